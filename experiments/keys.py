@@ -1,4 +1,4 @@
-"""How a project says what a column of readings means, for every kind of test."""
+"""Sections of columns and formats that several kinds of test share."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
-"""What a kind of test is to the rest of the house.
+"""The protocols of tests: how a kind reads, prepares and predicts, and the data they exchange.
 
 A project names tests; each is of a kind. A kind reads its section of the project into a `Test`,
 which makes models. Tests of a kind that can be fitted are prepared once (data read, or computed)
-and then give comparisons to a fit, in every process that runs starts; what a fit means for a test
-is told by the test itself. Nothing outside a folder of this package asks which kind a test is.
+and then give comparisons to a fit, in every process that runs starts; the kind's presenter says
+what a fit means for a test. Nothing outside a folder of this package asks which kind a test is.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,31 +42,30 @@ LONGEST = 80
 
 @dataclass(frozen=True)
 class Output:
-    """Where a test writes: below `folder`, names with `prefix` where several tests share it."""
+    """The place where a test writes: below `folder`, names with `prefix`."""
 
     folder: Path
     prefix: str = ""
 
     @classmethod
     def of(cls, folder: Path, test: str, several: bool) -> Output:
-        """Of a test by its name: before every file's where there are several tests.
+        """Return the output of a test; its name stands before every file's if there are several.
 
-        What the name of a file should not hold becomes a dash, and what is too long is cut; a few
-        digits then tell such names apart.
+        Characters that do not belong in the name of a file become dashes, and long names are cut; a
+        few digits then tell such names apart.
         """
         plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
         plain = plain.encode()[:LONGEST].decode(errors="ignore").strip("-.")
         if plain != test.replace(" ", "-"):
-            plain += f"-{hashlib.sha256(test.encode()).hexdigest()[:6]}"
-            plain = plain.strip("-")
+            plain = f"{plain}-{hashlib.sha256(test.encode()).hexdigest()[:6]}".strip("-")
         return cls(folder, f"{plain}-" if several else "")
 
     def name(self, file: str) -> str:
-        """The file's name below the folder."""
+        """Return the file's name below the folder."""
         return self.prefix + file
 
     def path(self, file: str) -> Path:
-        """The file."""
+        """Return the file."""
         return self.folder / self.name(file)
 
 
@@ -78,7 +78,7 @@ Refined = Literal["elements", "increments"]
 
 @dataclass(frozen=True)
 class Fabric:
-    """The one fabric that all tests of a project are of; thickness in mm before the test."""
+    """The one fabric of all tests of a project; thickness in mm before the test."""
 
     name: str
     thickness: float
@@ -87,7 +87,7 @@ class Fabric:
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of a project file by name, and what they are: MPa, MPa and mm per unit."""
+    """Units of a project file by name, and their sizes: MPa, MPa and mm per unit."""
 
     modulus: float = 1000.0
     pressure: float = 1e-3
@@ -99,7 +99,7 @@ class Scales:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a test stands: in which file, under which key, in which units, beside which data.
+    """The place of a test: its file and key, its units, the folder of its data.
 
     at : dotted key of its section, "bubble[0]". data_folder : instead of the folder that the
     section names. need_data : whether measured files must be there (a forward analysis does
@@ -114,17 +114,17 @@ class Place:
     need_data: bool = True
 
     def error(self, field: str, problem: str) -> InputError:
-        """An error in the section; `field` is the dotted key below it, "" for itself."""
+        """Return an error in the section; `field` is the dotted key below it, "" for itself."""
         return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What the data of a test say of the law, before any fit.
+    """The strains that the data of a test reach, before any fit.
 
-    strain : ends (eps1, eps2, gamma12) of the logarithmic strain that the test can reach, None
-    where it does not tell. break_shares : for each of them two shares of its end where the measured
-    stiffness changes most, for laws with regions; None where it does not tell.
+    strain : ends (eps1, eps2, gamma12) of the logarithmic strain, None where unknown. break_shares
+    : for each of them two shares of its end where the measured stiffness changes most, for laws
+    with regions; None where unknown.
     """
 
     strain: tuple[float | None, float | None, float | None] = (None, None, None)
@@ -132,52 +132,47 @@ class Reach:
 
 
 class Test(Protocol):
-    """One test as its section says: lengths mm, loads N, pressures and moduli MPa."""
+    """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa."""
 
     @property
     def kind(self) -> str:
-        """Name of its kind."""
+        """Return the name of its kind."""
 
     @property
     def name(self) -> str:
-        """Its own name in the project."""
+        """Return its own name in the project."""
 
     @property
     def weight(self) -> float:
-        """How much it counts among several tests in one fit."""
+        """Return how much it counts among several tests in one fit."""
 
     @property
     def reach(self) -> Reach:
-        """What its data say of the law."""
+        """Return the strains that its data reach."""
 
     @property
     def reads_files(self) -> bool:
-        """Whether its data are measured files, which a folder can be named for."""
+        """Return whether its data are measured files, which a folder can be named for."""
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, Any]:
-        """Models by the name of their part.
+        """Return models by the name of their part; raises InputError for an impossible mesh.
 
         thickness : mm, the fabric's unless given. what, factor : edges of elements, or increments,
         divided by a factor.
-
-        Raises
-        ------
-        InputError : a mesh or increments that cannot be had.
         """
 
     def settings(self) -> Mapping[str, object]:
-        """What a result depends on beside data, law and solver: for fingerprints; without paths."""
+        """Return settings, without paths, on which a result depends beside data, law, solver."""
 
 
 @dataclass(frozen=True, eq=False)
 class Studied:
-    """How a kind of test is studied with a card: what refinement, or nu12, changes.
+    """The quantities of a study with a card: under refinement, or with another nu12.
 
     steps : load levels of a model. quantities : of interest in a study of the mesh; responses : of
-    a study of nu12, in words `response`. curve : (x, y) along which levels are compared, None where
-    there is none.
+    a study of nu12, in words `response`. curve : (x, y) along which levels are compared, or None.
     """
 
     steps: Callable[[Any], Sequence[float]]
@@ -197,7 +192,7 @@ class CardRun:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """What forward analyses gave: numbers for result.json, lines for the terminal, figures."""
+    """The results of forward analyses: numbers for result.json, lines for the terminal, figures."""
 
     numbers: dict[str, Any]
     lines: Sequence[str] = ()
@@ -208,12 +203,11 @@ class Kind(Protocol):
     """A kind of test, as the registry holds it.
 
     name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
-    section : what such a table may say; `name` is among it, and `weight` where it is fitted.
-    fitted : whether its tests are `FittableTest`s. predicted : what tests offer that cards predict,
-    None for others. studied : None where no study runs it. A kind that knows tests worth making
-    next offers them (`candidates.Plannable`). A kind whose section names the folder of
-    measured files has `folder_key`, the dotted key of it, by which a project can be written down
-    with the folder that it was run with.
+    section : of such a table; `name` is among its keys, and `weight` where it is fitted. fitted :
+    whether its tests are `FittableTest`s. predicted : of tests that cards predict, None for others.
+    studied : None where no study runs it. A kind that knows tests worth making next is `Plannable`.
+    A kind with measured files in a folder has `folder_key`, the dotted key of it, by which a
+    project can be written down with the folder that it was run with.
     """
 
     name: str
@@ -224,21 +218,13 @@ class Kind(Protocol):
     studied: Studied | None
 
     def read(self, section: Any, place: Place, name: str) -> Test:
-        """Return the test of a section, in mm, N, MPa.
-
-        Raises
-        ------
-        InputError : naming the file and the dotted key, or a data file.
-        """
+        """Return the test of a section, in mm, N, MPa; raises InputError naming file and key."""
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Read the data of a test that is fitted, or compute them from its known solution.
 
-        law : all but the coefficients. Kinds that are only predicted do not have it.
-
-        Raises
-        ------
-        InputError : in the data. SolverFailure : the known solution cannot be run.
+        law : all but the coefficients. Kinds that are only predicted do not have it. Raises
+        InputError in the data, SolverFailure where the known solution cannot be run.
         """
 
 
@@ -248,11 +234,10 @@ Masks = Mapping[str, NDArray[np.bool_]]
 
 @dataclass(frozen=True)
 class Weighting:
-    """How much a test counts.
+    """The weight of a test.
 
     relative : the blocks of a test add up to `weight` times its mean relative RMS error, so that a
-    test of many blocks does not outvote one of few; otherwise they are as its own objective has
-    them.
+    test of many blocks does not outvote one of few; otherwise its own objective weighs them.
     """
 
     relative: bool = False
@@ -264,41 +249,36 @@ FittableTest = Test
 
 
 class PreparedTest(Protocol):
-    """A test with its data, in memory: what worker processes are given.
+    """A test with its data, in memory, as worker processes get it.
 
-    One whose data are measured files also offers them for the record of a run
-    (`data_files.OfFiles`), as a test that is predicted does.
-
-    A kind that looks at its data before a fit also has `doubts(expected)`, the reasons to doubt
-    them (`Doubt`); the kind itself then lists the names of its doubts, `Kind.doubts`.
+    One with measured files also has `data_files()`, for the record of a run (`OfFiles`), as a test
+    that is predicted does. A kind that looks at its data before a fit has `doubts(expected)`, and
+    then lists the names of its doubts, `Kind.doubts`.
     """
 
     @property
     def test(self) -> FittableTest:
-        """The test."""
+        """Return the test."""
 
     @property
     def objective_is(self) -> str:
-        """What its own objective is, in words."""
+        """Describe its own objective."""
 
     @property
     def known(self) -> HypoelasticLaw | None:
-        """The law behind computed data."""
+        """Return the law behind computed data."""
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Number of the specimen of each point that can be left out of a fit.
-
-        By name of the comparison; empty where nothing can be left out.
-        """
+        """Return by comparison the specimen of each point that can be left out of a fit."""
 
     def reach(self, masks: Masks) -> Reach:
-        """What the points matched say of the law; as the test's own where nothing is left out."""
+        """Return the strains that matched points reach; the test's own for all of them."""
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """What a fit compares: models, solvers, objectives, nuisance unknowns.
+        """Return the comparisons of a fit: models, solvers, objectives, nuisance unknowns.
 
         Each is named as the test, followed by its part where there are several: "strips: warp".
         """
@@ -306,7 +286,7 @@ class PreparedTest(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FittedTest:
-    """One test in the light of a finished fit.
+    """One test with the results of a finished fit.
 
     comparisons, histories : its own, in its own order, as `Weighting()` gives them. nuisance : by
     plain name, in the unit of each. law : the best; laws : of the best starts, best first.
@@ -326,10 +306,10 @@ class FittedTest:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What a fit means for one test.
+    """The meaning of a fit for one test.
 
-    numbers : for result.json. warnings : what a reader should know. lines : for the terminal.
-    quality : in a few words, for the card. summary : a clause for the head of the page.
+    numbers : for result.json. lines : for the terminal. quality : in a few words, for the card.
+    summary : a clause for the head of the page.
     """
 
     numbers: dict[str, Any]
@@ -341,13 +321,13 @@ class Findings:
 
 @dataclass(frozen=True, eq=False)
 class RunRecord:
-    """How a run of one test with one card ended, as it is stored.
+    """The end of a run of one test with one card, as it is stored.
 
-    seconds : wall clock, of when it was made. failure : why there is no result, "" where there is
-    one; early : the solver's own word for why it could go no further than it did, "" where it came
-    to the end. strain : (3,) largest (eps1, eps2, gamma12). arrays : what the kind of test keeps of
-    the history. iterations, unstable, remarks : as the solver says them. from_cache : it was made
-    earlier and taken from the cache of runs.
+    seconds : wall clock, when it was made. failure : why there is no result, "" where there is one;
+    early : the solver's reason for an end before the last frame, "" otherwise. strain : (3,)
+    largest (eps1, eps2, gamma12). arrays : that the kind of test keeps of the history. iterations,
+    unstable, remarks : as the solver has them. from_cache : it was made earlier and is a cached
+    run.
     """
 
     seconds: float
@@ -363,7 +343,7 @@ class RunRecord:
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """One test with one card: what was run, how it ended, what a reader should know of it.
+    """One test with one card: the model, how its run ended, and notes on it.
 
     end : of the band that the solver gives for the model, None where it has one answer. around :
     runs with laws around the card's, None where there are none.
@@ -380,83 +360,78 @@ class PredictedRun:
 
     @property
     def wall(self) -> str:
-        """Name of the wall that was run, "" where the solver has one answer."""
+        """Return the name of the wall that was run, "" where the solver has one answer."""
         return "" if self.end is None else self.end.name
 
     @property
     def predicted(self) -> bool:
-        """Whether it is what the solver predicts, not only the other end of its band."""
+        """Return whether the solver predicts it, not only as the other end of its band."""
         return self.end is None or self.end.predicted
 
     @property
     def title(self) -> str:
-        """Test and card; and the wall where it is the other end of a band."""
+        """Return test and card; and the wall where it is the other end of a band."""
         of = f"{self.test.name} with {self.card}"
         return of if self.predicted else f"{of}, {self.wall}"
 
 
 def band_of(runs: Iterable[PredictedRun]) -> list[BandEnd]:
-    """The ends of the band that the solver gave, first what is predicted; empty without one."""
+    """Return the ends of the band that the solver gave, the prediction first; empty without one."""
     ends = [run.end for run in runs if run.end is not None]
     return list({end.name: end for end in ends}.values())
 
 
 class Predicted(Protocol):
-    """What a kind of test offers whose tests are predicted with cards, not fitted."""
+    """The protocol of a kind of test that is predicted with cards, not fitted."""
 
     def depends_on(self, model: Any) -> Sequence[object]:
-        """All of a model that its result depends on: numbers, words, arrays, dataclasses."""
+        """Return all of a model that its result depends on: numbers, words, arrays, dataclasses."""
 
     def arrays(self, model: Any, history: History) -> Mapping[str, Array]:
-        """What is kept of a history, for everything that is told of it later.
-
-        Raises
-        ------
-        SolverFailure : the history is not what the model asks for.
-        """
+        """Return the arrays of a history that are kept; raises SolverFailure if they do not fit."""
 
     def early(self, model: Any, history: History) -> str:
-        """The solver's own word for an end before the last frame, "" where it came so far."""
+        """Return the solver's reason for an end before the last frame, "" where it came so far."""
 
     def measured(self, test: Any) -> bool:
-        """Whether a test has anything measured to compare runs with."""
+        """Return whether a test has anything measured to compare runs with."""
 
     def outcome(self, runs: Sequence[PredictedRun]) -> PredictedOutcome:
-        """What runs of tests of this kind say, in the order given."""
+        """Return the outcome of runs of tests of this kind, in the order given."""
 
 
 class PredictedOutcome(Protocol):
-    """What runs of one kind of test say; runs are named by their number in the order given."""
+    """The outcome of runs of one kind of test, numbered in the order given."""
 
     def ended(self, number: int) -> str:
-        """Whether a run came to its end ("finished"), how far it came, or why it failed."""
+        """Describe the end of a run: "finished", how far it came, or why it failed."""
 
     def error(self, number: int) -> float | None:
-        """RMS of model less measured over the largest measured value; None where there is none."""
+        """Return RMS of model less measured over the largest measured value, if measured."""
 
     def numbers(self, number: int) -> Mapping[str, Any]:
-        """Of a run that did not fail, for result.json."""
+        """Return the entries of result.json on a run that did not fail."""
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """The same as one row of a table: by the names of the columns, units in the names."""
+        """Return the same as one row of a table by names of columns, with units."""
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Frame by frame; no rows where the run failed."""
+        """Return the curve frame by frame; no rows where the run failed."""
 
     def test_numbers(self, test: Any) -> Mapping[str, Any]:
-        """What a test is, for result.json."""
+        """Return the entries of result.json on a test."""
 
     def lines(self) -> Sequence[str]:
-        """A table for the terminal."""
+        """Return a table for the terminal."""
 
 
 def record_of(
     kind: Predicted, model: Any, outcome: History | SolverFailure, seconds: float = 0.0
 ) -> RunRecord:
-    """The record of a run that ended, well or not.
+    """Return the record of a run that ended, well or not.
 
-    Whatever is no result is a failure: only the solver's own word for an end before the last frame
-    makes one.
+    A history that is no result is a failure: only the solver's own reason for an end before the
+    last frame makes it one.
     """
     if isinstance(outcome, History):
         try:
@@ -482,24 +457,24 @@ BEYOND = 1 + 1e-6
 
 
 def unstable_words(unstable: Sequence[str] | None) -> list[Note]:
-    """That equilibria at these loads (in words) are unstable, where there are any."""
+    """Note that equilibria at these loads (in words) are unstable, where there are any."""
     words = instability(unstable)
     return [Note(NoteKind.UNSTABLE, f"{words}: the model would not stay there")] if words else []
 
 
 def strains_of(history: History) -> Array:
-    """(3,) largest warp, fill and (either way) shear strain of an analysis."""
+    """Return (3,) largest warp, fill and (either way) shear strain of an analysis."""
     shear = max(abs(history.strain_min[2]), abs(history.strain_max[2]))
     return np.array([history.strain_max[0], history.strain_max[1], shear])
 
 
 def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
-    """Three values by the name of their strain component."""
+    """Return three values by the name of their strain component."""
     return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
 def beyond(reached: Array, ends: Array) -> list[tuple[str, float, float]]:
-    """Name, strain and end of each strain of `reached` (3,) that is beyond its end of `ends`."""
+    """Return name, strain and end of each strain of `reached` (3,) beyond its end of `ends`."""
     return [
         (name, float(s), float(end))
         for name, s, end in zip(STRAINS, reached, ends, strict=True)
@@ -508,51 +483,38 @@ def beyond(reached: Array, ends: Array) -> list[tuple[str, float, float]]:
 
 
 def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
-    """Where strains (3,) leave the range that a card is valid for."""
-    return [
-        Note(
-            NoteKind.BEYOND_CARD,
-            f"{name} strain {s:.3f} is beyond the card's valid range {end:.3f}: modulus held there",
-        )
-        for name, s, end in beyond(reached, card.law.strain_range)
-    ]
+    """Note where strains (3,) leave the range that a card is valid for."""
+    words = "{} strain {:.3f} is beyond the card's valid range {:.3f}: modulus held there"
+    found = beyond(reached, card.law.strain_range)
+    return [Note(NoteKind.BEYOND_CARD, words.format(*one)) for one in found]
 
 
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
-    """That a card that was run is of another thickness than the fabric's (mm), where it is."""
+    """Note that a card that was run is of another thickness than the fabric's (mm), where it is."""
     words = thickness_difference(card, thickness)
-    if words is None:
-        return []
-    return [Note(NoteKind.THICKNESS, f"{words}; it was run with the card's thickness")]
+    run = f"{words}; it was run with the card's thickness"
+    return [] if words is None else [Note(NoteKind.THICKNESS, run)]
 
 
 def beyond_range(reached: Array, ends: Array) -> list[Note]:
-    """Where strains (3,) of a fitted test leave the range that its law was given."""
-    return [
-        Note(
-            NoteKind.BEYOND_LAW,
-            f"{name} strain reached {s:.3f}, beyond law.strain_range {end:.4g}: the modulus was "
-            "held at its end value there; a wider range would let it vary",
-        )
-        for name, s, end in beyond(reached, ends)
-    ]
+    """Note where strains (3,) of a fitted test leave the range that its law was given."""
+    words = (
+        "{} strain reached {:.3f}, beyond law.strain_range {:.4g}: the modulus was held at its "
+        "end value there; a wider range would let it vary"
+    )
+    return [Note(NoteKind.BEYOND_LAW, words.format(*one)) for one in beyond(reached, ends)]
 
 
 def notes_of(history: History, card: MaterialCard) -> list[Note]:
-    """Everything to know of an analysis with a card."""
-    return _notes(history.remarks, strains_of(history), history.unstable, card)
+    """Return all notes on an analysis with a card."""
+    reached = beyond_card(strains_of(history), card)
+    return [*map(as_note, history.remarks), *reached, *unstable_words(history.unstable)]
 
 
 def notes_of_record(record: RunRecord, card: MaterialCard) -> list[Note]:
-    """The same of a run that is stored; nothing of one that failed, but its failure."""
-    reached = np.zeros(3) if record.strain is None else record.strain
-    return _notes(record.remarks, reached, record.unstable, card)
-
-
-def _notes(
-    remarks: Sequence[str], reached: Array, unstable: Sequence[str] | None, card: MaterialCard
-) -> list[Note]:
-    return [*map(as_note, remarks), *beyond_card(reached, card), *unstable_words(unstable)]
+    """Return all notes on a stored run; nothing of one that failed, but its failure."""
+    reached = [] if record.strain is None else beyond_card(record.strain, card)
+    return [*map(as_note, record.remarks), *reached, *unstable_words(record.unstable)]
 
 
 #: Of an unlimited law: no fabric is planned to be strained further (logarithmic).
@@ -561,10 +523,10 @@ MOST_STRAIN = 0.3
 
 @dataclass(frozen=True)
 class Precision:
-    """How precise the values of one comparison of the project are.
+    """The precision of the values of one comparison of the project.
 
-    noise : in the unit of its data, as its fit reckons with. alike : how many neighbours err as
-    one. values : of one block (a direction of displacement in one frame, a load curve).
+    noise : in the unit of its data, as its fit reckons with. alike : number of neighbours with one
+    error. values : of one block (a direction of displacement in one frame, a load curve).
     """
 
     noise: float
@@ -572,19 +534,17 @@ class Precision:
     values: int
 
     def at(self, values: int) -> float:
-        """Noise of independent values if `values` of them are to say as much."""
+        """Return the noise of independent values if `values` of them are to say as much."""
         return self.noise * float(np.sqrt(self.alike * values / self.values))
 
 
 @dataclass(frozen=True, eq=False)
 class Planning:
-    """What is known when a test is planned.
+    """The project as it is known when a test is planned.
 
-    Parameters
-    ----------
     present : the project's own tests of the kind, with their data. precision : by name of a
-        comparison. law : at the present optimum; candidates show what it makes of them.
-    noise : of the kind's measured values (mm, N), where a user gives it.
+    comparison. law : at the present optimum; candidates get their data from it. noise : of the
+    kind's measured values (mm, N), where a user gives it.
     """
 
     place: Place
@@ -596,7 +556,7 @@ class Planning:
 
     @property
     def ends(self) -> Array:
-        """(3,) strains (eps1, eps2, gamma12) to which a test is worth going: those of the law."""
+        """Return (3,) largest strains (eps1, eps2, gamma12) worth testing: those of the law."""
         return np.minimum(self.law.strain_range, MOST_STRAIN)
 
 
@@ -604,10 +564,10 @@ class Planning:
 class Candidate:
     """A test that could be made.
 
-    name : in a few words, one of its own. make : the test with data as the law makes them, its
-    objective's least noise that of independent values; raises SolverFailure where the law cannot
-    be run, InputError where there is no such model. noise_is : whose noise that is, in words.
-    specimens : how many are usually tested, each as good as the other.
+    name : in a few words, one of its own. make : return the test with data of the law, its
+    objective's least noise that of independent values; raises SolverFailure where the law cannot be
+    run, InputError where there is no such model. noise_is : the source of that noise, in words.
+    specimens : number that is usually tested, each as good as the other.
     """
 
     name: str
@@ -621,44 +581,41 @@ class Plannable(Protocol):
     """A kind of test that offers candidates."""
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Tests of the kind, as many as are worth comparing."""
+        """Return tests of the kind, as many as are worth comparing."""
 
 
 @runtime_checkable
 class Divisible(Protocol):
-    """A prepared test of which single parts can be left out of a fit.
+    """A prepared test that can leave single parts out of a fit.
 
-    Its `comparisons` take the masks of `parts`, and none is among them of which nothing is left.
-    Their objectives say by `of_points(values)` which residuals are of which points: (m,) of values
-    for the points of a mask; a bootstrap lets parts count several times, or not at all.
+    Its `comparisons` take the masks of `parts`, and none is among them that leaves nothing. Their
+    objectives have `of_points(values)`, (m,) for each residual, of values for the points of a mask;
+    a bootstrap lets parts count several times, or not at all.
     """
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """By sort ("frames", "specimens") and by name ("97 kPa"): the points kept without it.
+        """Return by sort ("frames", "specimens") and name ("97 kPa") the points kept without it.
 
         Only sorts of which the test has two or more. Masks are of every comparison of the test,
-        over its points in the order of its data; where they are turned round, its `comparisons`
-        are the part alone.
+        over its points in the order of its data; inverted masks give the comparisons of the part
+        alone.
         """
 
 
 @runtime_checkable
 class Refinable(Protocol):
-    """A prepared test whose fit can be asked what a finer, or a coarser, model would have shown."""
+    """A prepared test with finer, or coarser, models of its comparisons."""
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Its comparisons with edges of elements and increments divided by a factor.
+        """Return its comparisons with edges of elements and increments divided by a factor.
 
         Every residual is of the same measured value as that of `comparisons`. Where the data were
         computed with the fit's own model there is nothing finer: the same comparisons. A factor
-        below one makes larger elements, and leaves the increments as they are.
-
-        Raises
-        ------
-        InputError : there is no such mesh.
+        below one makes larger elements, and leaves the increments as they are. Raises InputError
+        without such a mesh.
         """
 
 
@@ -670,11 +627,8 @@ ROUGH = 4.0
 class Doubt:
     """One trap that the data of a test seem to have fallen into.
 
-    Parameters
-    ----------
-    name : of the trap, in one or two words joined by a hyphen: what is trusted by name.
-    sure : whether a fit of such data would be worthless; a warning otherwise.
-    text : what was seen, in numbers, what it probably is, and what to do.
+    name : one or two words joined by a hyphen, by which it is trusted. sure : whether a fit of such
+    data would be worthless; a warning otherwise. text : numbers, the probable cause, and a remedy.
     """
 
     name: str
@@ -684,27 +638,24 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is known of the fabric before the fit.
-
-    moduli : least and largest at rest, MPa, by name.
-    """
+    """Knowledge of the fabric before the fit; moduli : least and largest at rest, MPa, by name."""
 
     moduli: Mapping[str, tuple[float, float]]
 
     @property
     def warp_is_stiffer(self) -> bool:
-        """Whether the bounds mean the warp to be stiffer than the fill."""
+        """Return whether the bounds mean the warp to be stiffer than the fill."""
         (low, high), (least, largest) = self.moduli["E1"], self.moduli["E2"]
         return low * high > 1.5 * least * largest
 
     def outside(self, modulus: float, names: Sequence[str]) -> str:
-        """Words on a modulus (MPa) far out of the bounds of those named together, "" otherwise."""
+        """Describe a modulus (MPa) far out of the bounds of those named together; "" otherwise."""
         low = min(self.moduli[name][0] for name in names)
         high = max(self.moduli[name][1] for name in names)
         if low / ROUGH <= modulus <= high * ROUGH:
             return ""
-        whose = " and ".join(names)
-        return f"{modulus:.3g} MPa, and the bounds of {whose} are {low:.3g} to {high:.3g}"
+        bounds = f"the bounds of {' and '.join(names)} are {low:.3g} to {high:.3g}"
+        return f"{modulus:.3g} MPa, and {bounds}"
 
 
 @dataclass(frozen=True)
@@ -717,28 +668,24 @@ class Judgement:
 
     @property
     def errors(self) -> tuple[Doubt, ...]:
-        """Sure ones that nobody trusts."""
+        """Return sure doubts that are not trusted."""
         return tuple(d for d in self.doubts if d.sure and d.name not in self.trusted)
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What a reader of the result should know, trusted doubts with the word for it."""
+        """Return notes on all other doubts, with their name where they are trusted."""
         return tuple(
-            Note(NoteKind.DOUBTFUL, d.text + self._trusted(d), self.test)
+            Note(
+                NoteKind.DOUBTFUL,
+                d.text + f" (trusted: {d.name})" * (d.name in self.trusted),
+                self.test,
+            )
             for d in self.doubts
             if d not in self.errors
         )
 
-    def _trusted(self, doubt: Doubt) -> str:
-        return f" (trusted: {doubt.name})" if doubt.name in self.trusted else ""
-
     def demand(self, project: Path) -> None:
-        """Stop at the sure doubts.
-
-        Raises
-        ------
-        InputError : all of them in one line, each with the name by which it can be trusted.
-        """
+        """Raise an InputError with all sure doubts in one line, each with its name."""
         if self.errors:
             said = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
             problem = f"{said}. Correct the data, or let it pass with --trust NAME"
@@ -746,20 +693,16 @@ class Judgement:
 
 
 def judged(test: str, doubts: Sequence[Doubt], trust: Collection[str]) -> Judgement:
-    """The doubts of a test, sure ones first."""
-    ordered = tuple(sorted(doubts, key=lambda d: not d.sure))
-    return Judgement(test, ordered, frozenset(trust))
+    """Return the doubts of a test, sure ones first."""
+    return Judgement(test, tuple(sorted(doubts, key=lambda d: not d.sure)), frozenset(trust))
 
 
 @dataclass(frozen=True, eq=False)
 class DataFile:
-    """A measured file and what became of its rows.
+    """A measured file and the number of its rows that are used.
 
-    Parameters
-    ----------
-    source : its format, columns and units, and what was chosen where it leaves a choice.
-    used : how many of its rows count, None where that means nothing. dropped : how many do not, by
-        why.
+    source : its format, columns and units, and choices where it leaves any. used : number of rows,
+    None where that means nothing. dropped : number of other rows, by why.
     """
 
     path: Path
@@ -770,43 +713,35 @@ class DataFile:
 
 @runtime_checkable
 class OfFiles(Protocol):
-    """What a prepared test, or one that is predicted, offers beside its protocol for the record."""
+    """A prepared or predicted test with measured files."""
 
     def data_files(self) -> Sequence[DataFile]:
-        """Its measured files in the order in which they count; none where data are computed."""
+        """Return its measured files in their order; none where data are computed."""
 
 
 def files_of(test: object) -> tuple[DataFile, ...]:
-    """The measured files of a test; none of one whose kind does not offer them."""
+    """Return the measured files of a test; none of one without."""
     return tuple(test.data_files()) if isinstance(test, OfFiles) else ()
 
 
 def joined(parts: Iterable[DataFile]) -> list[DataFile]:
-    """One a file, in the order of their first part: rows of several parts are added up."""
+    """Return one entry a file, in the order of their first part: rows are added up."""
     by_path: dict[Path, list[DataFile]] = {}
     for part in parts:
         by_path.setdefault(part.path, []).append(part)
-    return [
-        DataFile(path, same[0].source, _used(same), _added(p.dropped for p in same))
-        for path, same in by_path.items()
-    ]
+    files = []
+    for path, same in by_path.items():
+        counts = [part.used for part in same if part.used is not None]
+        dropped = Counter[str]()
+        for part in same:
+            dropped.update(part.dropped)
+        left = {why: count for why, count in dropped.items() if count}
+        files.append(DataFile(path, same[0].source, sum(counts) if counts else None, left))
+    return files
 
 
-def _used(parts: Sequence[DataFile]) -> int | None:
-    counts = [part.used for part in parts if part.used is not None]
-    return sum(counts) if counts else None
-
-
-def _added(each: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
-    for counts in each:
-        for why, count in counts.items():
-            total[why] = total.get(why, 0) + count
-    return {why: count for why, count in total.items() if count}
-
-
-#: Of the directions that a card keeps, the least certain first, so many are run unless laws are
-#: drawn: the others hardly move the moduli, and each costs as much as the prediction itself.
+#: Number of a card's directions, least certain first, that are run unless laws are drawn: others
+#: hardly move the moduli, and each costs as much as the prediction itself.
 DIRECTIONS = 4
 #: Standard deviations of a step along a direction; the next where a modulus would not be positive.
 STEPS = (1.0, -1.0, 0.5, -0.5, 0.1, -0.1)
@@ -827,18 +762,18 @@ class Around:
 
     @property
     def failed(self) -> int:
-        """How many of the runs failed."""
+        """Return how many of the runs failed."""
         return sum(bool(record.failure) for record in self.records)
 
     @property
     def words(self) -> str:
-        """What was run."""
+        """Describe the runs."""
         lost = f", {self.failed} failed" if self.failed else ""
         along = "of its least certain directions" if self.by == "directions" else "laws drawn"
         return f"{len(self.records)} {along}{lost}"
 
     def sigma(self, own: Array, others: Sequence[Array | None]) -> Array:
-        """(frames,) one standard deviation of a curve; NaN where it is not known.
+        """Return (frames,) one standard deviation of a curve; NaN where it is not known.
 
         own : (frames,) of the card itself. others : the same of the runs, None of one that failed,
         shorter of one that ended early.
@@ -861,13 +796,10 @@ class Around:
 def laws_around(
     card: MaterialCard, samples: int | None
 ) -> tuple[Around | None, Sequence[HypoelasticLaw]]:
-    """The laws to be run around a card's, and how; nothing where the card is not said to be sure.
+    """Return the laws to be run around a card's, and how; nothing where the card has no certainty.
 
-    samples : how many laws are drawn; None for the least certain directions, 0 for nothing.
-
-    Raises
-    ------
-    ValueError : hardly any law that could be drawn has positive moduli.
+    samples : number of laws to draw; None for the least certain directions, 0 for nothing. Raises
+    ValueError where hardly any law that could be drawn has positive moduli.
     """
     sure = card.certainty
     if sure is None or samples == 0:

@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 def kinds() -> Mapping[str, Kind]:
-    """Every kind by name: ours, those that are fitted first, then those of plug-ins.
+    """Return every kind by name: ours, those that are fitted first, then those of plug-ins.
 
     Plug-ins that do not work are logged and left out.
     """
@@ -38,12 +38,7 @@ def kinds() -> Mapping[str, Kind]:
 
 
 def kind_named(name: str) -> Kind:
-    """The kind of this name; no other is imported.
-
-    Raises
-    ------
-    InputError : there is none. PlugInFailure : a plug-in that does not work.
-    """
+    """Return the kind of this name, importing no other; raises InputError, PlugInFailure."""
     if name in _folders():
         kind: Kind = import_module(f".{name}", __package__).KIND
         return kind
@@ -58,17 +53,12 @@ def report_of(name: str) -> Any:
     """Return the presenter of a kind of test: the module `report` of its folder, or `Kind.report`.
 
     It has `simulate(test, cards, runs, out, within_range)`, which writes the results of forward
-    analyses, runs by (card, part), and returns a `Simulation`.
-
-    Of tests that are fitted it also has `findings(prepared, fitted)`, which returns `Findings`;
-    `show(prepared, fitted, findings, out)`, which writes the files of a fit and returns an
-    `Exhibit`; `residuals(prepared, fitted)`, a table of every matched value (part, where,
-    quantity, measured, modelled, difference, unit); and, where the data are looked at before a
-    fit, `examine(prepared, out)`. Of tests that are predicted it has `show_outcome(outcome, out)`.
-
-    Raises
-    ------
-    InputError : there is no such kind. PlugInFailure : a plug-in that does not work.
+    analyses, runs by (card, part), and returns a `Simulation`. Of tests that are fitted it also has
+    `findings(prepared, fitted)`, which returns `Findings`; `show(prepared, fitted, findings, out)`,
+    which writes the files of a fit and returns an `Exhibit`; `residuals(prepared, fitted)`, a table
+    of every matched value (part, where, quantity, measured, modelled, difference, unit); and, where
+    the data are looked at before a fit, `examine(prepared, out)`. Of tests that are predicted it
+    has `show_outcome(outcome, out)`.
     """
     if name in _folders():
         return import_module(f".{name}.report", __package__)
@@ -85,7 +75,7 @@ def _of(plug_in: PlugIn) -> Kind:
 
 @cache
 def _folders() -> tuple[str, ...]:
-    """Folders of this package: each holds a `KIND` of that name."""
+    """Return the folders of this package: each holds a `KIND` of that name."""
     return tuple(
         module.name for module in iter_modules([str(Path(__file__).parent)]) if module.ispkg
     )
@@ -93,5 +83,5 @@ def _folders() -> tuple[str, ...]:
 
 @cache
 def _warn(text: str) -> None:
-    """Once a line: kinds are asked for many times."""
+    """Log a line once: kinds are asked for many times."""
     log.warning("%s", text)

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from ...materials.law import HypoelasticLaw
 from ..kinds import Candidate, MakeSolver, Place, Planning
 from .candidates import candidates
-from .data import prepare
-from .forward import STUDIED
-from .prepared import PreparedBubble
+from .prepared import PreparedBubble, prepare
 from .section import BubbleSection
-from .test import BubbleTest, read
+from .test import STUDIED, BubbleTest, read
 
 NAMES = (
     "length-unit", "zero-points", "repeated-frame", "z-flipped", "frame-order",
@@ -24,7 +22,7 @@ __all__ = ["KIND", "BubbleKind"]
 
 
 class BubbleKind:
-    """[[bubble]] of a project."""
+    """The kind of [[bubble]] in a project."""
 
     name = "bubble"
     title = "a bubble inflation test"
@@ -36,22 +34,17 @@ class BubbleKind:
     doubts = NAMES
 
     def read(self, section: BubbleSection, place: Place, name: str) -> BubbleTest:
-        """The test of a section; raises InputError."""
+        """Return the test of a section; raises InputError."""
         return read(section, place, name)
 
     def prepare(
         self, test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver
     ) -> PreparedBubble:
-        """Read the measured fields, or compute those of the known solution.
-
-        Raises
-        ------
-        InputError : in the data. SolverFailure : the known solution cannot be run.
-        """
+        """Read the measured fields, or compute those of the known solution."""
         return prepare(test, law, make_solver)
 
     def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """The same again, to more pressure, with an elliptic rim."""
+        """Return the same test again, to more pressure, with an elliptic rim."""
         return candidates(planning)
 
 

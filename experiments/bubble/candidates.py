@@ -35,7 +35,7 @@ REACHED = 0.7
 
 
 def candidates(planning: Planning) -> Sequence[Candidate]:
-    """Of the project's first bubble, or of a usual one where there is none."""
+    """Return variants of the project's first bubble, or of a usual one where there is none."""
     own = [test for test in planning.present if isinstance(test, PreparedBubble)]
     if own:
         first, noise_is = own[0].test, f"that of {own[0].test.name}"
@@ -58,7 +58,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 
 def _made(test: BubbleTest, sight: Precision, planning: Planning) -> PreparedBubble:
-    """The test with what the law shows in it, at the nodes of its model."""
+    """Return the test with the law's displacements at the nodes of its model."""
     law = planning.law
     model = with_sheet(test.model(), test.sheet, test.outline, FLAT)
     history = planning.make_solver().run(model, law)
@@ -74,7 +74,7 @@ def _made(test: BubbleTest, sight: Precision, planning: Planning) -> PreparedBub
 
 
 def _as_planned(test: BubbleTest) -> BubbleTest:
-    """The test as it would be made: matched at points, in millimetres, its rim at rest."""
+    """Return the test as it would be made: matched at points, in millimetres, its rim at rest."""
     sheet = replace(test.sheet, measured=False, moving_rim=False)
     return replace(test, match_by="points", objective="mm", sheet=sheet)
 
@@ -87,7 +87,7 @@ def _to(test: BubbleTest, more: Sequence[float]) -> BubbleTest:
 
 
 def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
-    """With a rim as long as the test's own, at pressures that strain the sheet about as much.
+    """Return the test with a rim as long as its own, at pressures that strain it about as much.
 
     Of a shallow dome of height h, p = h (N1/a^2 + N2/b^2) up to a factor; alike strained it is h
     that goes with the minor semi-axis b.
@@ -108,7 +108,7 @@ def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
 
 
 def _usual(planning: Planning) -> BubbleTest:
-    """A circular one, to a pressure at which the sheet is strained as far as the law is known."""
+    """Return a circular test, to a pressure that strains the sheet as far as the law is known."""
     law, ends = planning.law, planning.ends
     top = _pressure(law, REACHED * float(min(ends[:2])), planning.place.fabric.thickness)
     pressures = tuple(share * top for share in LEVELS)
@@ -134,7 +134,7 @@ def _usual(planning: Planning) -> BubbleTest:
 
 
 def _pressure(law: HypoelasticLaw, strain: float, thickness: float) -> float:
-    """MPa at which a shallow cap of the usual radius is strained so far in its middle.
+    """Return MPa at which a shallow cap of the usual radius is strained so far in its middle.
 
     Strain 2/3 (h/R)^2, curvature 2 h/R^2, tension that of the mean of both moduli.
     """

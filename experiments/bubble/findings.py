@@ -1,6 +1,4 @@
-"""What a fit means for a bubble test: how far it is off, what the offsets took, what was left
-out.
-"""
+"""Numbers and words on a fitted bubble test: the sheet, the frames taken, the registration."""
 
 from __future__ import annotations
 
@@ -10,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...inference.assessment import moduli_error
-from ...materials.forms.base import COMPONENTS
 from ...meshes.bubble_model import BubbleModel
-from ...notes import Note, NoteKind, percent
+from ...notes import Note, NoteKind
 from ...readers.pressure_log import ClockOffset
-from ..kinds import Findings, FittedTest
-from .objective import FieldObjective, displacement_offset
+from ..kinds import FittedTest
+from .objective import FieldObjective
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
@@ -29,10 +25,23 @@ NOT_BELIEVED = (
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "
     "[bubble.sheet] take the measured surface, look for modes, or take out a constant field"
 )
+#: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
+FAITHFUL = 6
+CRIME = (
+    "the data were computed by the very model that is fitted to them (same mesh, same increments, "
+    "same solver): an inverse crime, so that the errors are smaller than any test could make them"
+)
+
+
+def objective_of(fitted: FittedTest) -> FieldObjective:
+    """Return the objective of the test's one comparison."""
+    (comparison,) = fitted.comparisons
+    assert isinstance(comparison.objective, FieldObjective)
+    return comparison.objective
 
 
 def fitted_model(fitted: FittedTest) -> BubbleModel:
-    """The model with its parameters as the fit found them."""
+    """Return the model with its parameters as the fit found them."""
     (comparison,) = fitted.comparisons
     model: BubbleModel = comparison.model
     own = [n for n in comparison.nuisance if n.model_parameter is not None]
@@ -41,33 +50,29 @@ def fitted_model(fitted: FittedTest) -> BubbleModel:
 
 
 def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any]:
-    """For result.json; lengths mm, slack %."""
+    """Return the entries of result.json on the sheet; lengths mm, slack %."""
     sheet, model = prepared.test.sheet, fitted_model(fitted)
-    heights, surface = model.mesh.points[:, 2], prepared.sheet.surface
-    moved = model.rim_motion
-    numbers: dict[str, Any] = {
+    heights, surface, moved = model.mesh.points[:, 2], prepared.sheet.surface, model.rim_motion
+    taken = None
+    if sheet.constant:
+        rms = np.sqrt(np.mean(constant_field(fitted)[1] ** 2, axis=0))
+        taken = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
+    since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
+    return {
         "used": used_of(prepared),
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
         "slack_percent": [100 * s for s in model.slack] if sheet.slack else None,
         "rim_motion_mm": None if moved is None else float(np.linalg.norm(moved, axis=2).max()),
-        "constant_field_rms_mm": None,
-        "from_pressure_kPa": None,
+        "constant_field_rms_mm": taken,
+        "from_pressure_kPa": since,
     }
-    if sheet.constant:
-        field = constant_field(fitted)[1]
-        rms = np.sqrt(np.mean(field**2, axis=0))
-        numbers["constant_field_rms_mm"] = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
-    if sheet.since is not None:
-        numbers["from_pressure_kPa"] = 1e3 * prepared.test.pressures[sheet.since]
-    return numbers
 
 
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
-    """For the terminal: which of them the fit used, each with its size."""
-    words = []
-    surface = numbers["surface_mm"]
+    """Return the line of the terminal on what the fit used of the sheet, each with its size."""
+    words, surface = [], numbers["surface_mm"]
     if numbers["measured_rms_mm"] is not None:
         words.append(f"measured surface (followed to {numbers['measured_rms_mm']:.2g} mm RMS)")
     if numbers["modes_mm"]:
@@ -85,59 +90,72 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
         words.append(f"constant field taken out: {taken}")
     if numbers["from_pressure_kPa"] is not None:
         words.append(f"displacements counted from {numbers['from_pressure_kPa']:.4g} kPa")
-    return ["sheet: " + ("; ".join(words) if words else "flat and taut, its rim fixed")]
+    return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]
 
 
 def sheet_warnings(prepared: PreparedBubble) -> list[Note]:
-    """A real test of which nothing is known of the sheet's shape."""
+    """Warn of a real test of which nothing is known of the sheet's shape."""
     if prepared.known is not None or prepared.test.sheet.known:
         return []
     return [Note(NoteKind.FLAT_SHEET, NOT_BELIEVED)]
 
 
-def used_of(prepared: PreparedBubble) -> list[str]:
-    sheet = prepared.test.sheet
-    return [
-        words
-        for words, on in (
-            ("measured surface", sheet.measured),
-            ("modes", sheet.modes),
-            ("slack", sheet.slack),
-            ("measured rim", sheet.moving_rim),
-            ("constant field", sheet.constant),
-            ("loaded reference frame", sheet.since is not None),
+def match_warnings(prepared: PreparedBubble) -> list[Note]:
+    """Warn of data computed by the fitted model, and of surfaces too coarse to follow a bubble."""
+    test, notes = prepared.test, []
+    if prepared.by_this_model:
+        notes.append(Note(NoteKind.INVERSE_CRIME, CRIME))
+    if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
+        words = (
+            f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk "
+            "closely and bias the moduli, also without noise; matching by points does not"
         )
-        if on
-    ]
+        notes.append(Note(NoteKind.SURFACES, words))
+    return notes
+
+
+def used_of(prepared: PreparedBubble) -> list[str]:
+    """Return in words what the fit used of the sheet."""
+    sheet = prepared.test.sheet
+    on = {
+        "measured surface": sheet.measured,
+        "modes": sheet.modes,
+        "slack": sheet.slack,
+        "measured rim": sheet.moving_rim,
+        "constant field": sheet.constant,
+        "loaded reference frame": sheet.since is not None,
+    }
+    return [words for words, used in on.items() if used]
 
 
 def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
-    """Places (n, 2) mm and the field (n, 3) mm that was taken out there."""
-    (comparison,) = fitted.comparisons
-    objective = comparison.objective
-    assert isinstance(objective, FieldObjective)
+    """Return places (n, 2) mm and the field (n, 3) mm that was taken out there."""
+    objective = objective_of(fitted)
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     field = objective.constant_field(fitted.histories[0].displacement, fitted.nuisance)
     places = np.zeros((len(field), 2))
     for target in objective.targets:
-        places[target.places] = target.at(comparison.model.mesh.points[:, :2])
+        places[target.places] = target.at(nodes)
     return places, field
 
 
+def recorded_of(prepared: PreparedBubble) -> RecordedFrames | None:
+    """Return the frames chosen by pressure; None where the project names all pressures."""
+    data = prepared.test.data
+    return data.recorded if isinstance(data, PointFiles) else None
+
+
 def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
-    """For result.json: pressures in kPa, the clocks' offset in s."""
-    asked, doubt = taken.asked, taken.doubt
+    """Return the entries of result.json on the frames: pressures in kPa, the offset in s."""
+    kilos = {"pressure_kPa": taken.pressure, "asked_kPa": taken.asked, "uncertain_kPa": taken.doubt}
+    known = {name: own for name, own in kilos.items() if own is not None}
     numbers: dict[str, Any] = {
         "from": taken.source,
         "frames": taken.count,
         "left_out": dict(taken.left_out),
         "taken": [
-            {
-                "frame": name,
-                "pressure_kPa": 1e3 * float(taken.pressure[i]),
-                **({} if asked is None else {"asked_kPa": 1e3 * float(asked[i])}),
-                **({} if doubt is None else {"uncertain_kPa": 1e3 * float(doubt[i])}),
-            }
-            for i, name in enumerate(taken.names)
+            {"frame": frame, **{name: 1e3 * float(own[i]) for name, own in known.items()}}
+            for i, frame in enumerate(taken.names)
         ],
     }
     clock = taken.clock
@@ -152,24 +170,21 @@ def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
 
 
 def recorded_lines(taken: RecordedFrames) -> list[str]:
-    """For the terminal."""
+    """Return the lines of the terminal on the frames taken."""
     left_out = "".join(f", {count} {why}" for why, count in taken.left_out.items())
-    lines = [
-        f"pressures from {taken.source}: {len(taken.names)} of {taken.count} frames taken{left_out}"
-    ]
+    count = f"{len(taken.names)} of {taken.count} frames taken{left_out}"
+    lines = [f"pressures from {taken.source}: {count}"]
     if taken.asked is not None:
-        off = np.abs(taken.pressure - taken.asked)
-        worst = int(np.argmax(off))
+        worst = int(np.argmax(np.abs(taken.pressure - taken.asked)))
         lines[0] += (
             f"; farthest from the pressure asked for: {1e3 * taken.pressure[worst]:.4g} in place of"
             f" {1e3 * taken.asked[worst]:.4g} kPa"
         )
-    if taken.clock is not None:
-        lines.append(clock_words(taken.clock))
-    return lines
+    return lines if taken.clock is None else [*lines, clock_words(taken.clock)]
 
 
 def clock_words(clock: ClockOffset) -> str:
+    """Describe how far the clocks are apart, and how sure that is."""
     ahead = f"clock of the log less that of the frames: {clock.offset:.2f} s"
     if clock.misfit is None:
         return f"{ahead}, given"
@@ -182,9 +197,9 @@ def clock_words(clock: ClockOffset) -> str:
 
 
 def registration_numbers(found: Registration) -> dict[str, Any]:
-    """For result.json."""
+    """Return the entries of result.json on the registration."""
     seen = [m for m in found.motions if m.points]
-    warp, rim, given = found.warp, found.rim, found.options
+    warp, rim = found.warp, found.rim
     return {
         "origin_mm": found.placement.origin.tolist(),
         "axes": found.placement.axes.tolist(),
@@ -194,7 +209,7 @@ def registration_numbers(found: Registration) -> dict[str, Any]:
         "warp_degrees": found.warp_angle,
         "warp": "given" if warp is None else {"error_degrees": warp.error, "clear": warp.clear},
         "clamp_motion": {
-            "removed": bool(seen) and given.remove_clamp_motion,
+            "removed": bool(seen) and found.options.remove_clamp_motion,
             "shift_mm": [float(np.linalg.norm(m.shift)) for m in seen],
             "turn_degrees": [m.angle for m in seen],
         },
@@ -202,7 +217,7 @@ def registration_numbers(found: Registration) -> dict[str, Any]:
 
 
 def registration_line(found: Registration) -> str:
-    """One line for the terminal."""
+    """Return the line of the terminal on the registration."""
     x, y, z = found.placement.origin
     how = "given" if found.warp is None else f"+- {found.warp.error:.1g}"
     return (
@@ -211,81 +226,8 @@ def registration_line(found: Registration) -> str:
     )
 
 
-#: Below this degree polynomial surfaces follow a bubble so badly that the moduli are biased.
-FAITHFUL = 6
-CRIME = (
-    "the data were computed by the very model that is fitted to them (same mesh, same increments, "
-    "same solver): an inverse crime, so that the errors are smaller than any test could make them"
-)
-
-
-def objective_of(fitted: FittedTest) -> FieldObjective:
-    """The objective of the test's one comparison."""
-    (comparison,) = fitted.comparisons
-    assert isinstance(comparison.objective, FieldObjective)
-    return comparison.objective
-
-
-def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
-    """Numbers for result.json, warnings, and words for terminal, card and page."""
-    test, objective = prepared.test, objective_of(fitted)
-    offset = displacement_offset(fitted.nuisance)
-    mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
-    numbers: dict[str, Any] = {
-        "mean_abs_mm": mean,
-        "nuisance": {
-            "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
-            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
-        },
-        "data": {
-            "matched_by": test.match_by,
-            "places": [len(t.displacement) for t in objective.targets],
-            "doubtful_dropped": prepared.dropped,
-            **_as_read(prepared),
-            "outside_dropped": prepared.outside,
-        },
-    }
-    taken = recorded_of(prepared)
-    if taken is not None:
-        numbers["data"]["pressures"] = recorded_numbers(taken)
-    numbers["sheet"] = sheet_numbers(prepared, fitted)
-    if prepared.surfaces:
-        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
-    lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    lines += [] if taken is None else recorded_lines(taken)
-    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
-    lines += [f"data: {note}" for note in notes]
-    if prepared.known is not None:
-        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
-        numbers["moduli_error"] = errors
-        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
-        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
-        said = ", ".join(
-            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
-        )
-        lines.append(f"largest error of the moduli over the strain reached: {said}")
-    if prepared.registration is not None:
-        numbers["registration"] = registration_numbers(prepared.registration)
-        lines.append(registration_line(prepared.registration))
-    lines += sheet_lines(numbers["sheet"])
-    lines += _offset_words(prepared, fitted)
-    return Findings(
-        numbers,
-        (*sheet_warnings(prepared), *_warnings(prepared)),
-        tuple(lines),
-        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
-        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
-    )
-
-
-def recorded_of(prepared: PreparedBubble) -> RecordedFrames | None:
-    """By which pressures its frames were taken; None where the project names them all."""
-    data = prepared.test.data
-    return data.recorded if isinstance(data, PointFiles) else None
-
-
-def _as_read(prepared: PreparedBubble) -> dict[str, Any]:
-    """Which columns of the files were read, and how many rows were dropped, by why."""
+def read_numbers(prepared: PreparedBubble) -> dict[str, Any]:
+    """Return the entries of result.json on the columns read and the rows dropped, by why."""
     source, dropped = prepared.fields[0].source, Counter[str]()
     for field in prepared.fields:
         dropped.update(field.dropped)
@@ -293,22 +235,8 @@ def _as_read(prepared: PreparedBubble) -> dict[str, Any]:
     return {"dropped": dict(dropped), **({"read": read} if source.format else {})}
 
 
-def _offset_words(prepared: PreparedBubble, fitted: FittedTest) -> list[str]:
+def nuisance_lines(fitted: FittedTest) -> list[str]:
+    """Return the line of the terminal on the offsets that were fitted; none without any."""
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
-    if not units:
-        return []
     said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
-    return [f"nuisance: {said}"]
-
-
-def _warnings(prepared: PreparedBubble) -> list[Note]:
-    test, notes = prepared.test, []
-    if prepared.by_this_model:
-        notes.append(Note(NoteKind.INVERSE_CRIME, CRIME))
-    if test.match_by != "surfaces" or test.match_degree >= FAITHFUL:
-        return notes
-    words = (
-        f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk closely "
-        "and bias the moduli, also without noise; matching by points does not"
-    )
-    return [*notes, Note(NoteKind.SURFACES, words)]
+    return [f"nuisance: {said}"] if units else []

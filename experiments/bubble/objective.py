@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,20 +37,19 @@ CORRELATION = 0.05
 
 
 def displacement_offset(nuisance: Mapping[str, float]) -> Array:
-    """(3,) mm; zero where it is no unknown."""
+    """Return (3,) mm; zero where it is no unknown."""
     return np.array([nuisance.get(name, 0.0) for name in OFFSETS])
 
 
 @dataclass(frozen=True, eq=False)
 class FieldTarget:
-    """What the displacement field should be at one pressure.
+    """The displacement field that was measured at one pressure.
 
     displacement (n, 3) mm at n places; `sample` (n, nodes) takes model nodes to these places
-    (None: the places are the nodes). places : (n,) their numbers, by which the same place is known
-    in other targets; needed for a field that is constant. frame : of the model's history, the
-    target's own number unless given; since : the frame from which the displacement is counted,
-    None for the reference state. at_rest : (n, 2) mm, where the places are before the test; needed
-    for what neighbours have in common.
+    (None: the places are the nodes). places : (n,) numbers, the same for a place in all targets;
+    needed for a constant field. frame : of the model's history, the target's own number unless
+    given; since : the frame from which the displacement is counted, None for the reference state.
+    at_rest : (n, 2) mm, the places before the test.
     """
 
     pressure: float
@@ -62,13 +61,19 @@ class FieldTarget:
     at_rest: Array | None = None
 
     def at(self, nodal: Array) -> Array:
-        """Model displacement (nodes, ...) at the places, (n, ...)."""
+        """Return the model's displacement (nodes, ...) at the places, (n, ...)."""
         if self.sample is None:
             return nodal
         return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
 
+    def only(self, which: NDArray[Any]) -> FieldTarget:
+        """Return the target of some of its places; `sample` is left as it is."""
+        places = None if self.places is None else self.places[which]
+        rest = None if self.at_rest is None else self.at_rest[which]
+        return replace(self, displacement=self.displacement[which], places=places, at_rest=rest)
+
     def of(self, frames: Array, number: int) -> Array:
-        """The same of frames (frames, nodes, ...), as target `number` of its objective."""
+        """Return that of frames (frames, nodes, ...), as target `number` of its objective."""
         here = frames[number if self.frame is None else self.frame]
         return self.at(here if self.since is None else here - frames[self.since])
 
@@ -76,19 +81,11 @@ class FieldTarget:
 class FieldObjective:
     """Residual blocks for displacement fields at several pressures, x, y, z at each.
 
-    Parameters
-    ----------
-    targets : one a reported pressure, in the order of the model's frames.
-    normalise : "e" (Eq. 4.8) or "mm".
-    weight : of every block in e.
-    noise : mm, of one measured displacement, to reckon with at least; that of a good image
-        correlation unless given.
+    targets : one a reported pressure, in the order of the model's frames. normalise : "e" (Eq. 4.8)
+    or "mm". weight : of every block in e. noise : mm, of one measured displacement, at least.
     constant : directions (0 to 2) in which a field that is the same at all pressures is projected
-        out: at every place the weighted mean over the pressures of model less measured is zero.
-
-    Raises
-    ------
-    InputError : a direction without any displacement cannot be normalised by it.
+    out: at every place the weighted mean over the pressures of model less measured is zero.
+    Raises InputError for a direction without any displacement to normalise by.
     """
 
     #: What the residuals are in after `scale`.
@@ -109,42 +106,39 @@ class FieldObjective:
         for target in self.targets:
             largest = np.abs(target.displacement).max(axis=0)
             if normalise == "e" and not (largest > 0).all():
-                axis = "xyz"[int(np.argmin(largest))]
-                raise InputError(
-                    None,
-                    f"data at {target.pressure * 1e3:g} kPa",
-                    f"d{axis} is zero everywhere: nothing to match (is a column mapped wrongly?)",
-                )
+                zero = f"d{'xyz'[int(np.argmin(largest))]} is zero everywhere"
+                problem = f"{zero}: nothing to match (is a column mapped wrongly?)"
+                raise InputError(None, f"data at {target.pressure * 1e3:g} kPa", problem)
             count = np.sqrt(len(target.displacement))
             self.scales.append(count / weight * (largest if normalise == "e" else np.ones(3)))
         self.sizes = tuple(len(t.displacement) for t in self.targets for _ in "xyz")
 
     @property
     def scale(self) -> Array:
-        """(m,): millimetres in one unit of each residual."""
+        """Return (m,) millimetres in one unit of each residual."""
         return np.repeat(np.concatenate(self.scales), self.sizes)
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Everything measured that the residual depends on."""
+        """Return everything measured that the residual depends on."""
         places = [t.sample.data for t in self.targets if t.sample is not None]
         return (*(t.displacement for t in self.targets), *places)
 
     @property
     def places(self) -> tuple[Array, ...]:
-        """(n, 2) mm at rest of every block's values; empty where they are not known."""
+        """Return (n, 2) mm at rest of every block's values; empty where they are not known."""
         known = [target.at_rest for target in self.targets if target.at_rest is not None]
         if len(known) < len(self.targets):
             return ()
         return tuple(places for places in known for _ in "xyz")
 
     def of_points(self, values: Array) -> Array:
-        """(m,) for each residual, of values for each place of the targets, frame by frame."""
+        """Return (m,) for each residual, of values for each place, frame by frame."""
         ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
         return np.concatenate([np.tile(own, 3) for own in np.split(values, ends)])
 
     def shifted(self, here: History, there: History) -> FieldObjective:
-        """The objective of a model that moves as `here` where this one moves as `there`."""
+        """Return the objective of a model that moves as `here` where this one moves as `there`."""
         other = copy.copy(self)
         by = here.displacement - there.displacement
         other.targets = tuple(
@@ -154,8 +148,7 @@ class FieldObjective:
         return other
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Blocks laid end to end, (m,); offset_x, offset_y, offset_z (mm) are added to the model's
-        displacement."""
+        """Return the blocks laid end to end, (m,); the model is moved by the offsets."""
         parts = self.differences(history.displacement, nuisance)
         return np.concatenate(
             [(d / s).T.reshape(-1) for d, s in zip(parts, self.scales, strict=True)]
@@ -164,37 +157,35 @@ class FieldObjective:
     def modelled(
         self, displacement: Array, nuisance: Mapping[str, float] | None = None
     ) -> list[Array]:
-        """(n, 3) mm of each target, from the model's (frames, nodes, 3): offset included."""
+        """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
         shift = displacement_offset(nuisance or {})
         return [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
 
     def differences(
         self, displacement: Array, nuisance: Mapping[str, float] | None = None
     ) -> list[Array]:
-        """Model less measured (n, 3) mm of each target, without a constant field."""
-        modelled = self.modelled(displacement, nuisance)
-        return self._varying(
-            [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
-        )
+        """Return model less measured (n, 3) mm of each target, without a constant field."""
+        return self._varying(self._off(displacement, nuisance))
 
     def constant_field(
         self, displacement: Array, nuisance: Mapping[str, float] | None = None
     ) -> Array:
-        """(places, 3) mm, measured less model as far as it is the same at all pressures."""
+        """Return (places, 3) mm, measured less model as far as it is the same at all pressures."""
+        return -self._mean(self._off(displacement, nuisance))
+
+    def _off(self, displacement: Array, nuisance: Mapping[str, float] | None) -> list[Array]:
         modelled = self.modelled(displacement, nuisance)
-        return -self._mean(
-            [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
-        )
+        return [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
 
     def _varying(self, parts: list[Array]) -> list[Array]:
-        """Values (n, 3, ...) of each target less their mean over the pressures, place by place."""
+        """Return values (n, 3, ...) of each target less their mean over the pressures by place."""
         if not self.constant:
             return parts
         mean = self._mean(parts)
         return [part - mean[t.places] for part, t in zip(parts, self.targets, strict=True)]
 
     def _mean(self, parts: list[Array]) -> Array:
-        """(places, 3, ...), weighted as the squares of the residuals are; zero if not constant."""
+        """Return (places, 3, ...), weighted as the squared residuals; zero if not constant."""
         numbers = [t.places for t in self.targets if t.places is not None]
         count = 1 + max(int(own.max()) for own in numbers)
         total, weights = np.zeros((count, *parts[0].shape[1:])), np.zeros((count, 3))
@@ -210,7 +201,7 @@ class FieldObjective:
         return np.asarray(mean)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """(m, parameters) from d displacement (frames, nodes, 3, parameters)."""
+        """Return (m, parameters) from d displacement (frames, nodes, 3, parameters)."""
         count = slope.shape[-1]
         parts = self._varying([target.of(slope, k) for k, target in enumerate(self.targets)])
         return np.concatenate(
@@ -221,7 +212,7 @@ class FieldObjective:
         )
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """(m, names): slope of the residual by offset_x, offset_y, offset_z (mm)."""
+        """Return (m, names), the slope of the residual by offset_x, offset_y, offset_z (mm)."""
         unknown = [name for name in names if name not in OFFSETS]
         if unknown:
             raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
@@ -234,7 +225,7 @@ class FieldObjective:
     def mean_absolute(
         self, displacement: Array, nuisance: Mapping[str, float] | None = None
     ) -> float:
-        """Mean over all places and pressures of |dx| + |dy| + |dz| differences, mm."""
+        """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""
         parts = self.differences(displacement, nuisance)
         return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())
 
@@ -244,7 +235,7 @@ LEAST_SHARE = 0.1
 
 
 def folded(field: DisplacementField) -> DisplacementField:
-    """A full field folded onto the quarter x, y >= 0."""
+    """Fold a full field onto the quarter x, y >= 0."""
     sign = np.where(field.points < 0, -1.0, 1.0)
     moved = field.displacement.copy()
     moved[:, :2] *= sign
@@ -252,7 +243,7 @@ def folded(field: DisplacementField) -> DisplacementField:
 
 
 def mirrored(field: DisplacementField) -> DisplacementField:
-    """A quarter's field mirrored to the full disk."""
+    """Mirror a quarter's field to the full disk."""
     if (field.points < -1e-9).any():
         return field
     points, moved = [], []
@@ -261,31 +252,26 @@ def mirrored(field: DisplacementField) -> DisplacementField:
         moved.append(field.displacement * (sx, sy, 1))
     xy, u = np.concatenate(points), np.concatenate(moved)
     _, once = np.unique(np.round(xy, 6), axis=0, return_index=True)
-    z, sigma = (
-        None if value is None else np.tile(value, 4)[once] for value in (field.z, field.sigma)
-    )
+    z, sigma = (None if own is None else np.tile(own, 4)[once] for own in (field.z, field.sigma))
     return replace(field, points=xy[once], displacement=u[once], z=z, sigma=sigma)
 
 
 def at_nodes(
     sources: Sequence[DisplacementField | DisplacementSurface], mesh: Mesh
 ) -> list[FieldTarget]:
-    """Targets on the model's nodes, from computed fields or polynomial surfaces."""
-    nodes = mesh.points[:, :2]
-    return [
-        FieldTarget(
-            source.pressure,
-            source.evaluate(nodes)
-            if isinstance(source, DisplacementSurface)
-            else _interpolated(source, mesh),
-            at_rest=nodes,
-        )
-        for source in sources
-    ]
+    """Return targets on the model's nodes, from computed fields or polynomial surfaces."""
+    nodes, targets = mesh.points[:, :2], []
+    for source in sources:
+        if isinstance(source, DisplacementSurface):
+            moved = source.evaluate(nodes)
+        else:
+            moved = _interpolated(source, mesh)
+        targets.append(FieldTarget(source.pressure, moved, at_rest=nodes))
+    return targets
 
 
 def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
-    """Computed displacements at the model's nodes; exact when the meshes are the same."""
+    """Return computed displacements at the model's nodes; exact when the meshes are the same."""
     nodes = mesh.points[:, :2]
     if nodes.shape == field.points.shape and np.allclose(nodes, field.points, atol=1e-9):
         return field.displacement
@@ -300,7 +286,7 @@ def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
 
 
 def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
-    """How displacements of the nodes are read at points: as the camera does, if that is known."""
+    """Return how displacements are read at points: as the camera does, if that is known."""
     reading = SmoothReading.of(mesh)
     return reading if test.facet is None else FacetReading(reading, test.facet)
 
@@ -308,11 +294,9 @@ def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
 def at_points(
     test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
-    """Targets at the measured points on the disk, and how many lie beyond its rim.
+    """Return targets at the measured points on the disk, and how many lie beyond its rim.
 
-    Raises
-    ------
-    InputError : next to no point lies on the disk, or all of them near its centre.
+    Raises InputError where next to no point lies on the disk, or all of them near its centre.
     """
     targets, outside = [], 0
     reading, before = reading_of(test, mesh), None
@@ -324,14 +308,13 @@ def at_points(
         outside += int((~inside).sum())
         _check_scale(test, field, inside)
         rest = field.points[inside]
-        targets.append(
-            FieldTarget(field.pressure, field.displacement[inside], sample, at_rest=rest)
-        )
+        moved = field.displacement[inside]
+        targets.append(FieldTarget(field.pressure, moved, sample, at_rest=rest))
     return targets, outside
 
 
 def _check_scale(test: BubbleTest, field: DisplacementField, inside: NDArray[np.bool_]) -> None:
-    """Metres taken for millimetres, or the other way round, show in where the points lie."""
+    """Raise InputError where points lie as if metres were taken for millimetres, or vice versa."""
     reach = float(np.abs(field.points).max())
     if inside.mean() < LEAST_SHARE:
         where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of"
@@ -354,11 +337,11 @@ POWER = 2.0 / 3.0
 
 
 def at_rest(fields: Sequence[DisplacementField], since: int) -> list[DisplacementField]:
-    """The fields with places in the sheet without load, where they are those of frame `since`.
+    """Return fields with places in the sheet without load, where they are those of frame `since`.
 
     That is so where the picture that all displacements are counted from was taken at the pressure
-    of this frame: nothing moves in it. How far its places have moved already is told by the next
-    frame: in-plane displacements grow with p^(2/3). Other fields are left as they are.
+    of this frame: nothing moves in it. The next frame shows how far its places have moved already:
+    in-plane displacements grow with p^(2/3). Other fields are left as they are.
     """
     first = fields[since]
     if first.displacement.any():
@@ -371,7 +354,7 @@ def at_rest(fields: Sequence[DisplacementField], since: int) -> list[Displacemen
 
 
 def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarget]:
-    """The targets with the numbers of their places, the same place having the same in all.
+    """Return the targets with numbers of their places, equal for the same place in all.
 
     nodes : (nodes, 2) mm, of the model.
     """
@@ -385,11 +368,9 @@ def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarge
 
 
 def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget]:
-    """Targets, with places, less that of the frame `since`, from which the others are counted.
+    """Return targets, with places, less that of the frame `since`, from which they are counted.
 
-    Raises
-    ------
-    InputError : a frame that shares too few places with it.
+    Raises InputError for a frame that shares too few places with it.
     """
     origin = targets[since]
     assert origin.places is not None
@@ -407,15 +388,6 @@ def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget
             raise InputError(None, "sheet.from_pressure", problem)
         moved = target.displacement[mine] - origin.displacement[its]
         sample = None if target.sample is None else target.sample[mine]
-        relative.append(
-            replace(
-                target,
-                displacement=moved,
-                sample=sample,
-                places=target.places[mine],
-                at_rest=None if target.at_rest is None else target.at_rest[mine],
-                frame=k,
-                since=since,
-            )
-        )
+        own = target.only(mine)
+        relative.append(replace(own, displacement=moved, sample=sample, frame=k, since=since))
     return relative

@@ -1,4 +1,4 @@
-"""[bubble.data.points]: the files of measured displacements, and how they are read."""
+"""The files of [bubble.data.points]: measured displacements, and the pressures of their frames."""
 
 from __future__ import annotations
 
@@ -47,41 +47,31 @@ def pressures_by_log(
     place: Place,
     folder: Path,
 ) -> tuple[ClockOffset, list[str]]:
-    """The pressures of all frames by a log, and what the frames are called.
+    """Return the pressures of all frames by a log, and the frames' names.
 
-    folder : of the data, where the log may be too.
-
-    Raises
-    ------
-    InputError : naming file and key: in the log or the frames, times that cannot be had, clocks
-        that cannot be put together.
+    folder : of the data, where the log may be too. Raises InputError naming file and key for a bad
+    log or frame, times that are missing, clocks that cannot be matched.
     """
     at = f"{AT}.log"
     file = _beside(section.file, place, folder, f"{at}.file")
+    kind = named_format(place, f"{at}.format", "machine table", section.format)
+    pressure, time = channel_of(section.pressure), channel_of(section.time)
     log = read_pressure_log(
-        file,
-        LogOptions(
-            channel_of(section.pressure),
-            channel_of(section.time),
-            named_format(place, f"{at}.format", "machine table", section.format),
-            section.comment,
-            section.decimal,
-        ),
+        file, LogOptions(pressure, time, kind, section.comment, section.decimal)
     )
     heights, names = [], []
     for one in files:
         # One file at a time: all frames of a test need not be in memory at once.
         risen = apex_heights(read_frames([one], options, format))
         heights += risen.tolist()
-        several = len(risen) > 1
-        names += [f"{one.name}, frame {i + 1}" if several else one.name for i in range(len(risen))]
+        count = len(risen)
+        names += [f"{one.name}, frame {i + 1}" if count > 1 else one.name for i in range(count)]
     height = np.array(heights)
     try:
         times = _frame_times(section, files, len(height), place, folder)
-        if section.offset is not None:
-            given = section.offset
-            return given_offset(given, times, height, log.time, log.pressure), names
-        return find_offset(times, height, log.time, log.pressure), names
+        seen = times, height, log.time, log.pressure
+        given = section.offset
+        return find_offset(*seen) if given is None else given_offset(given, *seen), names
     except InputError as error:
         if error.path is not None:
             raise
@@ -91,7 +81,7 @@ def pressures_by_log(
 def _frame_times(
     section: LogSection, files: Sequence[Path], count: int, place: Place, folder: Path
 ) -> Array:
-    """Times (frames,) in s by the camera's clock."""
+    """Return times (frames,) in s by the camera's clock."""
     by_name = bool(section.time_in_name)
     if by_name == (section.times is not None) and (by_name or section.rate is None):
         problem = "expected one of 'rate', 'times' and 'time_in_name' for the times of the frames"
@@ -111,26 +101,18 @@ def _frame_times(
         assert section.rate is not None
         return np.arange(count) / section.rate
     if len(files) != count:
-        raise InputError(
-            None, "time_in_name", "a file holds several frames; give 'rate' or 'times'"
-        )
+        problem = "a file holds several frames; give 'rate' or 'times'"
+        raise InputError(None, "time_in_name", problem)
     pattern = section.time_in_name if isinstance(section.time_in_name, str) else None
     if section.rate is not None and pattern is None:
         problem = "with 'rate', expected a pattern whose group is the number of the picture"
         raise InputError(None, "time_in_name", problem)
-    numbers = np.array(
-        [number_in_name(f, TIME_UNITS, pattern, None, "time_in_name") for f in files]
-    )
-    return numbers / (section.rate or 1.0)
+    numbers = [number_in_name(f, TIME_UNITS, pattern, None, "time_in_name") for f in files]
+    return np.array(numbers) / (section.rate or 1.0)
 
 
 def log_files(section: LogSection | None, place: Place, folder: Path) -> tuple[Path, ...]:
-    """The files that pressures come from beside the frames, for the record; none without a log.
-
-    Raises
-    ------
-    InputError : naming file and key: one that is not there.
-    """
+    """Return the files of the pressures beside the frames, for the record; none without a log."""
     if section is None:
         return ()
     named = {"file": section.file, "times": section.times}
@@ -140,7 +122,7 @@ def log_files(section: LogSection | None, place: Place, folder: Path) -> tuple[P
 
 
 def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
-    """A file beside the frames, in the folder of the data, or beside the project."""
+    """Return a file beside the frames, in the folder of the data, or beside the project."""
     for home in (folder, place.path.parent):
         if is_file(home / name):
             return home / name
@@ -151,16 +133,11 @@ def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
 class RecordedFrames:
     """The frames that a test takes, by rising pressure.
 
-    Parameters
-    ----------
-    files : of the frames taken; all files where one holds several frames. frames : their numbers
-        among all frames of the files, None where each file holds one.
-    names : what each is called. pressure : (n,) MPa, as recorded. asked : (n,) MPa, None where no
-        pressures were asked for.
-    source : where the pressures stand, in words. count : of all frames. left_out : how many were
-        not looked at, by why.
-    logs : files beside those of the frames that were read: a log, a table of times.
-    doubt : (n,) MPa, by what the clocks' offset leaves open; None without a log. clock : of a log.
+    files : of the frames taken; all files where one holds several frames. frames : numbers among
+    all frames of the files, None where each file holds one. pressure : (n,) MPa, as recorded. asked
+    : (n,) MPa, None where none were asked for. source : of the pressures, in words. count : of all
+    frames. left_out : number of frames not used, by why. doubt : (n,) MPa, by the uncertain offset
+    of the clocks; None without a log. logs : other files that were read: a log, a table of times.
     """
 
     files: tuple[Path, ...]
@@ -185,17 +162,10 @@ def recorded_frames(
     place: Place,
     folder: Path,
 ) -> RecordedFrames:
-    """The frames of a test by what was recorded.
+    """Choose the frames of a test by the pressures that were recorded.
 
-    Parameters
-    ----------
-    asked : MPa, the test's own `pressures`; None takes all frames, or `frames` of them.
-    folder : of the data, where a log may be too.
-
-    Raises
-    ------
-    InputError : naming file and key: no or two places of the pressures, pressures that cannot be
-        read, frames that are not there.
+    asked : MPa, the test's own `pressures`; None takes all frames, or `frames` of them. folder : of
+    the data, where a log may be too. Raises InputError naming file and key.
     """
     _check(section, asked, place)
     clock, names = None, [file.name for file in files]
@@ -209,9 +179,8 @@ def recorded_frames(
     else:
         pattern = section.from_name if isinstance(section.from_name, str) else None
         unit = section.unit or place.scales.pressure_unit
-        pressures = np.array(
-            [number_in_name(f, PRESSURE_UNITS, pattern, unit, "from_name") for f in files]
-        )
+        own = [number_in_name(f, PRESSURE_UNITS, pattern, unit, "from_name") for f in files]
+        pressures = np.array(own)
         source = "the files' names"
     limit = None if section.tolerance is None else section.tolerance * place.scales.pressure
     try:
@@ -261,9 +230,8 @@ def _check(section: PressureSection, asked: Sequence[float] | None, place: Place
 class PointFiles:
     """Measured displacements: files in the order of the pressures, and how they are read.
 
-    recorded : which of their frames are taken, and at which pressures; None where the pressures are
-    the project's own, one a frame. correlation : how they were measured, in words, by the keys of
-    [bubble.data.points.correlation].
+    recorded : frames and pressures chosen among them; None where the pressures are the project's
+    own, one a frame. correlation : words by the keys of [bubble.data.points.correlation].
     """
 
     files: tuple[Path, ...]
@@ -277,14 +245,10 @@ class PointFiles:
 def measured_files(
     section: BubbleSection, place: Place, pressures: Sequence[float] | None
 ) -> PointFiles | None:
-    """The files of [bubble.data.points] and how they are read; None for a known solution.
+    """Return the files of [bubble.data.points]; None for a known solution.
 
-    pressures : MPa, None where the project names none.
-
-    Raises
-    ------
-    InputError : both sources of data or none, files that are not there, pressures of frames that
-        cannot be read or do not fit those asked for.
+    pressures : MPa, None where the project names none. Raises InputError for both sources of data
+    or none, missing files, and pressures of frames that are unreadable or not those asked for.
     """
     known, points = section.data.known_solution, section.data.points
     if (known is None) == (points is None):
@@ -295,15 +259,8 @@ def measured_files(
     measured = _points(points, place)
     if points.pressure is None or (pressures is not None and not place.need_data):
         return measured
-    recorded = recorded_frames(
-        points.pressure,
-        pressures,
-        measured.files,
-        measured.options,
-        measured.format,
-        place,
-        _folder(points, place),
-    )
+    how = measured.files, measured.options, measured.format
+    recorded = recorded_frames(points.pressure, pressures, *how, place, _folder(points, place))
     return replace(measured, files=recorded.files, recorded=recorded)
 
 
@@ -315,25 +272,15 @@ def _points(points: PointsSection, place: Place) -> PointFiles:
             problem = f"column {column!r} is named for {first} and for {name}"
             raise place.error(f"data.points.columns.{name}", problem)
     files = _files(points, place)
-    unit = points.length_unit or place.scales.length_unit
+    scale = LENGTH_UNITS[points.length_unit or place.scales.length_unit]
     options = FrameOptions(
-        FIELD,
-        columns or None,
-        points.flag_column,
-        points.comment,
-        LENGTH_UNITS[unit],
-        points.valid_column,
-        points.decimal,
-        points.coordinates,
-        points.camera_axes,
-    )
-    return PointFiles(
-        files,
-        options,
-        named_format(place, "data.points.format", "frame", points.format),
-        registration_options(points.registration, place, LENGTH_UNITS[unit]),
-        correlation=points.correlation.model_dump(exclude_none=True),
-    )
+        FIELD, columns or None, points.flag_column, points.comment, scale, points.valid_column,
+        points.decimal, points.coordinates, points.camera_axes,
+    )  # fmt: skip
+    kind = named_format(place, "data.points.format", "frame", points.format)
+    registration = registration_options(points.registration, place, scale)
+    correlation = points.correlation.model_dump(exclude_none=True)
+    return PointFiles(files, options, kind, registration, correlation=correlation)
 
 
 def _folder(points: PointsSection, place: Place) -> Path:
@@ -354,9 +301,8 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
     try:
         names = [_named(pattern, i) for i in points.indices]
     except ValueError:
-        problem = (
-            f"expected a name with {{index}} in it, such as t_{{index:02d}}.csv; got {pattern!r}"
-        )
+        example = "expected a name with {index} in it, such as t_{index:02d}.csv"
+        problem = f"{example}; got {pattern!r}"
         raise place.error("data.points.pattern", problem) from None
     if len(set(names)) != len(names):
         problem = "the same file for several pressures; is {index} in the pattern?"
@@ -365,12 +311,7 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
 
 
 def _named(pattern: str, index: int) -> str:
-    """The pattern with `index` for {index}; nothing else is done in braces.
-
-    Raises
-    ------
-    ValueError : braces that hold something else, a width of more than two digits.
-    """
+    """Return the pattern with `index` for {index}; raises ValueError for other braces."""
     name = ""
     for text, inside, spec, conversion in string.Formatter().parse(pattern):
         name += text
@@ -383,7 +324,7 @@ def _named(pattern: str, index: int) -> str:
 
 
 def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
-    """The files, patterns in `files` put into the natural order of what they match."""
+    """Return the files, patterns in `files` put into the natural order of their matches."""
     names = _file_names(points, place)
     folder = _folder(points, place)
     advice = "give the folder of the measured data with --data DIR"

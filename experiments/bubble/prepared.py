@@ -1,4 +1,4 @@
-"""A bubble test with its data: what was measured, or computed, and what a fit compares with it."""
+"""A bubble test with its data, measured or computed, and the comparisons of a fit with it."""
 
 from __future__ import annotations
 
@@ -11,25 +11,17 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison, Nuisance
+from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.reading import FacetReading, SmoothReading
-from ...readers.fields import DisplacementField
+from ...readers.fields import DisplacementField, read_fields
 from ...readers.frames import FrameSource
-from ...readers.surfaces import DisplacementSurface
-from ..kinds import (
-    DataFile,
-    Doubt,
-    Expected,
-    MakeSolver,
-    Masks,
-    Reach,
-    Weighting,
-    joined,
-)
+from ...readers.surfaces import DisplacementSurface, fit_surface
+from ..kinds import DataFile, Doubt, Expected, MakeSolver, Masks, Reach, Weighting, joined
 from .doubts import View, doubts_of
 from .objective import (
     OFFSETS,
@@ -40,36 +32,38 @@ from .objective import (
     at_rest,
     counted_from,
     folded,
+    mirrored,
     reading_of,
     with_places,
 )
 from .point_files import PointFiles
-from .registration import Registration
-from .sheet import FLAT, MeasuredSheet, sheet_nuisance, with_sheet
-from .test import PART, BubbleTest
+from .registration import Registration, register_fields
+from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
+from .test import PART, BubbleTest, KnownSolution
 
 Array = NDArray[np.float64]
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
-OBJECTIVES = {
-    "e": "sum of relative RMS errors",
-    "mm": "sum of RMS errors, mm",
-}
+OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
 #: Comparisons of lower stages lead in; a bubble is the last to join.
 STAGE = 2
 #: mm and kPa; a pressure offset leaves the first pressure positive.
 MOST_SHIFT, MOST_PRESSURE, LEAST_SHARE = 20.0, 50.0, -0.9
 PRESSURE = "pressure_offset"
+#: Quads of the full disk: with fewer it is no disk any more.
+LEAST_QUADS = 48
+#: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
+INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedBubble:
-    """The test, what was measured (or computed) as read, and polynomial surfaces of it.
+    """The test, its fields as read (or computed), and polynomial surfaces of them.
 
     known : the law behind computed data. surfaces : for the match or the report. registration :
     of the fields, None where the files were in the test's coordinates. by_this_model : the data
-    were computed with the mesh, the increments and the solver of the fit. sheet : what the
-    fields say of the sheet's surface and of its rim.
+    were computed with the mesh, the increments and the solver of the fit. sheet : surface and rim
+    as measured.
     """
 
     test: BubbleTest
@@ -82,39 +76,45 @@ class PreparedBubble:
 
     @property
     def objective_is(self) -> str:
-        """What is minimised, in words."""
+        """Describe the objective."""
         own = OBJECTIVES[self.test.objective]
         unknown = self.test.sheet.modes or self.test.sheet.slack
         return f"{own}, and what is known of the sheet" if unknown else own
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """None: a bubble is one specimen."""
+        """Return nothing: a bubble is one specimen."""
         return {}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Frames, where no field that is constant over them is projected out."""
-        return frames_of(self)
+        """Return the points kept without each frame, by its pressure; none of a single frame.
+
+        None, too, where a field that is the same in all frames is projected out: it is known of
+        all of them together only.
+        """
+        targets = self.targets
+        if self.test.sheet.constant or len(targets) < 2:
+            return {}
+        frame = np.repeat(np.arange(len(targets)), [len(t.displacement) for t in targets])
+        names = [f"{1e3 * target.pressure:.5g} kPa" for target in targets]
+        if len(set(names)) < len(names):
+            names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
+        return {"frames": {name: {self.test.name: frame != k} for k, name in enumerate(names)}}
 
     def reach(self, masks: Masks) -> Reach:
-        """As the test's own: a bubble does not tell how far it is strained."""
+        """Return the test's own: a bubble does not tell how far it is strained."""
         return self.test.reach
 
     @property
     def dropped(self) -> int:
-        """Doubtful points that were left out."""
+        """Return the number of doubtful points that were left out."""
         return sum(sum(f.dropped.values()) for f in self.fields)
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """The one comparison: the whole field at every pressure; none where nothing is left.
-
-        Raises
-        ------
-        InputError : data that cannot be matched.
-        """
+        """Return the comparison of the field at all pressures; none where nothing is left."""
         test, model, sheet = self.test, self.model, self.test.sheet
         whole = self.targets
         targets = kept_targets(whole, (masks or {}).get(test.name))
@@ -133,12 +133,7 @@ class PreparedBubble:
 
     @property
     def targets(self) -> list[FieldTarget]:
-        """What is matched, frame by frame, on the model's mesh.
-
-        Raises
-        ------
-        InputError : data that cannot be matched.
-        """
+        """Return the fields to match, frame by frame, on the model's mesh; raises InputError."""
         test, mesh, sheet = self.test, self.model.mesh, self.test.sheet
         if test.match_by == "surfaces":
             targets = at_nodes(self.surfaces, mesh)
@@ -158,56 +153,72 @@ class PreparedBubble:
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """The same places on a finer mesh with finer increments, or on a coarser mesh."""
-        if self.by_this_model and factor > 1:
-            return self.comparisons(make_solver, weighting)
-        return finer_bubble(self, make_solver, weighting, factor)
+        """Return the same places on a finer mesh with finer increments, or on a coarser mesh."""
+        (own,) = self.comparisons(make_solver, weighting)
+        return (own if self.by_this_model and factor > 1 else self._refined(own, factor),)
+
+    def _refined(self, own: Comparison, factor: float) -> Comparison:
+        """Return a comparison of quads and increments divided by a factor; below one of quads.
+
+        Displacements between nodes are read as the fit reads them: that is part of the difference.
+        Raises InputError for a mesh too coarse for a disk, or for the places of the data.
+        """
+        test = self.test
+        finer = test.models(what="elements", factor=factor)[PART]
+        whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
+        if whole < LEAST_QUADS and factor < 1:
+            problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
+            raise InputError(None, "elements", problem)
+        steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
+        model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
+        assert isinstance(own.objective, FieldObjective)
+        moved = copy.copy(own.objective)
+        reading = reading_of(test, model.mesh)
+        moved.targets = resampled(own.objective.targets, own.model.mesh, model.mesh, reading)
+        return replace(own, model=model, objective=moved)
 
     def data_files(self) -> Sequence[DataFile]:
-        """The files of the measured fields; none where they were computed."""
+        """Return the files of the measured fields; none where they were computed."""
         data = self.test.data
         logs: Sequence[Path] = ()
         if isinstance(data, PointFiles) and data.recorded is not None:
             logs = data.recorded.logs
-        frames = [
-            DataFile(f.path, f.source, len(f.points), f.dropped)
-            for f in self.fields
-            if f.path is not None
-        ]
+        read = [(field.path, field) for field in self.fields if field.path is not None]
+        frames = [DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
         return [*joined(frames), *(DataFile(log, FrameSource("log"), None) for log in logs)]
 
     @property
     def matched(self) -> Sequence[DisplacementField]:
-        """The fields as they are matched: at places without load, folded for a quarter."""
+        """Return the fields as they are matched: at places without load, folded for a quarter."""
         since = self.test.sheet.since
         fields = self.fields if since is None else at_rest(self.fields, since)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
     def model(self) -> BubbleModel:
-        """Of the sheet as it was, with the unknown shapes at zero."""
+        """Return the model of the sheet as it was, with the unknown shapes at zero."""
         return with_sheet(self.test.model(), self.test.sheet, self.test.outline, self.sheet)
 
     @property
     def outside(self) -> int:
-        """Measured points beyond the rim of the model, which are not matched."""
+        """Return the number of measured points beyond the model's rim, which are not matched."""
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
         return at_points(self.test, self.matched, self.test.model().mesh)[1]
 
     @property
     def view(self) -> View:
-        """What is looked at before a fit."""
+        """Return the fields for a look before a fit."""
         test = self.test
         return View(self.fields, test.outline, test.thickness, self.registration is not None)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """What makes the measured fields doubtful; nothing where they were computed."""
+        """Return the doubts about the measured fields; none where they were computed."""
         return () if self.known is not None else doubts_of(self.view, expected)
 
 
 def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
-    """The offsets that the test's section turns on."""
+    """Return the offsets that the test's section turns on."""
     on: list[Nuisance] = []
     if test.displacement_offset:
         on += [Nuisance(name, -MOST_SHIFT, MOST_SHIFT, "mm", None, 1.0) for name in OFFSETS]
@@ -217,48 +228,13 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
     return tuple(on)
 
 
-#: Quads of the full disk: with fewer it is no disk any more.
-LEAST_QUADS = 48
-#: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
-INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
-
-
-def finer_bubble(
-    prepared: PreparedBubble, make_solver: MakeSolver, weighting: Weighting, factor: float
-) -> tuple[Comparison, ...]:
-    """Its one comparison, of quads and increments divided by a factor; only of quads below one.
-
-    What lies between nodes is read as the fit reads it: what that does is part of the
-    difference.
-
-    Raises
-    ------
-    InputError : the mesh would be too coarse for a disk, or for the places of the data.
-    """
-    test = prepared.test
-    (own,) = prepared.comparisons(make_solver, weighting)
-    finer = test.models(what="elements", factor=factor)[PART]
-    whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
-    if whole < LEAST_QUADS and factor < 1:
-        problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
-        raise InputError(None, "elements", problem)
-    steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
-    model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, prepared.sheet)
-    objective = own.objective
-    assert isinstance(objective, FieldObjective)
-    moved = copy.copy(objective)
-    reading = reading_of(test, model.mesh)
-    moved.targets = resampled(objective.targets, own.model.mesh, model.mesh, reading)
-    return (replace(own, model=model, objective=moved),)
-
-
 def resampled(
     targets: tuple[FieldTarget, ...],
     own: Mesh,
     other: Mesh,
     reading: SmoothReading | FacetReading | None = None,
 ) -> tuple[FieldTarget, ...]:
-    """The same targets at the same places, from the nodes of another mesh.
+    """Return the same targets at the same places, from the nodes of another mesh.
 
     reading : of that mesh, smooth unless given.
     """
@@ -287,30 +263,10 @@ def _sample(reading: SmoothReading | FacetReading, places: Array) -> sp.csr_matr
     raise InputError(None, "mesh", problem)
 
 
-def frames_of(prepared: PreparedBubble) -> Mapping[str, Mapping[str, Masks]]:
-    """The points that are kept without each frame, by its pressure.
-
-    None of a single frame, nor where a field that is the same in all frames is projected out: it
-    is known of all of them together only.
-    """
-    if prepared.test.sheet.constant:
-        return {}
-    targets = prepared.targets
-    if len(targets) < 2:
-        return {}
-    whose = np.repeat(np.arange(len(targets)), [len(t.displacement) for t in targets])
-    names = [f"{1e3 * target.pressure:.5g} kPa" for target in targets]
-    if len(set(names)) < len(names):
-        names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
-    return {
-        "frames": {name: {prepared.test.name: whose != k} for k, name in enumerate(names)},
-    }
-
-
 def kept_targets(
     targets: Sequence[FieldTarget], mask: NDArray[np.bool_] | None
 ) -> list[FieldTarget]:
-    """What a mask over the points of all targets leaves of them, each of its own frame."""
+    """Return the points of all targets that a mask leaves, each with its own frame."""
     if mask is None:
         return list(targets)
     ends = np.cumsum([len(target.displacement) for target in targets])[:-1]
@@ -322,14 +278,105 @@ def kept_targets(
         whole = target.sample
         if whole is None and not own.all():
             whole = sp.identity(len(own), format="csr")
-        kept.append(
-            replace(
-                target,
-                displacement=target.displacement[own],
-                sample=whole if whole is None else sp.csr_matrix(whole[own]),
-                places=None if target.places is None else target.places[own],
-                at_rest=None if target.at_rest is None else target.at_rest[own],
-                frame=frame,
-            )
-        )
+        sample = None if whole is None else sp.csr_matrix(whole[own])
+        kept.append(replace(target.only(own), sample=sample, frame=frame))
     return kept
+
+
+def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBubble:
+    """Read or compute the data of a test; raises InputError, SolverFailure."""
+    if isinstance(test.data, KnownSolution):
+        fields, known, own = _computed(test, test.data, law, make_solver)
+        surfaces = _surfaces(test, fields, computed=True)
+        prepared = PreparedBubble(test, fields, surfaces, known, by_this_model=own)
+    else:
+        fields, registration = _measured(test, test.data)
+        surfaces = _surfaces(test, fields, computed=False)
+        prepared = PreparedBubble(test, fields, surfaces, None, registration)
+    try:
+        sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
+    except InputError as error:
+        raise test.place.error(error.field, error.problem) from None
+    return replace(prepared, sheet=sheet)
+
+
+def _computed(
+    test: BubbleTest, data: KnownSolution, law: HypoelasticLaw, make_solver: MakeSolver
+) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
+    """Compute the known solution on the data's own mesh; `law` : of the fit, but its coefficients.
+
+    Returns the fields, their law, and whether mesh, increments and solver are those of the fit.
+    """
+    field = "data.known_solution"
+    try:
+        form = form_named(data.form, {}, law.strain_range.tolist())
+        known = HypoelasticLaw(data.beta, law.nu12, law.strain_range, law.thickness_change, form)
+    except InputError as error:
+        raise test.place.error(f"{field}.{error.field}", error.problem) from None
+    try:
+        solver = make_solver() if data.solver is None else make_solver(data.solver)
+    except InputError as error:
+        raise test.place.error(f"{field}.solver", error.problem) from None
+    if data.symmetry == "quarter" and test.symmetry == "full":
+        problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
+        raise test.place.error(f"{field}.symmetry", problem)
+    source = test.model(elements=data.elements, symmetry=data.symmetry, increments=data.increments)
+    try:
+        history = solver.run(source, known)
+    except SolverFailure as failure:
+        reason = f"the known solution cannot be run: {failure.reason}"
+        where = failure.solver, failure.exit_number, failure.log_tail, failure.scratch
+        raise SolverFailure(reason, *where) from None
+    fields = tuple(
+        DisplacementField(p, source.mesh.points[:, :2], u)
+        for p, u in zip(test.pressures, np.asarray(history.displacement), strict=True)
+    )
+    own = data.solver is None or solver.identity == make_solver().identity
+    return fields, known, own and _same_steps_and_mesh(test, data)
+
+
+def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
+    """Return whether the data are of the fit's increments and mesh, whole or folded."""
+    if len(data.increments) != len(test.increments):
+        return False
+    if not np.allclose(data.increments, test.increments, rtol=1e-9, atol=0.0):
+        return False
+    own, other = (test.model(elements=n).mesh for n in (test.elements, data.elements))
+    return own.points.shape == other.points.shape and np.allclose(own.points, other.points)
+
+
+def _surfaces(
+    test: BubbleTest, fields: Sequence[DisplacementField], computed: bool
+) -> tuple[DisplacementSurface, ...]:
+    """Fit surfaces to every field; too few points leave them out where they are only reported."""
+    # A computed quarter is mirrored: surfaces are fitted to the full disk.
+    whole = [mirrored(f) if computed else f for f in fields]
+    if test.match_by == "points":
+        if min(len(f.points) for f in whole) < (test.match_degree + 1) ** 2:
+            return ()
+    try:
+        return tuple(fit_surface(f, test.match_degree) for f in whole)
+    except InputError as error:
+        raise test.place.error("match.degree", f"{error.field}: {error.problem}") from None
+
+
+def _measured(
+    test: BubbleTest, data: PointFiles
+) -> tuple[tuple[DisplacementField, ...], Registration | None]:
+    """Read the fields, and register them where the section asks for it."""
+    frames = None if data.recorded is None else data.recorded.frames
+    try:
+        fields = read_fields(
+            data.files, test.pressures, options=data.options, format=data.format, frames=frames
+        )
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise test.place.error(f"data.points.{error.field}", error.problem) from None
+    if data.registration is None:
+        return fields, None
+    try:
+        return register_fields(fields, test.outline, data.registration)
+    except InputError as error:
+        field = f"data.points.registration.{error.field}".rstrip(".")
+        raise test.place.error(field, error.problem) from None

@@ -1,4 +1,11 @@
-"""Frames of a bubble test brought into the test's coordinates, each step found or given."""
+"""Frames of a bubble test brought into the test's coordinates, each step found or given.
+
+The rim is where the sheet does not rise (`rim_of_motion`). The warp follows from symmetry: a disk
+of orthotropic fabric moves symmetrically about warp and fill, whatever the law. In polar components
+about the centre, u_r and u_z then have only cosines of the angle from the warp, u_theta only sines
+(`symmetry_axes`). The sheet's first shape adds much the same at every pressure: two frames are
+subtracted. `register` puts plane, centre, clamp motion and warp together.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +21,12 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
-from .equilibrium import apex_shape
 from .placement import (
     LEAST,
-    UNKNOWN,
     Placement,
     RigidMotion,
     all_applied,
+    apex_shape,
     axes_angle,
     clamp_motion,
     clamp_points,
@@ -33,16 +39,34 @@ from .placement import (
 )
 
 Array = NDArray[np.float64]
+Point = tuple[float, float, float]
+PlaneOf = Literal["found", "clamp", "edge", "camera"]
 
-#: Even powers (of u, of v) of a shape beside the factor that vanishes at the rim.
+#: Even and odd powers (of u, of v) of a shape beside the factor that vanishes at the rim.
 EVEN = ((0, 0), (2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
 ODD = ((1, 0), (0, 1), (3, 0), (2, 1), (1, 2), (0, 3))
-#: Points and frames enough to tell a centre; of more, every so many.
+#: Points and frames that are enough for a centre; of more points, every so many.
 POINTS, FRAMES = 2000, 4
-#: Points nearer to the rim than this share of its radius say where it is.
-NEAR = 0.8
-#: Points up to this share of the radius from a first guess of the centre are taken.
-INSIDE = 1.02
+#: Share of the radius beyond which points tell where the rim is, and up to which points are taken
+#: about the first guess of the centre.
+NEAR, INSIDE = 0.8, 1.02
+#: Harmonics around the centre; the even ones above zero tell the axes.
+HARMONICS = (0, 1, 2, 3, 4)
+TELLING = (2, 4)
+RADII = np.linspace(0.1, 0.9, 9)
+ANGLES = np.radians(np.arange(0.0, 90.0, 0.05))
+#: Share of the highest frame's rise that the frame subtracted from others may have at most.
+LOW = 0.7
+#: Parts of the points by whose scatter the axes are judged, and the most frames that are used.
+PARTS, FRAMES_SYMMETRY = 4, 6
+#: Points that a part needs: four for each of its terms.
+ENOUGH = 120
+#: Largest standard error of usable axes, degrees, and how clear they must be at least.
+UNSURE, CLEAR = 5.0, 0.5
+#: The sheet's edge: points from this share of the rim's radius on.
+EDGE = 0.85
+#: Frames by which the centre is found: those with at least this share of the largest rise.
+HIGH = 0.5
 
 
 @dataclass(frozen=True)
@@ -67,22 +91,16 @@ def rim_of_motion(
     start: tuple[float, float] = (0.0, 0.0),
     angle: float | None = None,
 ) -> Rim:
-    """The rim of known size through which the sheet does not rise.
+    """Find the rim of known size through which the sheet does not rise.
 
     The rise of every frame is a polynomial of even and odd terms times a factor that is zero on
     the rim, all about the centre that is looked for, and one constant (the frame's shift along
     z). Odd terms take what the sheet is not symmetric in: they cannot move the rim.
 
-    Parameters
-    ----------
     surfaces : reference places (n, 2) mm in the plane and rises (n,) mm along its normal, by rising
-        pressure: the last few are taken.
-    semi_axes : mm; equal for a circle. start : mm, about where the centre is.
-    angle : degrees, of the first semi-axis; found unless given where the axes differ.
-
-    Raises
-    ------
-    InputError : points that do not come near the rim all around it, too few of them.
+    pressure: the last few are taken. semi_axes : mm. start : mm, a guess of the centre. angle :
+    degrees, of the first semi-axis; found unless given where the axes differ. Raises InputError for
+    points that do not come near the rim all around it, and for too few of them.
     """
     free = semi_axes[0] != semi_axes[1] and angle is None
     fixed = 0.0 if angle is None else angle
@@ -98,8 +116,7 @@ def rim_of_motion(
         return np.concatenate(parts)
 
     count = 3 if free else 2
-    scale = [semi_axes[0], semi_axes[0], 60.0][:count]
-    best = least_squares(left, guess[:count], x_scale=scale)
+    best = least_squares(left, guess[:count], x_scale=[semi_axes[0], semi_axes[0], 60.0][:count])
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
@@ -109,7 +126,7 @@ def rim_of_motion(
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
-    """About the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
+    """Guess the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
     weight = np.clip(rise, 0.0, None)
     x, y = (points - (weight[:, None] * points).sum(axis=0) / weight.sum()).T
     xx, yy, xy = (float((weight * a).sum()) for a in (x * x, y * y, x * y))
@@ -118,7 +135,7 @@ def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> fl
 
 
 def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:
-    """Coordinates (2, n) about a centre x, y and along axes turned by degrees: 1 on the rim."""
+    """Return coordinates (2, n) about a centre x, y, turned by degrees, in semi-axes."""
     turn = np.radians(place[2])
     c, s = np.cos(turn), np.sin(turn)
     x, y = (points - place[:2]).T
@@ -128,14 +145,18 @@ def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array
 def _on_disk(
     points: Array, rise: Array, place: Array, semi_axes: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Some of the points within the rim, and their rises over the largest of them."""
+    """Return some of the points within the rim, and their rises over the largest of them."""
     local = _local(points, place, semi_axes)
     inside = np.hypot(*local) < INSIDE
     least = 3 * (len(EVEN) + len(ODD) + 1)
     if inside.sum() < least:
         problem = f"expected at least {least} points on the disk, got {int(inside.sum())}"
         raise InputError(None, "centre", f"{problem}; are the length unit and the radius right?")
-    _all_around(local[:, inside])
+    u, v = local[:, inside & (np.hypot(*local) > NEAR)]
+    around = np.unique((np.arctan2(v, u) // (np.pi / 4)).astype(int))
+    if len(around) < 8:
+        problem = f"points come within {1 - NEAR:.0%} of the rim in {len(around)} of 8 directions"
+        raise InputError(None, "centre", f"{problem} only; give the centre")
     every = slice(None, None, -(-int(inside.sum()) // POINTS))
     rise = rise[inside][every]
     return points[inside][every], rise / np.abs(rise).max()
@@ -147,40 +168,13 @@ def _terms(u: Array, v: Array) -> Array:
     return np.stack([*shapes, np.ones_like(u)], axis=1)
 
 
-def _all_around(local: Array) -> None:
-    """Whether points come near the rim in each of eight directions."""
-    near = np.hypot(*local) > NEAR
-    around = np.unique((np.arctan2(local[1, near], local[0, near]) // (np.pi / 4)).astype(int))
-    if len(around) < 8:
-        problem = f"points come within {1 - NEAR:.0%} of the rim in {len(around)} of 8 directions"
-        raise InputError(None, "centre", f"{problem} only; give the centre")
-
-
-# The two axes about which a displacement field is symmetric: warp and fill, whatever the law.
-#
-# A disk of orthotropic fabric moves symmetrically about warp and fill. In polar components about
-# the centre, u_r and u_z then have only cosines of the angle from the warp, u_theta only sines.
-# What the sheet's first shape adds is much the same at every pressure: two frames are subtracted.
-
-#: Harmonics around the centre; the even ones above zero tell the axes.
-HARMONICS = (0, 1, 2, 3, 4)
-TELLING = (2, 4)
-RADII = np.linspace(0.1, 0.9, 9)
-ANGLES = np.radians(np.arange(0.0, 90.0, 0.05))
-#: Share of the highest frame's rise that the frame subtracted from others may have at most.
-LOW = 0.7
-#: Parts of the points that tell how sure the axes are, and the most frames that are looked at.
-PARTS, FRAMES_SYMMETRY = 4, 6
-#: Points that a part needs: four for each of its terms.
-ENOUGH = 120
-
-
 @dataclass(frozen=True)
 class Axes:
-    """angle : degrees from x towards y of one axis, 0 to 90; the other is 90 degrees from it.
+    """Two axes of symmetry at right angles.
 
-    error : standard error, degrees, from frame to frame and between parts of the points.
-    clear : 1 where the field is wholly symmetric about the axes, 0 where no axes are better.
+    angle : degrees from x towards y of one of them, 0 to 90. error : standard error, degrees, from
+    frame to frame and between parts of the points. clear : 1 where the field is wholly symmetric
+    about the axes, 0 where no axes are better.
     """
 
     angle: float
@@ -189,17 +183,14 @@ class Axes:
 
     @property
     def off(self) -> float:
-        """How far they are turned from x and y, degrees, from -45 to below 45."""
+        """Return the turn from x and y, degrees, from -45 to below 45."""
         return axes_angle(self.angle)
 
 
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
-    """The axes of the frames' even part.
+    """Return the axes of the frames' even part.
 
-    Parameters
-    ----------
-    frames : about the rim's centre, in its plane, by rising pressure.
-    radius : mm.
+    frames : about the rim's centre, in its plane, by rising pressure. radius : mm.
     """
     costs = _costs(frames, radius)
     together = costs.sum(axis=0)
@@ -208,7 +199,7 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     error = _scatter(costs, best)
     count = min(PARTS, min(len(frame.points) for frame in frames) // ENOUGH)
     if count > 1:
-        parts = [[_part(frame, k, count) for frame in frames] for k in range(count)]
+        parts = [[_part(frame, slice(k, None, count)) for frame in frames] for k in range(count)]
         by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
         error = float(np.hypot(error, _scatter(by_part, best)))
     total = float(together.max())
@@ -217,7 +208,7 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
 
 
 def _costs(frames: Sequence[Frame], radius: float) -> Array:
-    """What is not symmetric (frames, angles), of each high frame less the lowest."""
+    """Return the asymmetry (frames, angles) of each high frame less the lowest."""
     rise = [float(np.nanmax(frame.displacement[:, 2])) for frame in frames]
     low = [f for f, r in zip(frames, rise, strict=True) if r <= LOW * rise[-1]]
     high = [f for f, r in zip(frames, rise, strict=True) if r > LOW * rise[-1]]
@@ -227,13 +218,12 @@ def _costs(frames: Sequence[Frame], radius: float) -> Array:
     )
 
 
-def _part(frame: Frame, number: int, count: int) -> Frame:
-    every = slice(number, None, count)
+def _part(frame: Frame, every: slice) -> Frame:
     return replace(frame, points=frame.points[every], displacement=frame.displacement[every])
 
 
 def _scatter(costs: Array, best: float) -> float:
-    """Standard error of the mean angle, degrees; axes repeat after 90 degrees."""
+    """Return the standard error of the mean angle, degrees; axes repeat after 90 degrees."""
     each = ANGLES[np.argmin(costs, axis=1)]
     if len(each) < 2:
         return 0.0
@@ -242,12 +232,12 @@ def _scatter(costs: Array, best: float) -> float:
 
 
 def harmonics(frame: Frame, radius: float) -> Array:
-    """Amplitudes (3, 5, 2, 9) mm: of u_r, u_theta, u_z, by harmonic, cosine and sine, radius."""
-    whole = np.isfinite(frame.displacement).all(axis=1) & np.isfinite(frame.points).all(axis=1)
-    x, y = frame.points[whole, :2].T / radius
+    """Return amplitudes (3, 5, 2, 9) mm of u_r, u_theta, u_z, by harmonic, cosine/sine, radius."""
+    points, moved = _whole(frame)
+    x, y = points[:, :2].T / radius
     r, angle = np.hypot(x, y), np.arctan2(y, x)
     on = (r > 1e-6) & (r < 1.0)
-    r, angle, moved = r[on], angle[on], frame.displacement[whole][on]
+    r, angle, moved = r[on], angle[on], moved[on]
     c, s = np.cos(angle), np.sin(angle)
     polar = np.stack([c * moved[:, 0] + s * moved[:, 1], c * moved[:, 1] - s * moved[:, 0]])
     result = np.empty((3, len(HARMONICS), 2, len(RADII)))
@@ -263,14 +253,20 @@ def harmonics(frame: Frame, radius: float) -> Array:
     return result
 
 
+def _whole(frame: Frame) -> tuple[Array, Array]:
+    """Return places (n, 3) and displacements (n, 3) mm where both were correlated."""
+    whole = np.isfinite(frame.points).all(axis=1) & np.isfinite(frame.displacement).all(axis=1)
+    return frame.points[whole], frame.displacement[whole]
+
+
 def _radial(r: Array, k: int, planar: bool) -> Array:
-    """Powers of the radius that a smooth field's harmonic k has: (3, n)."""
+    """Return the powers of the radius that a smooth field's harmonic k has: (3, n)."""
     lowest = abs(k - 1) if planar and k else k + (1 if planar else 0)
     return np.stack([r ** (lowest + 2 * i) for i in range(3)])
 
 
 def _asymmetry(profile: Array) -> Array:
-    """What is not symmetric about an axis at each of the angles, mm^2."""
+    """Return the part that is not symmetric about an axis at each of the angles, mm^2."""
     total = np.zeros(len(ANGLES))
     for k in TELLING:
         cosine, sine = np.cos(k * ANGLES)[:, None], np.sin(k * ANGLES)[:, None]
@@ -281,19 +277,13 @@ def _asymmetry(profile: Array) -> Array:
     return total
 
 
-#: Standard error of the axes (degrees) above which the field does not tell them, and how clear
-#: they must be at least.
-UNSURE, CLEAR = 5.0, 0.5
-
-
 @dataclass(frozen=True)
 class WarpDirection:
-    """Where the warp lies, by the fields of all frames.
+    """The direction of the warp by the fields of all frames.
 
     angle : degrees from x towards y, from -90 to 90. error : standard error of their mean, degrees.
-    clear : of the axes, see `symmetry.Axes`; None where an elliptic rim told the angle.
-    strains : Green-Lagrange at the centre in the highest frame less those of the lowest, warp and
-    fill.
+    clear : as that of `Axes`; None where the angle is that of an elliptic rim. strains :
+    Green-Lagrange at the centre in the highest frame less those of the lowest, warp and fill.
     """
 
     angle: float
@@ -305,16 +295,10 @@ class WarpDirection:
 def warp_of_field(
     frames: Sequence[Frame], radius: float, warp_is_stiff: bool = True
 ) -> WarpDirection:
-    """The axis of symmetry along which the centre is strained less (warp stiff), or more.
+    """Find the axis of symmetry along which the centre is strained less (warp stiff), or more.
 
-    Parameters
-    ----------
-    frames : in coordinates about the rim's centre, in its plane; by rising pressure.
-    warp_is_stiff : whether the warp is the direction that is strained less.
-
-    Raises
-    ------
-    InputError : too few points about the centre, or a field whose axes cannot be told.
+    frames : about the rim's centre, in its plane, by rising pressure. Raises InputError for too few
+    points about the centre, and for a field without clear axes.
     """
     axes = symmetry_axes(frames, radius)
     if axes.error > UNSURE or axes.clear < CLEAR:
@@ -333,17 +317,10 @@ def warp_of_field(
 def warp_of_rim(
     frames: Sequence[Frame], radius: float, rim: Rim, rim_angle: float
 ) -> WarpDirection:
-    """The warp by the turn of an elliptic rim, whose first semi-axis lies at `rim_angle` from it.
+    """Find the warp by an elliptic rim with its first semi-axis at `rim_angle` (degrees) from it.
 
-    A sheet whose edge is an ellipse turned to the yarns has no axes of symmetry.
-
-    Parameters
-    ----------
-    frames : as for `warp_of_field`. rim : found. rim_angle : degrees from warp towards fill.
-
-    Raises
-    ------
-    InputError : an ellipse too round to tell its turn.
+    A sheet with an edge that is an ellipse turned to the yarns has no axes of symmetry. Raises
+    InputError for an ellipse too round to tell its turn.
     """
     if rim.turn_error > UNSURE:
         problem = (
@@ -356,7 +333,7 @@ def warp_of_rim(
 
 
 def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
-    """At the centre along an axis at `angle` degrees and across it."""
+    """Return the strains at the centre along an axis at `angle` degrees and across it."""
     strain = centre_strain(frames[-1], radius)
     if len(frames) > 1:
         strain = strain - centre_strain(frames[0], radius)
@@ -366,12 +343,7 @@ def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[floa
 
 
 def centre_strain(frame: Frame, radius: float) -> Array:
-    """Green-Lagrange strain (2, 2) of the surface at the centre.
-
-    Raises
-    ------
-    InputError : too few points about the centre.
-    """
+    """Return the Green-Lagrange strain (2, 2) of the surface at the centre; raises InputError."""
     try:
         shape = apex_shape(frame.points[:, :2], frame.displacement, radius)
     except InputError as error:
@@ -381,42 +353,25 @@ def centre_strain(frame: Frame, radius: float) -> Array:
 
 
 def warp_of_points(first: Array, second: Array) -> float:
-    """Angle (degrees, -90 to 90) of the line through two marked points (2,) in the plane.
-
-    Raises
-    ------
-    InputError : the points are the same.
-    """
+    """Return the angle (degrees, -90 to 90) of the line through two marked points (2,)."""
     x, y = np.asarray(second, dtype=float) - np.asarray(first, dtype=float)
     if np.hypot(x, y) < 1e-9:
         raise InputError(None, "warp", "expected two different points along the warp")
     return line_angle(float(np.degrees(np.arctan2(y, x))))
 
 
-Point = tuple[float, float, float]
-PlaneOf = Literal["found", "clamp", "edge", "camera"]
-
-#: The sheet's edge: points from this share of the rim's radius on.
-EDGE = 0.85
-#: Frames by which the centre is found: those with at least this share of the largest rise.
-HIGH = 0.5
-
-
 @dataclass(frozen=True)
 class RegistrationOptions:
-    """What is given of a registration; everything else is found.
+    """The given steps of a registration; everything else is found.
 
-    Parameters
-    ----------
     plane : of the rim: through points on the "clamp", through the "edge" of the sheet, the
-        "camera"'s own x and y, or "found": the clamp where it was seen, else the edge.
-    centre : (3,) of the rim in the camera's coordinates, mm.
-    rim_angle : degrees, of the first semi-axis of an ellipse from the warp towards the fill.
-    warp : degrees from the camera's x to the warp, towards the camera's y where the sheet rises
-        towards the camera's z.
-    warp_points : two marks along the warp in the camera's coordinates, mm.
-    warp_is_stiff : whether the direction strained less is the warp, where it is found.
-    remove_clamp_motion : whether the clamp's rigid motion is taken out of every frame.
+    "camera"'s own x and y, or "found": the clamp where it was seen, else the edge. centre : (3,) of
+    the rim in the camera's coordinates, mm. rim_angle : degrees, of the first semi-axis of an
+    ellipse from the warp towards the fill. warp : degrees from the camera's x to the warp, towards
+    the camera's y where the sheet rises towards the camera's z. warp_points : two marks along the
+    warp in the camera's coordinates, mm. warp_is_stiff : whether the direction strained less is the
+    warp, where it is found. remove_clamp_motion : whether the clamp's rigid motion is taken out of
+    every frame.
     """
 
     plane: PlaneOf = "found"
@@ -433,22 +388,18 @@ class RegistrationOptions:
             raise InputError(None, "warp", problem)
 
 
-#: Nothing is given.
 ALL_FOUND = RegistrationOptions()
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """What was found, and how.
+    """The result of a registration, and how each step came about.
 
-    Parameters
-    ----------
-    placement : of the test's coordinates in the camera's.
-    plane_of : "clamp", "edge" or "camera". flatness : mm, robust deviation of its points.
-    rim : in the plane, x along the warp; its centre is the origin. None where the centre is given.
-    warp : None where its direction is given. warp_angle : degrees, as `RegistrationOptions.warp`.
-    motions : of the clamp, one a frame, in the test's coordinates.
-    options : what was given.
+    placement : of the test's coordinates in the camera's. plane_of : "clamp", "edge" or "camera".
+    flatness : mm, robust deviation of its points. rim : in the plane, x along the warp, about the
+    origin; None where the centre is given. warp : None where its direction is given. warp_angle :
+    degrees, as `RegistrationOptions.warp`. motions : of the clamp, one a frame, in the test's
+    coordinates. options : as they were given.
     """
 
     placement: Placement
@@ -466,23 +417,23 @@ def register(
     semi_axes: tuple[float, float],
     options: RegistrationOptions = ALL_FOUND,
 ) -> tuple[tuple[Frame, ...], Registration]:
-    """The frames in the test's coordinates, and what they are.
+    """Return the frames in the test's coordinates, and how these were found.
 
-    Parameters
-    ----------
     frames : in the camera's coordinates, mm, by rising pressure; the rim must not turn by more
-        than rounding between frames, unless the clamp is seen.
-    semi_axes : of the rim, mm; equal for a circle, first the one that `rim_angle` belongs to.
-
-    Raises
-    ------
-    InputError : a step that cannot be found and must be given.
+    than rounding between frames, unless the clamp is seen. semi_axes : of the rim, mm; equal for a
+    circle, first the one that `rim_angle` belongs to. Raises InputError for a step that cannot be
+    found and must be given.
     """
     reference = frames[-1]
-    up = _up(reference)
+    moving = reference.displacement[np.isfinite(reference.displacement).all(axis=1)]
+    if not len(moving) or not np.abs(moving).max() > 0:
+        raise InputError(reference.path, "", "nothing moves in the frame of the highest pressure")
+    up = np.asarray(moving.mean(axis=0))
     placement, _ = plane_through(reference.points, up)
     if options.plane == "camera":
-        placement = _camera(up)
+        # The camera's axes; turned about x where the sheet rises away from its z.
+        axes = np.diag([1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0])
+        placement = Placement(np.zeros(3), axes)
     placement, rim = _centred(frames, placement, semi_axes, options)
     flatness, plane_of = 0.0, "camera"
     if options.plane != "camera":
@@ -493,7 +444,8 @@ def register(
         placement, flatness = plane_through(reference.points[points], up)
         placement, rim = _centred(frames, placement, semi_axes, options)
     moved = all_applied(placement, frames)
-    motions = _motions(moved, Outline(*semi_axes, _rim_angle(placement, rim, options)))
+    outline = Outline(*semi_axes, _rim_angle(placement, rim, options))
+    motions = tuple(clamp_motion(frame, clamp_points(frame.points, outline)) for frame in moved)
     if options.remove_clamp_motion:
         moved = tuple(without(f, m) for f, m in zip(moved, motions, strict=True))
     angle, warp = _warp(moved, placement, semi_axes, rim, options)
@@ -502,21 +454,11 @@ def register(
         rest = (rim.angle - angle) % 180.0 if rim.angle else 0.0
         rim = Rim(0.0, 0.0, rest, rim.error, rim.turn_error)
     full = turn.after(placement)
+    x = full.axes @ np.array([1.0, 0.0, 0.0])
+    from_camera_x = line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))
     return all_applied(turn, moved), Registration(
-        full, plane_of, flatness, rim, warp, _from_camera_x(full), motions, options
+        full, plane_of, flatness, rim, warp, from_camera_x, motions, options
     )
-
-
-def _up(frame: Frame) -> Array:
-    moved = frame.displacement[np.isfinite(frame.displacement).all(axis=1)]
-    if not len(moved) or not np.abs(moved).max() > 0:
-        raise InputError(frame.path, "", "nothing moves in the frame of the highest pressure")
-    return np.asarray(moved.mean(axis=0))
-
-
-def _camera(up: Array) -> Placement:
-    """The camera's axes; turned about x where the sheet rises away from its z."""
-    return Placement(np.zeros(3), np.diag([1.0, 1.0, 1.0] if up[2] > 0 else [1.0, -1.0, -1.0]))
 
 
 def _centred(
@@ -525,11 +467,12 @@ def _centred(
     semi_axes: tuple[float, float],
     options: RegistrationOptions,
 ) -> tuple[Placement, Rim | None]:
-    """The same plane with its origin in the centre of the rim."""
+    """Return the same plane with its origin in the centre of the rim."""
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
         return shifted(place[0], place[1]).after(placement), None
-    surfaces = [_surface(frame) for frame in all_applied(placement, frames)]
+    seen = [_whole(frame) for frame in all_applied(placement, frames)]
+    surfaces = [(points[:, :2], displacement[:, 2]) for points, displacement in seen]
     top = surfaces[-1][1].max()
     surfaces = [one for one in surfaces if one[1].max() > HIGH * top]
     points, rise = surfaces[-1]
@@ -548,14 +491,8 @@ def _centred(
     return shifted(rim.x, rim.y).after(placement), rim
 
 
-def _surface(frame: Frame) -> tuple[Array, Array]:
-    """Places (n, 2) and rises (n,) where both were correlated."""
-    whole = np.isfinite(frame.points).all(axis=1) & np.isfinite(frame.displacement).all(axis=1)
-    return frame.points[whole, :2], frame.displacement[whole, 2]
-
-
 def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptions) -> float:
-    """Degrees from the plane's x to the rim's first semi-axis; without meaning for a circle."""
+    """Return degrees from the plane's x to the first semi-axis; without meaning for a circle."""
     if rim is not None:
         return rim.angle
     return (options.rim_angle or 0.0) + (_given_warp(placement, options) or 0.0)
@@ -574,16 +511,8 @@ def _rim_points(
     return (outline.share(points[:, :2]) > EDGE) & ~beyond, "edge"
 
 
-def _motions(frames: Sequence[Frame], outline: Outline) -> tuple[RigidMotion, ...]:
-    found = []
-    for frame in frames:
-        clamp = clamp_points(frame.points, outline)
-        found.append(clamp_motion(frame, clamp) if clamp.any() else UNKNOWN)
-    return tuple(found)
-
-
 def _given_warp(placement: Placement, options: RegistrationOptions) -> float | None:
-    """Degrees from the plane's x to the warp, where it is given."""
+    """Return degrees from the plane's x to the warp, where it is given."""
     if options.warp_points is not None:
         first, second = placement.places(np.array(options.warp_points, dtype=float))[:, :2]
         return warp_of_points(first, second)
@@ -597,7 +526,7 @@ def _warp(
     rim: Rim | None,
     options: RegistrationOptions,
 ) -> tuple[float, WarpDirection | None]:
-    """Degrees from the plane's x to the warp."""
+    """Return degrees from the plane's x to the warp, and how it was found unless given."""
     given = _given_warp(placement, options)
     if given is not None:
         return given, None
@@ -611,25 +540,16 @@ def _warp(
     return found.angle, found
 
 
-def _from_camera_x(placement: Placement) -> float:
-    """Degrees from the camera's x, laid into the plane, to the test's x."""
-    x = placement.axes @ np.array([1.0, 0.0, 0.0])
-    return line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))
-
-
 def register_fields(
     fields: Sequence[DisplacementField],
     outline: Outline,
     options: RegistrationOptions = ALL_FOUND,
 ) -> tuple[tuple[DisplacementField, ...], Registration]:
-    """As `register`, of fields by rising pressure.
+    """Register fields by rising pressure as `register` does frames.
 
     outline : of the rim, its angle counted from the warp. Without a measured height of the
-    reference state the sheet is taken to lie in the camera's plane.
-
-    Raises
-    ------
-    InputError : as `register`; a plane to be found without a measured height.
+    reference state the sheet is taken to lie in the camera's plane; a plane to be found without
+    one raises InputError.
     """
     measured = all(field.z is not None for field in fields)
     if not measured:
@@ -637,17 +557,13 @@ def register_fields(
             problem = "the files have no height z of the reference state to lay a plane through"
             raise InputError(None, "plane", problem)
         options = replace(options, plane="camera")
-    semi_axes = outline.major, outline.minor
     if not outline.round:
         options = replace(options, rim_angle=outline.angle)
+    semi_axes = outline.major, outline.minor
     frames, registration = register([field.frame for field in fields], semi_axes, options)
-    moved = [
-        replace(
-            field,
-            points=frame.points[:, :2],
-            z=frame.points[:, 2] if measured else None,
-            displacement=frame.displacement,
-        )
-        for field, frame in zip(fields, frames, strict=True)
-    ]
+    moved = []
+    for field, frame in zip(fields, frames, strict=True):
+        z = frame.points[:, 2] if measured else None
+        xy, u = frame.points[:, :2], frame.displacement
+        moved.append(replace(field, points=xy, z=z, displacement=u))
     return tuple(moved), registration

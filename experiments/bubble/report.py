@@ -1,21 +1,28 @@
-"""What a bubble test puts on the page of a fit: cuts, heights, the inflated surface."""
+"""The presenter of bubble tests: what a fit says of one, its page, a look at its data, simulations.
+
+`findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
+fit, `residuals` the table of all matched values, `simulate` the results of forward analyses.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
-from ...files import replacing
+from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard
+from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
+from ...notes import percent
 from ...readers.fields import DisplacementField
 from ...readers.surfaces import write_surfaces
 from ...reports.bubbles import (
@@ -30,7 +37,7 @@ from ...reports.bubbles import (
     registration_charts,
     rise_charts,
 )
-from ...reports.charts import Chart, Charts, Shades, dots
+from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
 from ...reports.maps import Maps, Shade, Solid, maps_of, pack
 from ...reports.vega import save
@@ -41,40 +48,44 @@ from .findings import (
     clock_words,
     constant_field,
     fitted_model,
+    match_warnings,
+    nuisance_lines,
     objective_of,
+    read_numbers,
+    recorded_lines,
+    recorded_numbers,
     recorded_of,
+    registration_line,
+    registration_numbers,
     sheet_lines,
+    sheet_numbers,
+    sheet_warnings,
     used_of,
 )
-from .findings import findings as findings
-from .forward import apex_heights, at_nodes, inflated_sheets
 from .objective import displacement_offset
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS, Sheet
-from .test import PART, BubbleTest
+from .sheet import at_nodes, inflated_sheets
+from .test import PART, BubbleTest, apex_heights
 
-PICTURE, TABLE = "reference_surface.png", "reference_surface.csv"
-CONSTANT_PICTURE, CONSTANT_TABLE = "constant_field.png", "constant_field.csv"
-PICTURE_RECORDED_WORDS = "clock.png"
-PICTURE_REGISTRATION = "registration.png"
+Array = NDArray[np.float64]
+
 #: What each choice of the plane means.
 PLANES = {
     "clamp": "through the points beyond the rim",
     "edge": "through the edge of the sheet",
     "camera": "the camera's own x and y",
 }
-
 NOT_GIVEN = "not given"
-TITLE = "Image correlation"
-NOTE = (
+GUIDE = (
     "The fields that the good practices guide of the International Digital Image Correlation "
     "Society asks for. What is not given stands in no file that was read: give it in "
     "[bubble.data.points.correlation] before the report leaves the laboratory."
 )
-#: Of the hardware and the analysis, which exports of image correlation do not hold: what the
-#: section's keys are called on the page.
+#: Names on the page of the section's keys for hardware and analysis, which exports of image
+#: correlation do not hold.
 ASKED = {
     "camera": "camera",
     "resolution": "image resolution",
@@ -91,28 +102,192 @@ ASKED = {
     "matching": "shape function, matching criterion, interpolant",
     "prefilter": "prefilter and data filter",
 }
-
 NOT_MATCHED = "for the record: the fit matched the points themselves"
-SURFACES = "surfaces.csv"
+#: Points that are drawn of one pressure.
+POINTS = 120
+LABELS = ("x (warp), mm", "y (fill), mm")
+#: Signs of x and y of the parts of a whole: a quarter is seen four times.
+WHOLE, QUARTERS = ((1, 1),), ((1, 1), (-1, 1), (-1, -1), (1, -1))
+STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
+STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
+
+
+def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
+    """Return numbers for result.json, warnings, and words for terminal, card and page."""
+    test, objective = prepared.test, objective_of(fitted)
+    offset = displacement_offset(fitted.nuisance)
+    mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
+    numbers: dict[str, Any] = {
+        "mean_abs_mm": mean,
+        "nuisance": {
+            "displacement_offset_mm": offset.tolist() if test.displacement_offset else None,
+            "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
+        },
+        "data": {
+            "matched_by": test.match_by,
+            "places": [len(t.displacement) for t in objective.targets],
+            "doubtful_dropped": prepared.dropped,
+            **read_numbers(prepared),
+            "outside_dropped": prepared.outside,
+        },
+    }
+    lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
+    taken = recorded_of(prepared)
+    if taken is not None:
+        numbers["data"]["pressures"] = recorded_numbers(taken)
+        lines += recorded_lines(taken)
+    numbers["sheet"] = sheet_numbers(prepared, fitted)
+    if prepared.surfaces:
+        numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
+    notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
+    lines += [f"data: {note}" for note in notes]
+    if prepared.known is not None:
+        errors = moduli_error(fitted.law, prepared.known, fitted.reached)
+        ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
+        numbers["moduli_error"] = errors
+        numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
+        said = ", ".join(
+            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
+        )
+        lines.append(f"largest error of the moduli over the strain reached: {said}")
+    if prepared.registration is not None:
+        numbers["registration"] = registration_numbers(prepared.registration)
+        lines.append(registration_line(prepared.registration))
+    lines += [*sheet_lines(numbers["sheet"]), *nuisance_lines(fitted)]
+    return Findings(
+        numbers,
+        (*sheet_warnings(prepared), *match_warnings(prepared)),
+        tuple(lines),
+        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
+        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
+    )
+
+
+def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
+    """Return a row a place, pressure and direction.
+
+    Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
+    (dx, dy, dz), measured, modelled, difference (modelled less measured, offset included), unit.
+    """
+    objective, frames = objective_of(fitted), []
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
+        places = target.at(nodes)
+        for axis, name in enumerate(DIRECTIONS):
+            columns = {
+                "part": "bubble",
+                "frame": frame,
+                "pressure_kPa": 1e3 * target.pressure,
+                "x_mm": places[:, 0],
+                "y_mm": places[:, 1],
+                "quantity": name,
+                "measured": np.asarray(target.displacement)[:, axis],
+                "modelled": modelled[:, axis],
+            }
+            frames.append(pd.DataFrame(columns))
+    table = pd.concat(frames, ignore_index=True)
+    table["difference"] = table["modelled"] - table["measured"]
+    table["unit"] = objective.unit
+    return table
+
+
+def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
+    """Write the figures, surfaces.csv and bubble.pvd with its files; return the test's page."""
+    left, cuts = left_at_nodes(fitted), profile_charts(prepared, fitted)
+    series = out.path("bubble.pvd")
+    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
+    figures, sheet_files = sheet_exhibit(prepared, fitted, out)
+    files = [
+        *write_surface_table(prepared, out),
+        (series.name, "the inflated bubble pressure by pressure, for ParaView"),
+        *_pictures(prepared, fitted, cuts, out),
+        *sheet_files,
+    ]
+    tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
+    if prepared.registration is not None:
+        figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
+        tables.insert(0, registration_table(prepared.registration))
+    taken = recorded_of(prepared)
+    if taken is not None:
+        tables.insert(0, recorded_table(taken))
+        figures += clock_pictures(taken, out)
+    parts: list[Part] = [
+        cuts,
+        field_maps(prepared, fitted),
+        bubble_solid(prepared, fitted, left),
+        residual_chart(prepared, fitted),
+    ]
+    facts, record = _facts(prepared, findings), correlation_table(prepared)
+    return Exhibit(facts, figures, tables, files, parts, record)
+
+
+def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, object]]:
+    numbers = findings.numbers
+    facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
+    dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
+    if any(dropped):
+        facts.append(("points left out", f"{dropped[0]} doubtful, {dropped[1]} beyond the rim"))
+    shift, pressure = numbers["nuisance"].values()
+    if shift is not None:
+        facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
+    if pressure is not None:
+        facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
+    (sheet,) = sheet_lines(numbers["sheet"])
+    return [*facts, ("sheet", sheet.removeprefix("sheet: "))]
+
+
+def _saved(out: Output, name: str, charts: Charts, caption: str) -> Shown:
+    save(out.path(name), charts)
+    return out.name(name), caption
+
+
+def _pictures(
+    prepared: PreparedBubble, fitted: FittedTest, cuts: Charts, out: Output
+) -> list[Shown]:
+    """Write cuts and heights against what was measured, as pictures beside the page."""
+    name, objective = prepared.test.name, objective_of(fitted)
+    modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    heights = height_charts(
+        [t.pressure for t in objective.targets],
+        [t.displacement[:, 2] for t in objective.targets],
+        [own[:, 2] for own in modelled],
+        "known solution" if prepared.known is not None else "measured",
+    )
+    words = f"{name}: cuts through the bubble along warp and fill"
+    return [
+        _saved(out, "profiles.png", cuts, words),
+        _saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
+    ]
+
+
+def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
+    """Return measured less modelled (nodes, 3) mm by reported pressure; None where unmatched."""
+    objective, history = objective_of(fitted), fitted.histories[0]
+    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
+    left: list[Array | None] = [None] * len(history.displacement)
+    differences = objective.differences(history.displacement, fitted.nuisance)
+    for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
+        frame = number if target.frame is None else target.frame
+        left[frame] = at_nodes(nodes, target.at(nodes), -off)
+    return left
 
 
 def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
-    """The blocks of the test's own objective, pressure by pressure."""
+    """Return the blocks of the test's own objective, pressure by pressure."""
     objective = objective_of(fitted)
     residual = objective.residual(fitted.histories[0], fitted.nuisance)
-    norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3)
-    note = (
-        "RMS error over the largest measured value, direction by direction"
-        if prepared.test.objective == "e"
-        else "RMS error in mm, direction by direction"
-    )
-    kilo = [1e3 * t.pressure for t in objective.targets]
-    rows: list[list[object]] = [[p, *n.tolist()] for p, n in zip(kilo, norms, strict=True)]
-    return Table("Misfit by pressure", ["pressure, kPa", "x", "y", "z"], rows, note)
+    norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3).tolist()
+    of = "over the largest measured value" if prepared.test.objective == "e" else "in mm"
+    rows: list[list[object]] = [
+        [1e3 * t.pressure, *own] for t, own in zip(objective.targets, norms, strict=True)
+    ]
+    header = ["pressure, kPa", "x", "y", "z"]
+    return Table("Misfit by pressure", header, rows, f"RMS error {of}, direction by direction")
 
 
 def surface_tables(prepared: PreparedBubble) -> list[Table]:
-    """R^2 of the polynomial surfaces, where there are any."""
+    """Return R^2 of the polynomial surfaces, where there are any."""
     if not prepared.surfaces:
         return []
     test = prepared.test
@@ -120,86 +295,48 @@ def surface_tables(prepared: PreparedBubble) -> list[Table]:
         [1e3 * p, *(f"{r:.5f}" for r in s.r_squared)]
         for p, s in zip(test.pressures, prepared.surfaces, strict=True)
     ]
-    note = "" if test.match_by == "surfaces" else NOT_MATCHED
     title = f"R² of polynomial surfaces of degree {test.match_degree}"
+    note = "" if test.match_by == "surfaces" else NOT_MATCHED
     return [Table(title, ["pressure, kPa", "x", "y", "z"], rows, note)]
 
 
 def write_surface_table(prepared: PreparedBubble, out: Output) -> list[Shown]:
-    """surfaces.csv, where there are surfaces."""
+    """Write surfaces.csv, where there are surfaces."""
     if not prepared.surfaces:
         return []
-    with replacing(out.path(SURFACES)) as path:
+    with replacing(out.path("surfaces.csv")) as path:
         write_surfaces(prepared.surfaces, path)
-    return [(out.name(SURFACES), "polynomial surfaces of the data")]
-
-
-def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
-    """A row a place, pressure and direction.
-
-    Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
-    (dx, dy, dz), measured, modelled, difference (modelled less measured, offset included), unit.
-    """
-    objective = objective_of(fitted)
-    (comparison,) = fitted.comparisons
-    nodes = comparison.model.mesh.points[:, :2]
-    frames = []
-    every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
-    for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
-        places = target.at(nodes)
-        for axis, name in enumerate(("dx", "dy", "dz")):
-            frames.append(
-                pd.DataFrame(
-                    {
-                        "part": "bubble",
-                        "frame": frame,
-                        "pressure_kPa": 1e3 * target.pressure,
-                        "x_mm": places[:, 0],
-                        "y_mm": places[:, 1],
-                        "quantity": name,
-                        "measured": np.asarray(target.displacement)[:, axis],
-                        "modelled": modelled[:, axis],
-                    }
-                )
-            )
-    table = pd.concat(frames, ignore_index=True)
-    table["difference"] = table["modelled"] - table["measured"]
-    table["unit"] = objective.unit
-    return table
-
-
-Array = NDArray[np.float64]
-
-#: Points that are drawn of one pressure.
-POINTS = 120
+    return [(out.name("surfaces.csv"), "polynomial surfaces of the data")]
 
 
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return heights along both axes: lines of the model, dots of what was measured."""
-    displacement = fitted.histories[0].displacement + displacement_offset(fitted.nuisance)
     return cut_charts(
         f"{prepared.test.name} cuts",
         prepared.test.pressures,
         fitted.comparisons[0].model.mesh.points,
-        displacement,
+        fitted.histories[0].displacement + displacement_offset(fitted.nuisance),
         [(seen.points, seen.displacement) for seen in prepared.fields],
-        f"{prepared.test.name}: lines are the model, dots {source(prepared)}.",
+        f"{prepared.test.name}: lines are the model, dots {_source(prepared)}.",
     )
 
 
+def _source(prepared: PreparedBubble) -> str:
+    return "the known solution" if prepared.known is not None else "what was measured"
+
+
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
-    """What is left of dx, dy and dz over the measured height."""
+    """Return the residuals of dx, dy and dz over the measured height."""
     objective = objective_of(fitted)
     left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     targets = objective.targets
     numbers, charts = chosen(len(targets)), []
-    for axis, name in enumerate(("dx", "dy", "dz")):
+    for axis, name in enumerate(DIRECTIONS):
         series = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
             every = slice(None, None, max(1, -(-len(left[k]) // POINTS)))
             height = np.asarray(targets[k].displacement)[every, 2]
-            off = left[k][every, axis]
-            series.append(dots(kilo(targets[k].pressure), height, off, rank=rank))
+            series.append(dots(kilo(targets[k].pressure), height, left[k][every, axis], rank=rank))
         rms = float(np.sqrt(np.mean(np.concatenate([own[:, axis] for own in left]) ** 2)))
         title = f"{name}: RMS {rms:.2g} mm"
         alt = f"modelled less measured {name} over the measured height, {rms:.2g} mm RMS"
@@ -210,34 +347,20 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     return Charts(f"{prepared.test.name} residual", charts, caption + left_out(len(targets)))
 
 
-def source(prepared: PreparedBubble) -> str:
-    """What the model is compared with."""
-    return "the known solution" if prepared.known is not None else "what was measured"
-
-
-LABELS = ("x (warp), mm", "y (fill), mm")
-
-
 def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
-    """dx, dy and dz at every place that was matched."""
-    objective = objective_of(fitted)
+    """Return maps of dx, dy and dz at every place that was matched."""
+    objective, name = objective_of(fitted), prepared.test.name
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
-    displacement = fitted.histories[0].displacement
+    displacement, targets = fitted.histories[0].displacement, objective.targets
+    measured = [np.asarray(target.displacement) for target in targets]
     modelled = objective.modelled(displacement, fitted.nuisance)
     left = objective.differences(displacement, fitted.nuisance)
-    targets, name = objective.targets, prepared.test.name
-    rows = [
-        (
-            quantity,
-            "mm",
-            [np.asarray(target.displacement)[:, axis] for target in targets],
-            [own[:, axis] for own in modelled],
-            [own[:, axis] for own in left],
-        )
-        for axis, quantity in enumerate(("dx", "dy", "dz"))
-    ]
+    rows = []
+    for k, quantity in enumerate(DIRECTIONS):
+        a, b, c = ([own[:, k] for own in one] for one in (measured, modelled, left))
+        rows.append((quantity, "mm", a, b, c))
     caption = (
-        f"{name}: displacement of {source(prepared)}, of the model, and their difference. Colours "
+        f"{name}: displacement of {_source(prepared)}, of the model, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."
     )
     if objective.constant:
@@ -249,16 +372,10 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     )  # fmt: skip
 
 
-#: Signs of x and y of the parts of a whole: a quarter is seen four times.
-WHOLE, QUARTERS = ((1, 1),), ((1, 1), (-1, 1), (-1, -1), (1, -1))
-STRAIN_LABELS = ("strain along the warp ε1", "strain along the fill ε2", "shear strain γ12")
-STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear stress τ12")
-
-
 def bubble_solid(
     prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
 ) -> Solid:
-    """The modelled surface at every pressure of the test.
+    """Return the modelled surface at every pressure of the test.
 
     left : (nodes, 3) mm a pressure, between model and measurement; None where nothing is matched.
     """
@@ -272,10 +389,12 @@ def bubble_solid(
         (STRESSES, "MPa", np.array([sheet.stress for sheet in sheets])),
     )
     for names, unit, values in fields:
-        every = _around(values, signs)
-        for k, name in enumerate(names):
-            ends: Shades = "about zero" if k == 2 else "from least"
-            shades.append(Shade(name, unit, pack(every[..., k]), ends))
+        # A mirrored part is sheared the other way.
+        every = np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
+        shades += [
+            Shade(name, unit, pack(every[..., k]), "about zero" if k == 2 else "from least")
+            for k, name in enumerate(names)
+        ]
     points = mesh.points + np.array([sheet.displacement for sheet in sheets])
     around = [points * (sx, sy, 1.0) for sx, sy in signs]
     quads = [mesh.quads + k * len(mesh.points) for k in range(len(signs))]
@@ -292,126 +411,29 @@ def bubble_solid(
 
 
 def _sizes(left: Array | None, quads: NDArray[np.intp]) -> Array:
-    """(quads,) mm, mean over the corners; NaN where one of them has none."""
+    """Return (quads,) mm, means over the corners; NaN where one of them has none."""
     if left is None:
         return np.full(len(quads), np.nan)
     return np.asarray(np.linalg.norm(left, axis=1)[quads].mean(axis=1))
 
 
-def _around(values: Array, signs: Array) -> Array:
-    """(frames, parts * quads, 3): a mirrored part is sheared the other way."""
-    return np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
-
-
-PROFILES, HEIGHTS, SERIES = "profiles.png", "heights.png", "bubble.pvd"
-
-
-def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
-    """Write the figures, surfaces.csv and bubble.pvd with its files."""
-    files = [
-        *write_surface_table(prepared, out),
-        (out.name(SERIES), "the inflated bubble pressure by pressure, for ParaView"),
-    ]
-    left = left_at_nodes(fitted)
-    write_series(fitted_model(fitted), fitted.histories[0], fitted.law, out.path(SERIES), left)
-    of_sheet = sheet_exhibit(prepared, fitted, out)
-    files += [*_pictures(prepared, fitted, out), *of_sheet[1]]
-    figures = list(of_sheet[0])
-    tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
-    if prepared.registration is not None:
-        figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
-        tables.insert(0, registration_table(prepared.registration))
-    taken = recorded_of(prepared)
-    if taken is not None:
-        tables.insert(0, recorded_table(taken))
-        figures += clock_pictures(taken, out)
-    parts: list[Part] = [
-        profile_charts(prepared, fitted),
-        field_maps(prepared, fitted),
-        bubble_solid(prepared, fitted, left),
-        residual_chart(prepared, fitted),
-    ]
-    record = correlation_table(prepared)
-    return Exhibit(_facts(prepared, findings), figures, tables, files, parts, record)
-
-
-def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
-    """(nodes, 3) mm a reported pressure, measured less modelled; None where nothing is matched."""
-    objective, history = objective_of(fitted), fitted.histories[0]
-    nodes = fitted.comparisons[0].model.mesh.points[:, :2]
-    left: list[Array | None] = [None] * len(history.displacement)
-    differences = objective.differences(history.displacement, fitted.nuisance)
-    for number, (target, off) in enumerate(zip(objective.targets, differences, strict=True)):
-        frame = number if target.frame is None else target.frame
-        left[frame] = at_nodes(nodes, target.at(nodes), -off)
-    return left
-
-
-def _pictures(prepared: PreparedBubble, fitted: FittedTest, out: Output) -> list[Shown]:
-    """Cuts and heights against what was measured, as pictures beside the page."""
-    test = prepared.test
-    displacement = fitted.histories[0].displacement
-    label = "known solution" if prepared.known is not None else "measured"
-    objective = objective_of(fitted)
-    targets, modelled = objective.targets, objective.modelled(displacement, fitted.nuisance)
-    save(out.path(PROFILES), profile_charts(prepared, fitted))
-    heights = height_charts(
-        [t.pressure for t in targets],
-        [t.displacement[:, 2] for t in targets],
-        [own[:, 2] for own in modelled],
-        label,
-    )
-    save(out.path(HEIGHTS), heights)
-    return [
-        (out.name(PROFILES), f"{test.name}: cuts through the bubble along warp and fill"),
-        (out.name(HEIGHTS), f"{test.name}: modelled against measured height"),
-    ]
-
-
-def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, object]]:
-    numbers = findings.numbers
-    facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
-    dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
-    if any(dropped):
-        facts.append(("points left out", f"{dropped[0]} doubtful, {dropped[1]} beyond the rim"))
-    shift, pressure = numbers["nuisance"].values()
-    if shift is not None:
-        facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
-    if pressure is not None:
-        facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
-    (sheet,) = sheet_lines(numbers["sheet"])
-    facts.append(("sheet", sheet.removeprefix("sheet: ")))
-    return facts
-
-
-HEIGHTS_EXAMINED = "rises.png"
-
-
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
-    """Write the maps and the rise by pressure."""
-    tables = [_frames(prepared)]
-    if prepared.registration is not None:
-        tables.insert(0, registration_table(prepared.registration))
-    if prepared.view.apexes:
-        tables.append(_equilibrium(prepared))
-    maps = registration_picture(prepared.fields, prepared.test.outline, out)
-    return Exhibit(
-        facts=_facts_examined(prepared), figures=[maps, _rises(prepared, out)], tables=tables
-    )
-
-
-def _facts_examined(prepared: PreparedBubble) -> list[tuple[str, object]]:
-    view = prepared.view
-    facts: list[tuple[str, object]] = []
+    """Write the maps and the rise by pressure; return the page of the data before a fit."""
+    view, facts, tables = prepared.view, [], [_frames(prepared)]
     if view.rim is not None:
-        rim = view.rim
-        facts.append(
-            ("the sheet rises about, mm", f"{rim.x:.2f}, {rim.y:.2f} (+- {rim.error:.2g})")
-        )
+        where = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
+        facts.append(("the sheet rises about, mm", where))
     if view.axes is not None:
         clear = f"+- {view.axes.error:.2g}, {view.axes.clear:.0%} clear"
         facts.append(("axes of symmetry, degrees from x and y", f"{view.axes.off:.2f} ({clear})"))
-    return facts
+    if prepared.registration is not None:
+        tables.insert(0, registration_table(prepared.registration))
+    if view.apexes:
+        tables.append(_equilibrium(prepared))
+    maps = registration_picture(prepared.fields, prepared.test.outline, out)
+    rises = rise_charts([field.pressure for field in prepared.fields], view.rises)
+    figure = _saved(out, "rises.png", rises, "rise about the centre against pressure")
+    return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
 
 
 def _frames(prepared: PreparedBubble) -> Table:
@@ -425,20 +447,13 @@ def _frames(prepared: PreparedBubble) -> Table:
 
 
 def _equilibrium(prepared: PreparedBubble) -> Table:
-    thickness = prepared.test.thickness
     rows: list[list[object]] = [
         [
-            1e3 * apex.pressure,
-            apex.height,
-            1e3 * apex.curvature,
-            apex.force,
-            apex.error,
-            apex.force / thickness,
-            100 * apex.strain[0],
-            100 * apex.strain[1],
+            1e3 * apex.pressure, apex.height, 1e3 * apex.curvature, apex.force, apex.error,
+            apex.force / prepared.test.thickness, 100 * apex.strain[0], 100 * apex.strain[1],
         ]
         for apex in prepared.view.apexes
-    ]
+    ]  # fmt: skip
     header = [
         "pressure, kPa", "apex, mm", "k1 + k2, 1/m", "force, kN/m", "+-", "stress, MPa",
         "strain along warp, %", "along fill, %",
@@ -450,36 +465,33 @@ def _equilibrium(prepared: PreparedBubble) -> Table:
     return Table("Equilibrium of the apex, without a model", header, rows, note)
 
 
-def _rises(prepared: PreparedBubble, out: Output) -> Shown:
-    pressures = [field.pressure for field in prepared.fields]
-    save(out.path(HEIGHTS_EXAMINED), rise_charts(pressures, prepared.view.rises))
-    return out.name(HEIGHTS_EXAMINED), "rise about the centre against pressure"
-
-
 def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
-    """Figures and files of the surface and of a constant field, where there are any."""
-    figures, files = [], []
+    """Write figures and files of the surface and of a constant field, where there are any."""
+    figures: list[Shown] = []
+    files: list[Shown] = []
     sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
-        _write(out, TABLE, {"x_mm": points[:, 0], "y_mm": points[:, 1], "z0_mm": points[:, 2]})
-        heights = [("z0, mm", points[:, :2], points[:, 2])]
-        save(out.path(PICTURE), disk_charts(heights, edge))
+        columns = dict(zip(("x_mm", "y_mm", "z0_mm"), points.T, strict=True))
+        _write(out, "reference_surface.csv", columns)
+        charts = disk_charts([("z0, mm", points[:, :2], points[:, 2])], edge)
         how = " and ".join(w for w in used_of(prepared) if w in ("measured surface", "modes"))
         words = "surface of the sheet in the reference picture"
-        figures.append((out.name(PICTURE), f"{prepared.test.name}: {words} ({how})"))
-        files.append((out.name(TABLE), f"{words}, node by node"))
+        caption = f"{prepared.test.name}: {words} ({how})"
+        figures.append(_saved(out, "reference_surface.png", charts, caption))
+        files.append((out.name("reference_surface.csv"), f"{words}, node by node"))
     if sheet.constant:
         places, field = constant_field(fitted)
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
-        _write(out, CONSTANT_TABLE, {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns})
-        save(out.path(CONSTANT_PICTURE), disk_charts(own, edge))
+        columns = {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns}
+        _write(out, "constant_field.csv", columns)
         words = "measured less modelled, as far as it is the same at all pressures"
-        figures.append((out.name(CONSTANT_PICTURE), f"Taken out of the fit: {words}"))
-        files.append((out.name(CONSTANT_TABLE), f"{words}, point by point"))
+        caption = f"Taken out of the fit: {words}"
+        figures.append(_saved(out, "constant_field.png", disk_charts(own, edge), caption))
+        files.append((out.name("constant_field.csv"), f"{words}, point by point"))
     return figures, files
 
 
@@ -489,105 +501,84 @@ def _write(out: Output, name: str, columns: dict[str, Array]) -> None:
 
 
 def recorded_table(taken: RecordedFrames) -> Table:
-    """The frames taken, and at which pressures they were recorded."""
-    columns = ["frame", "pressure, kPa"]
-    cells: list[list[object]] = [
-        [n, 1e3 * p] for n, p in zip(taken.names, taken.pressure.tolist(), strict=True)
-    ]
+    """Return the frames taken, and at which pressures they were recorded."""
+    columns: dict[str, Sequence[object]] = {
+        "frame": taken.names,
+        "pressure, kPa": [1e3 * p for p in taken.pressure.tolist()],
+    }
     if taken.asked is not None:
-        columns += ["asked for, kPa", "farther by, kPa"]
-        for row, p, a in zip(cells, taken.pressure, taken.asked, strict=True):
-            row += [1e3 * float(a), 1e3 * float(p - a)]
+        columns["asked for, kPa"] = [1e3 * float(a) for a in taken.asked]
+        columns["farther by, kPa"] = [1e3 * float(off) for off in taken.pressure - taken.asked]
     if taken.doubt is not None and taken.clock is not None and taken.clock.misfit is not None:
-        columns.append("uncertain by the clocks, +- kPa")
-        for row, d in zip(cells, taken.doubt, strict=True):
-            row.append(1e3 * float(d))
-    left_out = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
-    note = f"pressures from {taken.source}; {len(cells)} of {taken.count} frames{left_out}"
+        columns["uncertain by the clocks, +- kPa"] = [1e3 * float(d) for d in taken.doubt]
+    rows = [list(row) for row in zip(*columns.values(), strict=True)]
+    dropped = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
+    note = f"pressures from {taken.source}; {len(rows)} of {taken.count} frames{dropped}"
     if taken.clock is not None:
         note += ". " + clock_words(taken.clock)
-    return Table("Frames taken", columns, cells, note)
+    return Table("Frames taken", list(columns), rows, note)
 
 
 def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
-    """Pressures of the log beside the heights of all frames; none without a log."""
+    """Draw pressures of the log beside the heights of all frames; none without a log."""
     clock = taken.clock
     if clock is None:
         return []
     times = clock.times + clock.offset
     charts = clock_charts(times, clock.pressure, clock.heights, taken.pressure)
-    save(out.path(PICTURE_RECORDED_WORDS), charts)
-    return [
-        (
-            out.name(PICTURE_RECORDED_WORDS),
-            "pressures of the log and heights of the frames, by one clock",
-        )
-    ]
+    words = "pressures of the log and heights of the frames, by one clock"
+    return [_saved(out, "clock.png", charts, words)]
 
 
 def registration_table(found: Registration) -> Table:
-    """What was found and what was given, step by step."""
+    """Return what was found and what was given, step by step."""
     x, y, z = found.placement.origin
     rim, warp = found.rim, found.warp
-    plane = f"tilted by {found.placement.tilt:.2f} degrees"
     how = PLANES[found.plane_of]
     if found.plane_of != "camera":
         how += f", which deviate by {found.flatness:.2g} mm"
-    rows: list[list[object]] = [
-        ["plane of the rim", plane, how],
-        [
-            "centre of the rim, mm",
-            f"{x:.2f}, {y:.2f}, {z:.2f}",
-            "given" if rim is None else f"found where the sheet does not rise, +- {rim.error:.2g}",
-        ],
-        [
-            "warp, degrees from the camera's x",
-            f"{found.warp_angle:.2f}",
-            "given" if warp is None else _warp_words(found),
-        ],
-        ["motion of the clamp", *_motion_words(found)],
+    centre, direction = "given", "given"
+    if rim is not None:
+        centre = f"found where the sheet does not rise, +- {rim.error:.2g}"
+    if warp is not None and warp.clear is None:
+        direction = f"found by the turn of the elliptic rim, +- {warp.error:.2g}"
+    elif warp is not None:
+        stiff = "stiffer" if found.options.warp_is_stiff else "softer"
+        direction = (
+            f"found by symmetry ({warp.clear:.0%} clear), +- {warp.error:.2g}; the {stiff} of the "
+            "two axes"
+        )
+    motion, removed = "not known", "no points beyond the rim all around"
+    seen = [m for m in found.motions if m.points]
+    if seen:
+        shift = max(float(np.linalg.norm(m.shift)) for m in seen)
+        motion = f"{shift:.3g} mm, {max(m.angle for m in seen):.2g} degrees at most"
+        removed = "removed" if found.options.remove_clamp_motion else "left in"
+    rows = [
+        ["plane of the rim", f"tilted by {found.placement.tilt:.2f} degrees", how],
+        ["centre of the rim, mm", f"{x:.2f}, {y:.2f}, {z:.2f}", centre],
+        ["warp, degrees from the camera's x", f"{found.warp_angle:.2f}", direction],
+        ["motion of the clamp", motion, removed],
     ]
     note = "lengths and directions in the camera's coordinates"
     return Table("Registration", ["step", "value", "how"], rows, note)
 
 
-def _warp_words(found: Registration) -> str:
-    assert found.warp is not None
-    if found.warp.clear is None:
-        return f"found by the turn of the elliptic rim, +- {found.warp.error:.2g}"
-    stiff = "stiffer" if found.options.warp_is_stiff else "softer"
-    return (
-        f"found by symmetry ({found.warp.clear:.0%} clear), +- {found.warp.error:.2g}; the "
-        f"{stiff} of the two axes"
-    )
-
-
-def _motion_words(found: Registration) -> tuple[str, str]:
-    seen = [m for m in found.motions if m.points]
-    if not seen:
-        return "not known", "no points beyond the rim all around"
-    shift = max(float(np.linalg.norm(m.shift)) for m in seen)
-    turn = max(m.angle for m in seen)
-    removed = "removed" if found.options.remove_clamp_motion else "left in"
-    return f"{shift:.3g} mm, {turn:.2g} degrees at most", removed
-
-
 def registration_picture(
     fields: Sequence[DisplacementField], outline: Outline, out: Output
 ) -> Shown:
-    """Maps of the reference height, where it was measured, and of the highest rise."""
+    """Draw maps of the reference height, where it was measured, and of the highest rise."""
     last = fields[-1]
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))
-    save(out.path(PICTURE_REGISTRATION), registration_charts(last.points, maps, outline.edge()))
-    return out.name(
-        PICTURE_REGISTRATION
-    ), "measured points in the test's coordinates, the rim, warp and fill"
+    charts = registration_charts(last.points, maps, outline.edge())
+    words = "measured points in the test's coordinates, the rim, warp and fill"
+    return _saved(out, "registration.png", charts, words)
 
 
 def correlation_table(prepared: PreparedBubble) -> list[Table]:
-    """A row a field; nothing where the data were computed."""
+    """Return how the fields were measured, a row an entry; nothing where they were computed."""
     test = prepared.test
     if not isinstance(test.data, PointFiles) or not prepared.fields:
         return []
@@ -595,7 +586,7 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     formats = sorted({f.source.format for f in prepared.fields if f.source.format})
     points = [len(f.points) for f in prepared.fields]
     software = [given.get("software", ""), ", ".join(formats)]
-    known: list[list[object]] = [
+    rows: list[list[object]] = [
         ["software and format of the export", "; ".join(filter(None, software)) or NOT_GIVEN],
         ["images evaluated", str(len(prepared.fields))],
         ["points in an image", f"{min(points)} to {max(points)}"],
@@ -604,17 +595,17 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
         ["noise floor of a displacement", _mm(test.noise) or NOT_GIVEN],
     ]
     if test.match_by == "surfaces":
-        known.append(["smoothing", f"polynomial surfaces of degree {test.match_degree}"])
-    asked: list[list[object]] = [[name, given.get(key, NOT_GIVEN)] for key, name in ASKED.items()]
-    return [Table(f"{TITLE}: {test.name}", ["", ""], [*known, *asked], NOTE, text=(1,))]
+        rows.append(["smoothing", f"polynomial surfaces of degree {test.match_degree}"])
+    rows += [[name, given.get(key, NOT_GIVEN)] for key, name in ASKED.items()]
+    return [Table(f"Image correlation: {test.name}", ["", ""], rows, GUIDE, text=(1,))]
 
 
 def _of_filter(test: BubbleTest) -> dict[str, str]:
-    """What the section of the camera's own filter tells, mm."""
+    """Return what the section of the camera's own filter says, mm."""
     if test.facet is None:
         return {}
-    told = {"subset": _mm(test.facet.size), "step": _mm(test.facet.step)}
-    return {key: words for key, words in told.items() if words}
+    said = {"subset": _mm(test.facet.size), "step": _mm(test.facet.step)}
+    return {key: words for key, words in said.items() if words}
 
 
 def _mm(value: float | None) -> str:
@@ -628,35 +619,23 @@ def write_series(
     path: Path,
     residuals: Sequence[Array | None] = (),
 ) -> Path:
-    """Write the series; each file holds the sheet as it is inflated, with its fields.
+    """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
 
     Point data: displacement (mm), and residual_mm, measured less modelled, where there are
     `residuals` (nodes, 3), one a reported pressure. Cell data: log_strain_1_2_12,
-    stress_1_2_12_MPa, wrinkling (0 taut, 1 wrinkled, 2 slack).
-
-    Parameters
-    ----------
-    path : of the collection, ends in .pvd; the files lie in a folder of its name.
-
-    Raises
-    ------
-    OutputError : they cannot be written.
+    stress_1_2_12_MPa, wrinkling (0 taut, 1 wrinkled, 2 slack). Raises OutputError.
     """
     folder, files = path.with_name(f"{path.stem}-vtu"), []
     for number, sheet in enumerate(inflated_sheets(model, history, law)):
         own = residuals[number] if number < len(residuals) else None
         file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
-        write_vtu(
-            model.mesh,
-            sheet.displacement,
-            file,
-            {} if own is None else {"residual_mm": own},
-            {
-                "log_strain_1_2_12": sheet.strain,
-                "stress_1_2_12_MPa": sheet.stress,
-                "wrinkling": sheet.state,
-            },
-        )
+        cells = {
+            "log_strain_1_2_12": sheet.strain,
+            "stress_1_2_12_MPa": sheet.stress,
+            "wrinkling": sheet.state,
+        }
+        nodal = {} if own is None else {"residual_mm": own}
+        write_vtu(model.mesh, sheet.displacement, file, nodal, cells)
         files.append((1e3 * sheet.pressure, file))
     return write_pvd(path, files)
 
@@ -668,23 +647,21 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """displacement.csv, bubble.pvd and profiles.png of every card, and the apex heights."""
+    """Write displacement.csv, bubble.pvd and profiles.png of every card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
     for i, name in enumerate(cards, start=1):
-        run = runs[name, PART]
-        if isinstance(run.outcome, SolverFailure):
-            numbers[name] = {"failed": run.outcome.reason}
-            lines.append(f"{name}: failed: {run.outcome.reason}")
+        history, model = runs[name, PART].outcome, runs[name, PART].model
+        if isinstance(history, SolverFailure):
+            numbers[name] = {"failed": history.reason}
+            lines.append(f"{name}: failed: {history.reason}")
             continue
         suffix = "" if len(cards) == 1 else f"-{i}"
-        history, model = run.outcome, run.model
-        heights = apex_heights(model, history)
-        reached = strains_of(history)
+        heights, kilos = apex_heights(model, history), 1e3 * history.load
         numbers[name] = {
-            "pressure_kPa": (1e3 * history.load).tolist(),
+            "pressure_kPa": kilos.tolist(),
             "apex_mm": heights.tolist(),
-            "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
+            "strain_reached": dict(zip(STRAINS, strains_of(history).tolist(), strict=True)),
         }
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
@@ -692,33 +669,27 @@ def simulate(
         cuts = cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)
         lines += [f"{name}:"] if len(cards) > 1 else []
-        lines += [
-            f"{p:8.1f} kPa   apex {z:8.3f} mm"
-            for p, z in zip(1e3 * history.load, heights, strict=True)
-        ]
-    lines += [f"note: {words}" for words in _flat(test)]
+        lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
+    if test.sheet != Sheet():
+        lines.append(
+            "note: simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] "
+            "says"
+        )
     only = numbers[next(iter(cards))] if len(cards) == 1 else {}
     return Simulation({**only, "cards": numbers}, lines)
 
 
-def _flat(test: BubbleTest) -> list[str]:
-    """That a forward analysis knows nothing of how the sheet of the test lay."""
-    if test.sheet == Sheet():
-        return []
-    return ["simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"]
-
-
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
-    """A row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
-    points, count = model.mesh.points[:, :2], len(model.mesh.points)
+    """Return a row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
+    x, y = model.mesh.points[:, :2].T
     frames = [
         pd.DataFrame(
             {
-                "pressure_kPa": np.full(count, 1e3 * load),
-                "node": np.arange(count),
-                "x_mm": points[:, 0],
-                "y_mm": points[:, 1],
-                **{f"d{axis}_mm": u[:, k] for k, axis in enumerate("xyz")},
+                "pressure_kPa": np.full(len(x), 1e3 * load),
+                "node": np.arange(len(x)),
+                "x_mm": x,
+                "y_mm": y,
+                **{f"{name}_mm": u[:, k] for k, name in enumerate(DIRECTIONS)},
             }
         )
         for load, u in zip(history.load, history.displacement, strict=True)

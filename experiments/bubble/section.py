@@ -1,4 +1,4 @@
-"""[[bubble]] of a project, as it is written."""
+"""The section [[bubble]] of a project file, and its units turned into mm, N and MPa."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class CorrelationSection(Section):
 
 
 class FilterSection(Section):
-    """The model is read as the camera reads the fabric."""
+    """The camera's filter: the model is read as the camera reads the fabric."""
 
     facet: Positive
     order: Literal[1, 2] = 1
@@ -56,13 +56,10 @@ class FilterSection(Section):
 def facet_of(
     section: FilterSection | None, place: Place, scale: float, symmetry: str, match: str
 ) -> Facet | None:
-    """The facet of a section, in mm; None where points are read as they are.
+    """Return the facet of a section, in mm; None where points are read as they are.
 
-    scale : mm per unit of the project's lengths.
-
-    Raises
-    ------
-    InputError : what makes no facet; a quarter model, or surfaces that are matched.
+    scale : mm per unit of the project's lengths. Raises InputError for an impossible facet, a
+    quarter model, and surfaces that are matched.
     """
     if section is None:
         return None
@@ -88,13 +85,7 @@ class EllipseSection(Section):
 
 
 def outline_of(section: BubbleSection, place: Place) -> Outline:
-    """The edge in mm.
-
-    Raises
-    ------
-    InputError : neither a radius nor an ellipse, or both; semi-axes the wrong way round, too far
-        apart, or below the fabric's thickness; a quarter of which the yarns are no axes.
-    """
+    """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius."""
     length, ellipse = place.scales.length, section.ellipse
     if section.radius is not None and ellipse is not None:
         raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
@@ -113,16 +104,11 @@ def outline_of(section: BubbleSection, place: Place) -> Outline:
         problem = f"expected at least the {MOST_SLENDER:g}th part of the major {outline.major:g} mm"
         raise place.error(key, f"{problem}, got {outline.minor:g} mm")
     if place.fabric.thickness >= outline.minor:
-        problem = (
-            f"expected more than the fabric's thickness {place.fabric.thickness:g} mm, got "
-            f"{outline.minor:g} mm"
-        )
-        raise place.error(key, problem)
+        problem = f"expected more than the fabric's thickness {place.fabric.thickness:g} mm"
+        raise place.error(key, f"{problem}, got {outline.minor:g} mm")
     if section.symmetry == "quarter" and not outline.doubly_symmetric:
-        problem = (
-            f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns: needs 'full'"
-        )
-        raise place.error("symmetry", problem)
+        axes = f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns"
+        raise place.error("symmetry", f"{axes}: needs 'full'")
     return outline
 
 
@@ -164,7 +150,7 @@ Degrees = Annotated[float, Field(ge=-180, le=180)]
 
 
 class RegistrationSection(Section):
-    """The files are in the camera's coordinates; what is not given is found."""
+    """The given steps of a registration of files in the camera's coordinates."""
 
     plane: PlaneOf = "found"
     centre: Triple | None = None
@@ -177,26 +163,19 @@ class RegistrationSection(Section):
 def registration_options(
     section: RegistrationSection | None, place: Place, scale: float
 ) -> RegistrationOptions | None:
-    """What the section gives, in mm; None where the files are in the test's coordinates.
+    """Return the given steps in mm; None where the files are in the test's coordinates.
 
-    scale : mm per unit of the files' lengths.
-
-    Raises
-    ------
-    InputError : an angle and two points.
+    scale : mm per unit of the files' lengths. Raises InputError for an angle and two points.
     """
     if section is None:
         return None
-    marks = None
-    if section.warp_points is not None:
-        first, second = (_point(one, scale) for one in section.warp_points)
-        marks = (first, second)
+    marks = [_point(one, scale) for one in section.warp_points or ()]
     try:
         return RegistrationOptions(
             plane=section.plane,
             centre=None if section.centre is None else _point(section.centre, scale),
             warp=section.warp,
-            warp_points=marks,
+            warp_points=(marks[0], marks[1]) if marks else None,
             warp_is_stiff=section.warp_is == "stiff",
             remove_clamp_motion=section.remove_clamp_motion,
         )
@@ -215,7 +194,7 @@ FULL = "a sheet that is not doubly symmetric needs symmetry = 'full'"
 
 
 class SheetSection(Section):
-    """Flat and taut unless something is said."""
+    """The sheet of the test: flat and taut unless something is said."""
 
     surface: Literal["flat", "measured"] = "flat"
     degree: Annotated[int, Field(ge=2, le=14)] = 8
@@ -231,16 +210,15 @@ class SheetSection(Section):
 
 @dataclass(frozen=True)
 class Sheet:
-    """How the sheet lay, and what of it is looked for.
+    """The first shape of the sheet, and its unknowns.
 
-    measured : whether the measured z is the reference surface. degree : of the polynomial through
-    measured heights, and through the measured motion of the rim. modes : how many shapes of the
-    surface are unknowns; prior : mm, one standard deviation of each. slack : whether it is an
-    unknown in both directions; slack_prior : %, one standard deviation. misfit : mm RMS by which a
-    good model is off, against which priors are weighed. moving_rim : whether the
-    rim follows the measurement. constant : directions (0 to 2) of which a field that is the same
-    at all pressures is projected out. since : number of the frame from which displacements are
-    counted, None for the reference picture.
+    measured : whether the measured z is the reference surface. degree : of the polynomials through
+    measured heights and the measured motion of the rim. modes : number of unknown shapes of the
+    surface; prior : mm, one standard deviation of each. slack : whether it is unknown in both
+    directions; slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against
+    which priors are weighed. moving_rim : whether the rim follows the measurement. constant :
+    directions (0 to 2) in which a field that is the same at all pressures is projected out. since :
+    number of the frame from which displacements are counted, None for the reference picture.
     """
 
     measured: bool = False
@@ -256,7 +234,7 @@ class Sheet:
 
     @property
     def known(self) -> bool:
-        """Whether anything makes up for a sheet that is not flat."""
+        """Return whether anything makes up for a sheet that is not flat."""
         return bool(self.measured or self.modes or self.constant or self.since is not None)
 
 
@@ -268,33 +246,25 @@ def sheet_of(
     of_files: bool,
     offset: bool,
 ) -> Sheet:
-    """The section in mm; pressures are in MPa.
+    """Return the section in mm; pressures are in MPa.
 
     of_files : whether the data are measured points. offset : whether a displacement offset is an
-    unknown.
-
-    Raises
-    ------
-    InputError : what does not go together.
+    unknown. Raises InputError for keys that do not go together.
     """
-    given = section.model_fields_set
-    if not of_files:
-        for key in ("surface", "rim"):
-            if getattr(section, key) == "measured":
-                raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
+    for key in ("surface", "rim"):
+        if not of_files and getattr(section, key) == "measured":
+            raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
     if symmetry == "quarter":
         if section.surface == "measured":
             raise place.error("sheet.surface", f"a measured surface: {FULL}")
         if not doubly_symmetric(section.modes):
             raise place.error("sheet.modes", f"{section.modes} modes: {FULL}")
-    either = section.modes or section.slack
-    for key, needs in (
-        ("prior", section.modes),
-        ("slack_prior", section.slack),
-        ("misfit", either),
+    for key, what, needs in (
+        ("prior", "modes", section.modes),
+        ("slack_prior", "slack", section.slack),
+        ("misfit", "modes or slack", section.modes or section.slack),
     ):
-        if key in given and not needs:
-            what = {"prior": "modes", "slack_prior": "slack", "misfit": "modes or slack"}[key]
+        if key in section.model_fields_set and not needs:
             raise place.error(f"sheet.{key}", f"belongs to {what}, not asked for")
     since = _frame(section, place, pressures)
     if since is not None and section.surface == "measured":
@@ -349,7 +319,7 @@ class KnownSolutionSection(Section):
 
 
 class ColumnsSection(Section):
-    """Names in the files, where they are not found."""
+    """Names of columns in the files, where they are not found."""
 
     x: str | None = None
     y: str | None = None
@@ -382,21 +352,21 @@ class PointsSection(Section):
 
 
 class DataSection(Section):
-    """[bubble.data]: one of the two."""
+    """[bubble.data]: one of the two sources."""
 
     known_solution: KnownSolutionSection | None = None
     points: PointsSection | None = None
 
 
 class MatchSection(Section):
-    """Whether points or polynomial surfaces through them are matched."""
+    """Points or polynomial surfaces through them, to be matched."""
 
     by: Literal["surfaces", "points"] = "points"
     degree: Annotated[int, Field(ge=1, le=12)] = 4
 
 
 class NuisanceSection(Section):
-    """What a measurement may be off by, fitted beside the moduli."""
+    """Offsets of a measurement, fitted beside the moduli."""
 
     displacement_offset: bool = False
     pressure_offset: bool = False

@@ -1,19 +1,25 @@
-"""The model of a sheet as it was: its measured surface, shapes to be found, a rim that moves."""
+"""The sheet of a bubble: its first shape and its rim in the model, and the inflated sheet."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import QhullError, cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import Nuisance
+from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes
+from ...meshes.mesh import surface_strain
 from ...readers.fields import DisplacementField
+from ...solvers.base import History
 from .section import Sheet
 
 Array = NDArray[np.float64]
@@ -26,11 +32,8 @@ LEAST_POINTS = 2
 class DiskPolynomial:
     """A polynomial of x and y, of several values at once.
 
-    Parameters
-    ----------
-    radius : mm, of the disk; degree : in x and y together.
-    coefficients : (terms, values) of products of Legendre polynomials.
-    rms : (values,) of the values less the polynomial, at the points it was fitted to.
+    radius : mm, of the disk; degree : in x and y together. coefficients : (terms, values) of
+    products of Legendre polynomials. rms : (values,) left at the points it was fitted to.
     """
 
     radius: float
@@ -39,21 +42,14 @@ class DiskPolynomial:
     rms: Array
 
     def at(self, points: Array) -> Array:
-        """Values (n, values) at points (n, 2) mm."""
+        """Return values (n, values) at points (n, 2) mm."""
         return np.asarray(_terms(points / self.radius, self.degree) @ self.coefficients)
 
 
 def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int) -> DiskPolynomial:
-    """Least squares.
+    """Fit values (n, k) at points (n, 2) mm by least squares.
 
-    Parameters
-    ----------
-    points : (n, 2) mm. values : (n, k).
-    radius : mm, of the disk. degree : in x and y together.
-
-    Raises
-    ------
-    InputError : too few points for the degree, or points that leave it undetermined.
+    Raises InputError for too few points for the degree, and for points that leave it undetermined.
     """
     terms = _terms(points / radius, degree)
     count = terms.shape[1]
@@ -71,7 +67,7 @@ def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int
 
 
 def _terms(places: Array, degree: int) -> Array:
-    """(n, terms) at places (n, 2) in radii."""
+    """Return (n, terms) at places (n, 2) in radii."""
     x, y = (legendre.legvander(places[:, axis], degree) for axis in (0, 1))
     return np.column_stack([x[:, a] * y[:, d - a] for d in range(degree + 1) for a in range(d + 1)])
 
@@ -88,51 +84,36 @@ MOST_SIGMAS = 6.0
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSheet:
-    """What the measured fields say of the sheet.
-
-    surface : polynomial through the heights of the reference picture. rim : through the
-    displacements at each pressure.
-    """
+    """Polynomials through the heights of the reference picture, and the motion at each pressure."""
 
     surface: DiskPolynomial | None = None
     rim: tuple[DiskPolynomial, ...] = ()
 
 
-#: Of which nothing is measured.
 FLAT = MeasuredSheet()
 
 
 def measured_sheet(
     sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]
 ) -> MeasuredSheet:
-    """Polynomials through what was measured on the disk.
+    """Fit polynomials to the measurement on the disk.
 
-    Raises
-    ------
-    InputError : heights that are not there, do not go out to the rim or are too large.
+    Raises InputError for heights that are missing, do not go out to the rim or are too large.
     """
-    surface = None
-    if sheet.measured:
-        surface = _surface(sheet, outline, fields)
-    if not sheet.moving_rim:
-        return MeasuredSheet(surface)
-    polynomials = []
-    for field in fields:
+    surface = _surface(sheet, outline, fields) if sheet.measured else None
+    rim = []
+    for field in fields if sheet.moving_rim else ():
         on = _on_disk(field, outline, "rim")
-        values = field.displacement[on]
-        polynomials.append(
-            fit_disk_polynomial(field.points[on], values, outline.major, sheet.degree)
-        )
-    return MeasuredSheet(surface, tuple(polynomials))
+        moved = field.displacement[on]
+        rim.append(fit_disk_polynomial(field.points[on], moved, outline.major, sheet.degree))
+    return MeasuredSheet(surface, tuple(rim))
 
 
 def _surface(sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]) -> DiskPolynomial:
     having = [f for f in fields if f.z is not None]
     if not having:
-        problem = (
-            "the files hold no height z of the reference picture: name its column, or use modes"
-        )
-        raise InputError(None, "sheet.surface", problem)
+        problem = "the files hold no height z of the reference picture"
+        raise InputError(None, "sheet.surface", f"{problem}: name its column, or use modes")
     # The reference is the same in all frames; the one with the most points tells most.
     field = max(having, key=lambda f: len(f.points))
     assert field.z is not None
@@ -165,16 +146,15 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
 def with_sheet(
     model: BubbleModel, sheet: Sheet, outline: Outline, of: MeasuredSheet
 ) -> BubbleModel:
-    """The model of a flat disk as that of the sheet as it was."""
-    places = model.mesh.points[:, :2]
+    """Return the model of a flat disk as that of the sheet as it was."""
+    places, rim = model.mesh.points[:, :2], model.mesh.node_sets["rim"]
     if of.surface is not None:
         heights = of.surface.at(places)[:, 0]
-        heights -= heights[model.mesh.node_sets["rim"]].mean()
+        heights -= heights[rim].mean()
         points = np.column_stack([places, heights])
         model = replace(model, mesh=replace(model.mesh, points=points))
     if of.rim:
-        rim = places[model.mesh.node_sets["rim"]]
-        measured = np.array([p.at(rim) for p in of.rim])
+        measured = np.array([p.at(places[rim]) for p in of.rim])
         levels = np.array([0.0, *model.pressures])
         flat = np.concatenate([np.zeros((1, measured[0].size)), measured.reshape(len(of.rim), -1)])
         motion = [np.interp(model.increments, levels, column) for column in flat.T]
@@ -186,7 +166,7 @@ def with_sheet(
 
 
 def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
-    """Unknowns of the sheet; scale (m,) : mm in one unit of each residual of the objective."""
+    """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
     weight = sheet.misfit * np.sqrt(TOGETHER) / float(np.median(scale))
     most = MOST_SIGMAS * sheet.prior
     unknowns = [
@@ -197,3 +177,85 @@ def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisa
         most = MOST_SIGMAS * own
         unknowns += [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
     return unknowns
+
+
+#: States of a quad by its principal stresses, as the files have them.
+TAUT, WRINKLED, LOOSE = 0, 1, 2
+
+
+#: Stress over the largest of the sheet that is taken as none.
+NONE = 1e-6
+
+
+#: Distances between neighbouring measured places: farther from all of them nothing is measured.
+FAR = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class InflatedSheet:
+    """The sheet at one reported pressure.
+
+    pressure : MPa. displacement : (nodes, 3) mm. strain : (quads, 3) log strain (eps1, eps2,
+    gamma12) in the middle of the quads; stress : (quads, 3) MPa, Cauchy, along the turned yarns, in
+    the same order. state : (quads,) of `TAUT`, `WRINKLED` (tension in one direction only), `LOOSE`.
+    """
+
+    pressure: float
+    displacement: Array
+    strain: Array
+    stress: Array
+    state: NDArray[np.intp]
+
+
+def inflated_sheets(
+    model: BubbleModel, history: History, law: HypoelasticLaw
+) -> Iterator[InflatedSheet]:
+    """Yield a sheet a reported pressure, the law integrated along the increments of the history."""
+    path, reported = history.path, model.reported
+    if path is None or len(path) != len(model.increments):
+        path, reported = history.displacement, np.arange(len(history.displacement))
+    frames = {int(step): frame for frame, step in enumerate(reported)}
+    strain = stress = np.zeros((len(model.mesh.quads), 3))
+    for step, u in enumerate(path):
+        before, strain = strain, sheet_strain(model, u)
+        stress, _ = law.increment(before, strain, stress)
+        if step in frames:
+            load = float(history.load[frames[step]])
+            yield InflatedSheet(load, u, strain, stress, states(stress))
+
+
+def sheet_strain(model: BubbleModel, displacement: Array) -> Array:
+    """Return (quads, 3) log strain since the sheet was without stress; displacement (nodes, 3)."""
+    mesh, rest = model.mesh, model.stress_free
+    warp = mesh.warp
+    if warp is None:
+        warp = np.tile([1.0, 0.0, 0.0], (len(mesh.quads), 1))
+    return surface_strain(replace(mesh, points=rest, warp=warp), mesh.points + displacement - rest)
+
+
+def states(stress: Array) -> NDArray[np.intp]:
+    """Return (n,) states of stresses (n, 3) of one sheet."""
+    mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+    size = np.hypot(half, stress[:, 2])
+    none = NONE * float(np.abs(mean).max() + size.max())
+    largest, least = mean + size, mean - size
+    return np.where(largest <= none, LOOSE, np.where(least <= none, WRINKLED, TAUT))
+
+
+def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
+    """Carry values (n, 3) at measured places (n, 2) to nodes (nodes, 2); NaN where none is near.
+
+    Linear between the places; a node beyond them, or in a hole of them, has none.
+    """
+    if len(places) == len(nodes) and np.allclose(places, nodes):
+        return values
+    found = np.full((len(nodes), 3), np.nan)
+    if len(places) < 4:
+        return found
+    tree = cKDTree(places)
+    apart = float(np.median(tree.query(places, k=2)[0][:, 1]))
+    near = tree.query(nodes)[0] <= FAR * apart
+    if near.any():
+        with suppress(QhullError):  # all places on one line: there is nothing between them
+            found[near] = LinearNDInterpolator(places, values)(nodes[near])
+    return found

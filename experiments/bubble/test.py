@@ -1,4 +1,4 @@
-"""A bubble test as its section says, and the model of it."""
+"""A bubble test as its section describes it, its model, and the quantities that studies compare."""
 
 from __future__ import annotations
 
@@ -14,30 +14,18 @@ from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.reading import Facet
-from ..kinds import Place, Reach, Refined
+from ...solvers.base import History
+from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
-from .section import (
-    BubbleSection,
-    KnownSolutionSection,
-    Sheet,
-    Symmetry,
-    facet_of,
-    outline_of,
-    sheet_of,
-)
+from .section import BubbleSection, Sheet, Symmetry, facet_of, outline_of, sheet_of
 
 
 def merge_increments(
-    place: Place,
-    field: str,
-    extra: Sequence[float],
-    pressures: Sequence[float],
+    place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
 ) -> tuple[float, ...]:
-    """Load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
+    """Return load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
 
-    Raises
-    ------
-    InputError : an extra one beyond the last pressure; `field` is their key in the test's section.
+    Raises InputError for an extra one beyond the last pressure; `field` : their key in the section.
     """
     steps = list(pressures)
     for i, step in enumerate(extra):
@@ -55,8 +43,8 @@ def merge_increments(
 class KnownSolution:
     """Data to be computed by the forward model.
 
-    beta : MPa, of the form `form`. elements : of the full disk. increments : MPa, containing the
-    pressures. solver : who computes them, the one that fits unless named.
+    beta : MPa, of the form `form`. elements : of the full disk. increments : MPa, with the
+    pressures. solver : that computes them, the one that fits unless named.
     """
 
     beta: NDArray[np.float64]
@@ -74,25 +62,28 @@ def data_source(
     increments: Sequence[float],
     measured: PointFiles | None,
 ) -> KnownSolution | PointFiles:
-    """What was measured, or the known solution; pressures and increments are in MPa.
+    """Return the measured files, or the known solution; pressures and increments are in MPa.
 
-    Raises
-    ------
-    InputError : a folder of files for computed data, more or fewer files than pressures.
+    Raises InputError for more or fewer files than pressures.
     """
     known, points = section.data.known_solution, section.data.points
     if known is not None:
-        return _known(section, known, place, pressures, increments)
+        field = "data.known_solution"
+        if known.increments is not None:
+            increments = merge_increments(place, f"{field}.increments", known.increments, pressures)
+        return KnownSolution(
+            beta=np.array(known.beta) * place.scales.modulus,
+            form=known.form,
+            elements=known.elements or section.elements,
+            increments=tuple(increments),
+            symmetry=known.symmetry or section.symmetry,
+            solver=known.solver,
+        )
     assert points is not None and measured is not None
     found, count = len(measured.files), len(pressures)
     # Where no data are needed, the files may not be there to be counted.
-    counted = place.need_data or found
-    if (
-        measured.recorded is None
-        and points.pressure is None
-        and counted
-        and found not in (count, 1)
-    ):
+    counted = measured.recorded is None and points.pressure is None
+    if counted and (place.need_data or found) and found not in (count, 1):
         field = "data.points.files" if points.files is not None else "data.points.indices"
         problem = f"expected one file for each of the {count} pressures, got {found}"
         if points.files is not None:
@@ -101,31 +92,7 @@ def data_source(
     return measured
 
 
-def _known(
-    section: BubbleSection,
-    known: KnownSolutionSection,
-    place: Place,
-    pressures: Sequence[float],
-    increments: Sequence[float],
-) -> KnownSolution:
-    field = "data.known_solution"
-    if known.increments is not None:
-        increments = merge_increments(place, f"{field}.increments", known.increments, pressures)
-    return KnownSolution(
-        beta=np.array(known.beta) * place.scales.modulus,
-        form=known.form,
-        elements=known.elements or section.elements,
-        increments=tuple(increments),
-        symmetry=known.symmetry or section.symmetry,
-        solver=known.solver,
-    )
-
-
 PART = "bubble"
-NO_PRESSURES = (
-    "this key is missing; add it, or say in [bubble.data.points.pressure] where each frame's own"
-    " stands"
-)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -159,22 +126,22 @@ class BubbleTest:
 
     @property
     def radius(self) -> float:
-        """Of the disk, mm; of an ellipse the mean of the semi-axes."""
+        """Return the radius, mm; of an ellipse the mean of the semi-axes."""
         return self.outline.radius
 
     @property
     def thickness(self) -> float:
-        """Of the fabric, mm."""
+        """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
 
     @property
     def reach(self) -> Reach:
-        """Nothing: how far a bubble is strained is known only when its law is."""
+        """Return nothing: the strain of a bubble is known only when its law is."""
         return Reach()
 
     @property
     def reads_files(self) -> bool:
-        """Not where its data are computed."""
+        """Return whether its data are measured, not computed."""
         return isinstance(self.data, PointFiles)
 
     def model(
@@ -184,12 +151,7 @@ class BubbleTest:
         symmetry: Symmetry | None = None,
         increments: tuple[float, ...] | None = None,
     ) -> BubbleModel:
-        """The test's model, or one of the same disk with another mesh or other increments.
-
-        Raises
-        ------
-        InputError : a mesh that cannot be had.
-        """
+        """Return the test's model, or one of the same disk with another mesh or increments."""
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
@@ -199,11 +161,9 @@ class BubbleTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, BubbleModel]:
-        """The one model; edges of its quads, or its increments, divided by a factor.
+        """Return the one model; edges of its quads, or its increments, divided by a factor.
 
-        Raises
-        ------
-        InputError : a mesh that cannot be had; increments to be joined.
+        Raises InputError for a mesh that cannot be had, and for increments to be joined.
         """
         own = self.model(thickness)
         if factor == 1:
@@ -222,7 +182,7 @@ class BubbleTest:
         return {PART: self.model(thickness, increments=steps)}
 
     def settings(self) -> Mapping[str, object]:
-        """Everything but names and places of files."""
+        """Return everything but names and places of files."""
         names = (
             "elements", "symmetry", "generator", "pressures", "increments", "match_by",
             "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",
@@ -242,24 +202,22 @@ class BubbleTest:
 
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
-    """The test of a section.
-
-    Raises
-    ------
-    InputError : naming the file and the dotted key.
-    """
-    scales = place.scales
-    asked = _pressures(section, place)
+    """Return the test of a section; raises InputError naming the file and the dotted key."""
+    asked, length = _pressures(section, place), place.scales.length
     measured = measured_files(section, place, asked)
     recorded = None if measured is None else measured.recorded
     pressures = asked if recorded is None else tuple(recorded.pressure.tolist())
     if pressures is None:
-        raise place.error("pressures", NO_PRESSURES)
+        problem = "this key is missing; add it, or say in [bubble.data.points.pressure] where each"
+        raise place.error("pressures", f"{problem} frame's own stands")
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
     outline = outline_of(section, place)
     source = data_source(section, place, pressures, increments, measured)
+    camera = None if section.data.points is None else section.data.points.filter
+    of_files, offset = isinstance(source, PointFiles), section.nuisance.displacement_offset
+    sheet = sheet_of(section.sheet, place, pressures, section.symmetry, of_files, offset)
     return BubbleTest(
         name=name,
         place=place,
@@ -276,22 +234,9 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         objective=section.objective,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
-        noise=None if section.noise is None else section.noise * scales.length,
-        facet=facet_of(
-            None if section.data.points is None else section.data.points.filter,
-            place,
-            scales.length,
-            section.symmetry,
-            section.match.by,
-        ),
-        sheet=sheet_of(
-            section.sheet,
-            place,
-            pressures,
-            section.symmetry,
-            isinstance(source, PointFiles),
-            section.nuisance.displacement_offset,
-        ),
+        noise=None if section.noise is None else section.noise * length,
+        facet=facet_of(camera, place, length, section.symmetry, section.match.by),
+        sheet=sheet,
     )
 
 
@@ -304,3 +249,32 @@ def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None
             problem = f"pressures must increase, got {given[i]:g} after {given[i - 1]:g}"
             raise place.error(f"pressures[{i}]", problem)
     return tuple(p * place.scales.pressure for p in given)
+
+
+def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
+    """Return (frames,) mm."""
+    apex = int(model.mesh.node_sets["apex"][0])
+    return np.asarray(history.displacement[:, apex, 2])
+
+
+def quantities(model: BubbleModel, history: History) -> dict[str, float]:
+    """Return apex heights, and the largest in-plane displacement at the last pressure."""
+    kilo, heights = 1e3 * history.load, apex_heights(model, history)
+    in_plane = np.linalg.norm(history.displacement[-1, :, :2], axis=1).max()
+    values = {f"apex at {p:.4g} kPa, mm": float(z) for p, z in zip(kilo, heights, strict=True)}
+    last = f"largest in-plane displacement at {kilo[-1]:.4g} kPa, mm"
+    return {**values, last: float(in_plane)}
+
+
+def responses(model: BubbleModel, history: History) -> dict[str, float]:
+    """Return the largest displacement at every pressure, mm."""
+    largest = np.linalg.norm(history.displacement, axis=2).max(axis=1)
+    return {f"{p:.4g} kPa": float(u) for p, u in zip(1e3 * history.load, largest, strict=True)}
+
+
+STUDIED = Studied(
+    steps=lambda model: model.increments,
+    quantities=quantities,
+    responses=responses,
+    response="largest displacement",
+)

@@ -26,7 +26,7 @@ from bubblefit.experiments.kinds import (
     strains_of,
     unstable_words,
 )
-from bubblefit.experiments.registry import NEEDED, kind_named, kinds
+from bubblefit.experiments.registry import NEEDED, kind_named, kinds, report_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.notes import NoteKind
@@ -38,7 +38,7 @@ from ..plug_ins import install
 KIND = """
 class Kind:
     name, title, section, fitted = "acme", "an acme test", None, True
-    predicted = studied = read = simulate = None
+    predicted = studied = read = report = None
 
 THING = Kind()
 """
@@ -47,7 +47,8 @@ THING = Kind()
 def test_ours_are_the_folders_fitted_ones_first():
     assert list(kinds())[:4] == ["biaxial", "bubble", "strips", "cylinder"]
     for name, kind in kinds().items():
-        assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED)
+        assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED[:-1])
+        assert callable(report_of(name).simulate)
         assert kind_named(name) is kind
     assert "'bubbel' is not one of: biaxial, bubble, cylinder, strips" in complaint(
         kind_named, "bubbel"

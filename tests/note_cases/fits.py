@@ -87,7 +87,8 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     match = ('by = "points"', 'by = "surfaces"\ndegree = 4')
     project = bf.read_project(small(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
-    return [*bubble_findings._warnings(prepared), *sheet_warnings(replace(prepared, known=None))]
+    flat = sheet_warnings(replace(prepared, known=None))
+    return [*bubble_findings.match_warnings(prepared), *flat]
 
 
 def notes_of_mesh(*_: Any) -> Iterable[Note]:

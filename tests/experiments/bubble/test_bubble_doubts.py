@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.doubts import View, doubts_of
-from bubblefit.experiments.bubble.equilibrium import apex_of
+from bubblefit.experiments.bubble.doubts import View, apex_of, doubts_of
 from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.kinds import Expected
 from bubblefit.materials.law import HypoelasticLaw

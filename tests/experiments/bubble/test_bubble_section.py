@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble import point_files
 from bubblefit.experiments.bubble import report as examined
-from bubblefit.experiments.bubble.equilibrium import Apex
+from bubblefit.experiments.bubble.doubts import Apex
 from bubblefit.experiments.bubble.objective import (
     FieldTarget,
     at_points,
@@ -41,6 +41,7 @@ from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint, complaint_with
+from ...drawings import caught
 from ...places import EXAMPLES, KNOWN, SHARED
 from ...projects import edited, small
 
@@ -447,8 +448,7 @@ def test_times_that_cannot_be_had(tmp_path, said, words):
 
 
 def test_every_cell_of_what_is_seen(tmp_path, monkeypatch):
-    drawn: list[Any] = []
-    monkeypatch.setattr(examined, "plot_rises", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, examined, "rise_charts")
     monkeypatch.setattr(examined, "registration_picture", lambda *_: ("maps.png", "maps"))
     points = np.zeros((4, 2))
     fields = [

@@ -9,8 +9,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble import KIND
-from bubblefit.experiments.bubble import findings as registration
+from bubblefit.experiments.bubble import KIND, report
 from bubblefit.experiments.bubble.findings import registration_line, registration_numbers
 from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.report import ASKED, correlation_table, registration_table
@@ -28,6 +27,7 @@ from ...camera import camera_project
 from ...commands import in_process, result_in
 from ...complaints import complaint
 from ...dic_exports import EXPORTS
+from ...drawings import caught
 from ...projects import EASY, small
 
 DATA = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
@@ -206,7 +206,7 @@ def test_what_cannot_be_found_names_the_key(seen):
     path = project_of_registered_fit(seen, "far", "centre = [500.0, 0.0, 600.0]\nplane = 'clamp'\n")
     project = bf.read_project(path)
     test = project.tests["bubble"]
-    said = complaint(test.prepare, law_of(project, [test.reach]), MembraneSolver)
+    said = complaint(KIND.prepare, test, law_of(project, [test.reach]), MembraneSolver)
     assert "bubble[0].data.points.registration" in said
 
 
@@ -269,14 +269,13 @@ def test_table_and_line():
 
 
 def test_maps(tmp_path, monkeypatch):
-    drawn: list[Any] = []
-    monkeypatch.setattr(registration, "plot_registration", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, report, "registration_charts")
     points, edge = np.ones((3, 2)), Outline.circle(100.0)
     moved = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 3.0]])
     first = DisplacementField(0.01, points, 0 * moved)
     for z in (None, np.array([4.0, 5.0, 6.0])):
         last = DisplacementField(0.2, points, moved, z=z)
-        shown = registration.registration_picture([first, last], edge, Output(tmp_path, "b-"))
+        shown = report.registration_picture([first, last], edge, Output(tmp_path, "b-"))
         assert shown == (
             "b-registration.png",
             "measured points in the test's coordinates, the rim, warp and fill",

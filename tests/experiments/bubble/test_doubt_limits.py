@@ -10,8 +10,7 @@ import pytest
 from bubblefit.experiments.bubble import doubts as motion
 from bubblefit.experiments.bubble import doubts as place
 from bubblefit.experiments.bubble import doubts as size
-from bubblefit.experiments.bubble.doubts import View
-from bubblefit.experiments.bubble.equilibrium import Apex
+from bubblefit.experiments.bubble.doubts import Apex, View
 from bubblefit.experiments.kinds import Expected
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField
@@ -157,9 +156,9 @@ def test_places_that_change_from_frame_to_frame(share, doubt):
 def test_places_that_are_only_a_little_like_the_motion():
     """A correlation of 0.9 is alike, a smaller one is chance."""
     moved = np.array([[3.0], [-3.0], [0.0], [0.0]])
-    for across, alike in ((1.45, 1.0), (1.46, None)):  # 1 / sqrt(1 + (1.45 / 3)^2) = 0.9003
+    for across, alike in ((1.45, 1.0), (1.46, 0.0)):  # 1 / sqrt(1 + (1.45 / 3)^2) = 0.9003
         assert motion._follows(np.array([[3.0], [-3.0], [across], [-across]]), moved) == alike
-    assert motion._follows(moved, 0 * moved) is None
+    assert motion._follows(moved, 0 * moved) == 0.0
 
 
 def test_axes_that_do_not_go_together():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import report as figures
-from bubblefit.experiments.bubble.findings import _warnings
+from bubblefit.experiments.bubble.findings import match_warnings
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.bubble.report import misfit_table, residuals, surface_tables
 from bubblefit.experiments.kinds import FittedTest, Output
@@ -140,7 +140,7 @@ def test_what_is_warned_of_before_the_numbers_are_used(by_this_model):
     def told(by, degree):
         test = SimpleNamespace(match_by=by, match_degree=degree)
         prepared: Any = SimpleNamespace(test=test, by_this_model=by_this_model)
-        return [note.kind for note in _warnings(prepared)]
+        return [note.kind for note in match_warnings(prepared)]
 
     crime = [NoteKind.INVERSE_CRIME] * by_this_model
     assert told("points", 4) == told("points", 6) == told("surfaces", 6) == crime

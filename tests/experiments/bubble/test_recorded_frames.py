@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.data import prepare
+from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.point_files import RecordedFrames
+from bubblefit.experiments.bubble.prepared import prepare
 from bubblefit.experiments.bubble.report import clock_pictures, recorded_table
 from bubblefit.experiments.kinds import Output, files_of
 from bubblefit.project.project import project_text, read_project, settings_of
@@ -18,6 +19,7 @@ from bubblefit.readers.pressure_log import ClockOffset
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
+from ...drawings import caught
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])
@@ -335,9 +337,7 @@ def test_the_table_of_frames():
 
 
 def test_pressures_and_heights_are_drawn_by_the_clock_of_the_log(tmp_path, monkeypatch):
-    drawn = []
-    module = "bubblefit.experiments.bubble.findings"
-    monkeypatch.setattr(f"{module}.plot_clock", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, report, "clock_charts")
     assert clock_pictures(PLAIN, Output(tmp_path)) == [] == drawn
     clock_pictures(TAKEN, Output(tmp_path))
     ((path, times, pressure, heights, taken),) = drawn

@@ -35,6 +35,7 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ...drawings import caught
 from ...scripts import script
 
 PRESSURES = (0.02, 0.09, 0.19)
@@ -421,8 +422,7 @@ def test_a_sheet_of_which_nothing_is_known(sheet, warned):
 
 
 def test_pictures_and_files(tmp_path, monkeypatch):
-    drawn: list[Any] = []
-    monkeypatch.setattr(report, "plot_disk", lambda *what: drawn.append(what))
+    drawn = caught(monkeypatch, report, "disk_charts")
     assert report.sheet_exhibit(*fitted(Sheet(slack=True)), Output(tmp_path)) == ([], [])
     assert not drawn and not list(tmp_path.iterdir())
     figures, files = report.sheet_exhibit(*fitted(ALL), Output(tmp_path, "b-"))

@@ -1,0 +1,427 @@
+"""Doubts about the data of a bubble test: traps that measured fields may have fallen into.
+
+Each check looks at the measured fields (`View`) and returns doubts, none where all is well. A
+check of its own is one function in `CHECKS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...meshes.disk import Outline
+from ...readers.fields import DisplacementField
+from ..kinds import Doubt, Expected
+from .placement import POWERS, apex_shape, in_all_quarters, line_angle
+from .registration import Axes, Rim, rim_of_motion, symmetry_axes
+
+Array = NDArray[np.float64]
+
+#: Of the highest rise: a centre that sinks by more while the pressure rises is no noise.
+SINKS = 0.02
+#: Share of the displacements by which reference places follow them when they are deformed ones,
+#: and least correlation of the two.
+FOLLOWS, LIKE = 0.5, 0.9
+#: Of the larger strain at the apex: the other one is not as negative as this under pressure.
+NEGATIVE = -0.25
+ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
+#: Of the radius: a centre, or a sheet's height, further off is no small thing.
+OFF, FAR_OFF, HIGH = 0.035, 0.15, 0.1
+#: Degrees.
+TILT, STEEP, TURN = 1.2, 8.0, 5.0
+#: Standard errors that a place or an angle must be off by.
+SURE = 4.0
+#: How clear axes must be, and how much more the warp must be strained than the fill.
+CLEAR, MORE = 0.6, 1.1
+#: Of the radius: the rise of a bubble at its highest pressure is somewhere between.
+LEAST_RISE, MOST_RISE = 0.004, 1.5
+#: Of the radius: how far from the centre the outermost point is.
+LEAST_REACH, MOST_REACH = 0.1, 20.0
+#: Of a biaxial stress and strain: Poisson's ratio is not known yet, and matters little here.
+RATIO = 0.25
+#: Below this mean strain the first shape of the sheet decides what looks like strain.
+TELLING = 0.002
+
+
+@dataclass(frozen=True)
+class Apex:
+    """Equilibrium at the apex of one field without any model: n1 k1 + n2 k2 = p from its shape.
+
+    pressure : MPa. height : mm, rise of the centre. curvature : 1/mm, k1 + k2 of the inflated
+    surface; positive where it is a dome. force : N/mm, the membrane force p / (k1 + k2), the same
+    in all directions if the two are equal. error : N/mm, standard error of the force from the
+    scatter of the points about a smooth surface. strain : logarithmic, along x and along y.
+    """
+
+    pressure: float
+    height: float
+    curvature: float
+    force: float
+    error: float
+    strain: tuple[float, float]
+
+    @property
+    def stiffness(self) -> float:
+        """Return force over mean strain, N/mm; infinite where nothing is strained."""
+        mean = 0.5 * (self.strain[0] + self.strain[1])
+        return self.force / mean if mean > 0 else float("inf")
+
+
+def apex_of(field: DisplacementField, radius: float) -> Apex:
+    """Return the apex of a field about the rim's centre; radius of the rim in mm.
+
+    Raises InputError for too few points about the centre.
+    """
+    before = field.frame.points
+    after = before + field.displacement
+    try:
+        shape = apex_shape(field.points, np.hstack([after, before]), radius)
+    except InputError as error:
+        raise InputError(field.path, error.field, error.problem) from None
+    left = after[shape.near, 2] - shape.terms @ shape.coefficients[:, 2]
+    tangents = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
+    metric = tangents[:, :3] @ tangents[:, :3].T
+    first = tangents[:, 3:] @ tangents[:, 3:].T
+    normal = np.cross(tangents[0, :3], tangents[1, :3])
+    normal /= np.linalg.norm(normal)
+    xx, xy, yy = (shape.at_centre(i, j)[:3] @ normal for i, j in ((2, 0), (1, 1), (0, 2)))
+    second = np.array([[xx, xy], [xy, yy]])
+    curvature = -float(np.trace(np.linalg.solve(metric, second)))
+    variance = float(left @ left) / (len(left) - len(POWERS))
+    inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
+    both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
+    spread = float(np.sqrt(variance * inverse[np.ix_(both, both)].sum())) * 2 / radius**2
+    stretch = np.sqrt(np.diag(metric) / np.diag(first))
+    strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
+    centre = shape.at_centre()
+    force = doubt = float("inf")
+    if curvature > 0:
+        force = field.pressure / curvature
+        doubt = force * spread / curvature
+    return Apex(field.pressure, float(centre[2] - centre[5]), curvature, force, doubt, strain)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Measured fields by rising pressure, in the test's coordinates.
+
+    outline : of the clamped edge. thickness : mm. registered : whether a registration brought
+    them there.
+    """
+
+    fields: tuple[DisplacementField, ...]
+    outline: Outline
+    thickness: float
+    registered: bool
+
+    @property
+    def radius(self) -> float:
+        """Return the radius in mm, of an ellipse the mean of its semi-axes."""
+        return self.outline.radius
+
+    @property
+    def last(self) -> DisplacementField:
+        """Return the field at the highest pressure."""
+        return self.fields[-1]
+
+    @cached_property
+    def rises(self) -> Array:
+        """Return (fields,) mm: median rise of points within a quarter of the radius, or of all."""
+        return np.array([self._rise(field) for field in self.fields])
+
+    def _rise(self, field: DisplacementField) -> float:
+        near = self.outline.share(field.points) < 0.25
+        rise = field.displacement[near, 2] if near.any() else field.displacement[:, 2]
+        return float(np.median(rise))
+
+    @cached_property
+    def apexes(self) -> tuple[Apex, ...]:
+        """Return the apex of every field; none where there are too few points."""
+        try:
+            return tuple(apex_of(field, self.outline.minor) for field in self.fields)
+        except (InputError, np.linalg.LinAlgError):
+            return ()
+
+    @cached_property
+    def rim(self) -> Rim | None:
+        """Find the rim, of an ellipse its turn; None where points do not reach it all around."""
+        high = [f for f, r in zip(self.fields, self.rises, strict=True) if r > 0.5 * self.rises[-1]]
+        surfaces = [(f.points, f.displacement[:, 2]) for f in high]
+        try:
+            return rim_of_motion(surfaces, (self.outline.major, self.outline.minor))
+        except InputError:
+            return None
+
+    @cached_property
+    def axes(self) -> Axes | None:
+        """Find the axes of symmetry; None where points lie on one side only.
+
+        None, too, where the edge is an ellipse: its turn says more, and across the yarns there
+        are no axes.
+        """
+        if not self.outline.round or not in_all_quarters(self.last.points):
+            return None
+        return symmetry_axes([field.frame for field in self.fields], self.radius)
+
+    def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
+        """Return which points lie well within the rim."""
+        return np.asarray(self.outline.share(field.points) < share)
+
+
+def upside_down(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt a bubble that goes down as the pressure goes up: z is flipped."""
+    rise = float(view.rises[-1])
+    if rise >= 0:
+        return []
+    text = (
+        f"the centre moves by {rise:.3g} mm along z at {_kilo(view)} kPa: z is "
+        "flipped; turn the axes, or let a registration find them"
+    )
+    return [Doubt("z-flipped", True, text)]
+
+
+def order(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt frames that are not in the order of their pressures."""
+    for k, (a, b) in enumerate(pairwise(view.rises)):
+        if b < a - SINKS * view.rises.max():
+            low, high = (1e3 * view.fields[i].pressure for i in (k, k + 1))
+            text = (
+                f"the centre sinks from {a:.3g} to {b:.3g} mm between {low:.4g} and {high:.4g} "
+                "kPa: the frames are not in the order of the pressures"
+            )
+            return [Doubt("frame-order", True, text)]
+    return []
+
+
+def repeated(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt one frame given for two pressures."""
+    pairs = [
+        f"{1e3 * first.pressure:.4g} and {1e3 * second.pressure:.4g} kPa"
+        for first, second in pairwise(view.fields)
+        if np.array_equal(first.displacement, second.displacement)
+        and np.abs(first.displacement).max() > 0
+    ]
+    if not pairs:
+        return []
+    more = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
+    text = (
+        f"the displacements at {pairs[0]} are the same to the last digit{more}: one frame is given "
+        "twice"
+    )
+    return [Doubt("repeated-frame", True, text)]
+
+
+def rejected_at_zero(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt points without correlation that were written as zeros."""
+    moved = view.last.displacement[view.inner(view.last)]
+    still = int((moved == 0).all(axis=1).sum())
+    twice = int((view.last.points == 0).all(axis=1).sum())
+    if still == 0 and twice < 2:
+        return []
+    found = [f"{still} of {len(moved)} points well within the rim do not move at all"] * (still > 0)
+    found += [f"{twice} points lie at exactly x = y = 0"] * (twice > 1)
+    text = (
+        f"{' and '.join(found)} at {_kilo(view)} kPa: points without correlation "
+        "seem to be written as zeros; name the column that marks them (flag_column)"
+    )
+    return [Doubt("zero-points", True, text)]
+
+
+def deformed_coordinates(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt places after the motion where those before it are meant."""
+    last, seen = view.last, ""
+    if last.z is not None and not view.registered:
+        # A reference surface that has the bubble's own shape.
+        alike = _follows(last.z[:, None], last.displacement[:, 2:])
+        seen = f"the height z follows dz by {alike:.0%}" if alike > FOLLOWS else ""
+    for other in view.fields[:-1]:
+        if not seen and len(other.points) == len(last.points):
+            moved = (last.displacement - other.displacement)[:, :2]
+            alike = _follows(last.points - other.points, moved)
+            if alike > FOLLOWS:
+                seen = f"x and y change from frame to frame by {alike:.0%} of dx and dy"
+    if not seen:
+        return []
+    text = f"{seen}: the coordinates are those of the deformed sheet; export the reference"
+    return [Doubt("deformed-coordinates", True, f"{text} coordinates")]
+
+
+def _follows(place: Array, moved: Array) -> float:
+    """Return the slope of places over displacements where the two are alike, 0 otherwise."""
+    a, b = place - place.mean(axis=0), moved - moved.mean(axis=0)
+    size = float(np.sqrt((a**2).sum() * (b**2).sum()))
+    if not size > 0 or float((a * b).sum()) < LIKE * size:
+        return 0.0
+    return float((a * b).sum() / (b**2).sum())
+
+
+def mirrored(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt x or y flipped in places or in displacements, not in both."""
+    if not view.apexes:
+        return []
+    strain = np.array(view.apexes[-1].strain)
+    if not strain.max() > 0:
+        text = f"the sheet shrinks at its centre (strains {strain[0]:.3g}, {strain[1]:.3g})"
+        return [Doubt("axis-flipped", True, f"{text}: x, y, dx and dy do not go together")]
+    strained = f"the centre is strained by {strain[0]:.3g} along x and {strain[1]:.3g} along y"
+    return [
+        Doubt(
+            "axis-flipped",
+            True,
+            f"{strained}: {name} and d{name} have opposite senses; flip one of them",
+        )
+        for name, own in zip("xy", strain, strict=True)
+        if own < NEGATIVE * strain.max()
+    ]
+
+
+def camera_height(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt heights counted from somewhere else than the rim."""
+    if view.last.z is None:
+        return []
+    height = float(np.median(view.last.z))
+    if abs(height) < HIGH * view.radius:
+        return []
+    text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
+    return [Doubt("camera-frame", False, text)]
+
+
+def off_centre(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt an origin that is not the rim's centre."""
+    if view.rim is None:
+        return []
+    off = float(np.hypot(view.rim.x, view.rim.y))
+    if off < max(OFF * view.radius, SURE * view.rim.error):
+        return []
+    text = (
+        f"the sheet rises about x = {view.rim.x:.3g}, y = {view.rim.y:.3g} mm (+- "
+        f"{view.rim.error:.2g}), not about the origin: {ADVICE}"
+    )
+    return [Doubt("off-centre", off > FAR_OFF * view.radius, text)]
+
+
+def tilted(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt a rise that is not along z: on average the sheet moves sideways."""
+    last, first = view.last, view.fields[0]
+    inner = view.inner(last)
+    if not inner.any():
+        return []
+    start = first.displacement[view.inner(first)].mean(axis=0) * (len(view.fields) > 1)
+    x, y, z = last.displacement[inner].mean(axis=0) - start
+    tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
+    if tilt < TILT:
+        return []
+    text = (
+        f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "
+        f"clamp moved; {ADVICE}"
+    )
+    return [Doubt("tilted", tilt > STEEP, text)]
+
+
+def turned(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt that warp and fill lie along x and y, or that an elliptic rim lies as it is said to."""
+    if view.rim is None:
+        return []
+    if not view.outline.round:
+        said = view.outline.angle
+        off = line_angle(view.rim.angle - said)
+        error, where = view.rim.turn_error, f"{said + off:.3g} degrees from x"
+        text = (
+            f"the sheet rises within an ellipse whose major axis lies {where} (+- {error:.2g}), not"
+            f" {said:.3g}: is its angle right, and {ADVICE}"
+        )
+    elif view.axes is None or view.axes.clear < CLEAR:
+        return []
+    else:
+        off, error = view.axes.off, view.axes.error
+        text = (
+            f"the fields are symmetric about axes {off:.3g} degrees from x and y (+- "
+            f"{error:.2g}): warp and fill lie there; {ADVICE}"
+        )
+    return [] if abs(off) < max(TURN, SURE * error) else [Doubt("turned", False, text)]
+
+
+def swapped(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt warp and fill that seem to be swapped, by the bounds of the moduli.
+
+    An ellipse is strained more along its minor axis, whatever the law.
+    """
+    if not view.outline.round or not view.apexes:
+        return []
+    if not expected.moduli or not expected.warp_is_stiffer:
+        return []
+    warp, fill = view.apexes[-1].strain
+    if len(view.apexes) > 1:
+        # What the sheet's first shape adds to both frames cancels.
+        warp, fill = warp - view.apexes[0].strain[0], fill - view.apexes[0].strain[1]
+    if not warp > MORE * fill > 0:
+        return []
+    text = (
+        f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, and "
+        "the bounds have the warp stiffer: warp and fill seem to be swapped"
+    )
+    return [Doubt("swapped", False, text)]
+
+
+def length_unit(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt mm taken for m, in places or in displacements."""
+    reach = float(view.outline.share(view.last.points).max())
+    rise = abs(float(view.rises[-1])) / view.radius
+    found = []
+    if not LEAST_REACH < reach < MOST_REACH:
+        found.append(
+            f"the outermost point is {reach:.3g} radii from the centre: are x and y in the length "
+            "unit that is said, and is the radius right?"
+        )
+    if not LEAST_RISE < rise < MOST_RISE:
+        found.append(
+            f"the centre rises by {rise:.3g} radii at {_kilo(view)} kPa: are the displacements in "
+            "the length unit that is said (mm beside m)?"
+        )
+    return [Doubt("length-unit", True, text) for text in found]
+
+
+def pressure_unit(view: View, expected: Expected) -> list[Doubt]:
+    """Doubt bar taken for kPa, or a wrong thickness, by the force that equilibrium gives."""
+    if not view.apexes or not expected.moduli:
+        return []
+    top = view.apexes[-1]
+    mean = 0.5 * sum(top.strain)
+    if not np.isfinite(top.force) or mean < TELLING:
+        return []
+    far = expected.outside(top.stiffness * (1 - RATIO) / view.thickness, ("E1", "E2"))
+    if not far:
+        return []
+    text = (
+        f"equilibrium of the apex at {_kilo(view)} kPa gives {top.force:.3g} N/mm at a strain of "
+        f"{mean:.3g}, a modulus of about {far}: is the pressure in the unit that is said (bar "
+        "beside kPa), and are thickness and lengths right?"
+    )
+    return [Doubt("pressure-unit", True, text)]
+
+
+def _kilo(view: View) -> str:
+    return f"{1e3 * view.last.pressure:.4g}"
+
+
+#: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
+CHECKS = (
+    length_unit, rejected_at_zero, repeated, upside_down, order, deformed_coordinates, mirrored,
+    pressure_unit, camera_height, off_centre, tilted, turned, swapped,
+)  # fmt: skip
+
+
+def doubts_of(view: View, expected: Expected) -> Sequence[Doubt]:
+    """Return the doubts in the order of the checks."""
+    found: list[Doubt] = []
+    for check in CHECKS:
+        found += check(view, expected)
+        if any(doubt.sure for doubt in found):
+            break
+    return found
