@@ -187,10 +187,7 @@ def write_notes(folder: Path, notes: Iterable[Note]) -> None:
     ------
     OutputError : it cannot be written.
     """
-    with (
-        replacing(folder / NOTES) as path,
-        open(path, "w", encoding="utf-8", newline="") as stream,
-    ):
+    with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
         table.writeheader()
         table.writerows(rows(notes))

@@ -14,12 +14,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
 from bubblefit.runs.refinement import refine
 from bubblefit.solvers.base import History
-from bubblefit.solvers.calculix import (
-    cylinder as cylinder_bending,
-)
-from bubblefit.solvers.calculix import (
-    cylinder_results as cylinder_analysis,
-)
+from bubblefit.solvers.calculix import cylinder as cylinder_bending
+from bubblefit.solvers.calculix import cylinder_results as cylinder_analysis
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver

@@ -5,26 +5,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from ..errors import InputError
-from ..inference.posterior import LEVEL
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
-from ..project.cards import usual_folder
-from ..project.project import Project
-from ..reports.fit_page import sigma_words
-from ..reports.html import percent
-from ..runs.fit import fit
-from ..runs.result import Fit, answers
-from ..runs.starts import timed
 from . import options as given
 from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 from .terminal import FILE, WORSE, Decorator, command, resumable, show, verbose, written_to
+
+if TYPE_CHECKING:
+    from ..project.project import Project
+    from ..runs.result import Fit
 
 #: Words for the modulus in the table of the terminal.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
@@ -120,6 +116,10 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
     KeyboardInterrupt : after naming --resume.
     """
+    from ..project.cards import usual_folder
+    from ..runs.fit import fit
+    from ..runs.starts import timed
+
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
     project = settings_given(project, options)
@@ -178,6 +178,11 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
+    from ..inference.posterior import LEVEL
+    from ..reports.fit_page import sigma_words
+    from ..reports.html import percent
+    from ..runs.result import answers
+
     sure = fit.best.certainty
     of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
     lines = [
@@ -221,6 +226,8 @@ def test_lines(fit: Fit) -> list[str]:
 
 def sure_lines(fit: Fit) -> list[str]:
     """Return the unknowns beside the moduli, and one sigma of the moduli from each test."""
+    from ..reports.fit_page import sigma_words
+
     lines = [
         f"{verdict.name}: {verdict.words}"
         for verdict in fit.verdicts

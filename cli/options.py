@@ -6,19 +6,20 @@ import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError, OutputError
-from ..materials.card import MaterialCard, read_card
-from ..project.cards import usual_folder
-from ..project.project import Project, read_project
 from ..readers.frames import QUANTITIES
 from ..readers.sections import LENGTH_UNITS
 from ..solvers.registry import ANY
 from ..solvers.registry import command_line as solver_options
 from .terminal import COMMAND_LINE, FILE, Decorator
+
+if TYPE_CHECKING:
+    from ..materials.card import MaterialCard
+    from ..project.project import Project
 
 Command = Callable[..., Any]
 
@@ -144,6 +145,8 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 def folder_beside(project: Path, suffix: str) -> Path:
     """Return the usual output folder of a command that does not fit: out/NAME-`suffix`."""
+    from ..project.cards import usual_folder
+
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")
 
@@ -175,6 +178,8 @@ def read_with_solver(
     ------
     InputError : in the project, or an option of a solver that does not run.
     """
+    from ..project.project import read_project
+
     return with_solver(read_project(path, data, need_data), given)
 
 
@@ -211,6 +216,8 @@ def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
     ------
     InputError : a file is no card, or is given twice.
     """
+    from ..materials.card import read_card
+
     named: dict[str, MaterialCard] = {}
     for path in cards:
         card = read_card(path)
