@@ -109,13 +109,7 @@ def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
 
 
 def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
-    """Read the project, fit the chosen tests (of a kind), write the folder and print the summary.
-
-    Raises
-    ------
-    InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
-    KeyboardInterrupt : after naming --resume.
-    """
+    """Fit the chosen tests (of a kind) of a project, write the folder and print the summary."""
     from ..project.cards import usual_folder
     from ..runs.fit import fit
     from ..runs.starts import timed
@@ -128,16 +122,10 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     starts = options["starts"] or project.fit.starts
     with resumable(folder), StudyProgress(starts, quiet) as progress:
         result = fit(
-            project,
-            _tests(options["tests"], kind, project.tests, path),
-            starts=options["starts"],
-            trust=options["trust"],
-            out=folder,
-            resume=options["resume"],
-            overwrite=options["overwrite"],
-            progress=progress.saw,
-            command_line=command_line(),
-        )
+            project, _tests(options["tests"], kind, project.tests, path), starts=options["starts"],
+            trust=options["trust"], out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+        )  # fmt: skip
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
     _end(result, folder, options["fail_above"], options["as_json"])

@@ -8,6 +8,7 @@ statement with what the runs say, and whether it holds; exits 1 where one that i
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -317,8 +318,11 @@ def _run(said: Mapping[str, Any]) -> Run:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out") / EXAMPLE.parent.name
-    if len(sys.argv) < 2:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").replace("%", "%%"))
+    parser.add_argument("folder", nargs="?", type=Path)
+    given: Path | None = parser.parse_args().folder
+    folder = given or Path("out") / EXAMPLE.parent.name
+    if given is None:
         going_on = ["--resume"] if (folder / "run.json").exists() else []
         command = ["bubblefit", "bend", str(EXAMPLE), "--out", str(folder), *going_on]
         subprocess.run(command, check=True)
