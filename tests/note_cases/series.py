@@ -43,7 +43,7 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
     """A project of one bar; what its solver `says` and `fails` at."""
     solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
     solver.says = says or solver.says
-    for module in ("studies.series", "fits.simulation", "fits.project"):
+    for module in ("runs.series", "project.project"):
         patch.setattr(f"bubblefit.{module}.kinds", lambda: known)
     patch.setitem(registry.SOLVERS, "bars", lambda: solver)
     return project_of(BarTest("a bar"))
