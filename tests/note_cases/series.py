@@ -45,7 +45,6 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
     solver.says = says or solver.says
     for module in ("runs.series", "project.project"):
         patch.setattr(f"bubblefit.{module}.kinds", lambda: known)
-    patch.setattr("bubblefit.runs.simulation.kind_named", known.__getitem__)
     patch.setitem(registry.SOLVERS, "bars", lambda: solver)
     return project_of(BarTest("a bar"))
 
