@@ -15,12 +15,12 @@ from pathlib import Path
 
 from .files import replacing
 
-#: The table of the notes in an output folder, and what a page says of it.
+#: The table of the notes in an output folder, and its description on a page.
 NOTES = "notes.csv"
 NOTES_ARE = "what a reader of the numbers should know, note by note"
-#: Notes that say the same of so many things are each told on the terminal.
+#: Up to so many notes that differ in numbers only are printed one by one on the terminal.
 FEW = 3
-#: What differs between notes that say the same: a number, or several in a row.
+#: A number, or several in a row: they differ between notes of the same words.
 NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 
 
@@ -42,7 +42,7 @@ class NoteKind(StrEnum):
     UNCONFIRMED = "unconfirmed"
     UNBALANCED = "unbalanced forces"
     NO_REACTIONS = "no reactions"
-    #: Whatever a solver of another distribution says.
+    #: Of a solver of another distribution.
     SOLVER = "of the solver"
     #: Of an analysis with a card.
     BEYOND_CARD = "beyond card range"
@@ -94,8 +94,7 @@ class NoteKind(StrEnum):
 #: A run that has a note of these kinds is marked in the tables of runs.
 MARKS = (NoteKind.BEYOND_CARD, NoteKind.SNAP, NoteKind.UNSTABLE, NoteKind.EARLY)
 
-#: What is said first of a fit, where only one thing is: first what makes its moduli wrong, then
-#: what makes them unsure, then how it went.
+#: Order of the one note that a fit prints: wrong moduli first, then unsure ones, then its course.
 GRAVEST = (
     NoteKind.DISCREPANCY,
     NoteKind.UNSTABLE,
@@ -175,8 +174,7 @@ def lines(notes: Sequence[Note]) -> list[str]:
         if len(same) <= FEW:
             said += [f"note: {note.line}" for note in same]
         else:
-            where = f"{NOTES} has each"
-            said.append(f"note, {len(same)} times ({where}), as {same[0].line}")
+            said.append(f"note, {len(same)} times ({NOTES} has each), as {same[0].line}")
     return said
 
 
@@ -187,15 +185,12 @@ def write_notes(folder: Path, notes: Iterable[Note]) -> None:
     ------
     OutputError : it cannot be written.
     """
-    with (
-        replacing(folder / NOTES) as path,
-        open(path, "w", encoding="utf-8", newline="") as stream,
-    ):
+    with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
         table.writeheader()
         table.writerows(rows(notes))
 
 
 def percent(value: float) -> str:
-    """A fraction as percent with two significant digits, whole from 100 % on."""
+    """Return a fraction as percent with two significant digits, whole from 100 % on."""
     return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -22,10 +22,12 @@ from bubblefit.reports.html import PAGE, find_browser
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.tests.dic_exports import EXPORTS
 from common import ROOT, known_model_and_law, seconds, start_on
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_info, threadpool_limits
+
+sys.path.insert(0, str(ROOT / "tests"))  # no installed package has the tests
+from dic_exports import EXPORTS
 
 QUADS = (192, 450, 800, 1800, 3200, 7200, 20_000)
 #: Doubles of band storage beyond which the banded LU is not tried (half a gigabyte).

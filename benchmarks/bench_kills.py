@@ -1,11 +1,9 @@
 """Kill fits, bendings and validations at random moments and resume each to its end.
 
-    python benchmarks/bench_kills.py [kills a command, 4 unless given] [seed] [command ...]
-
-What is killed: the command's own process, one of its workers, or the CalculiX that runs. Then:
-is the result that of the run that nobody killed, number by number; is any process alive; is a
-scratch folder, a half-written file or shared memory left? /dev/shm is this script's own where a
-mount of it is allowed. Exit code 1 where anything differs or is left.
+Kills the command's own process, one of its workers, or the CalculiX that runs. Then compares the
+result with that of a whole run, number by number, and looks for processes, scratch folders,
+half-written files and shared memory that are left. /dev/shm is this script's own where a mount of
+it is allowed. Exit code 1 where anything differs or is left.
 """
 
 from __future__ import annotations
@@ -21,12 +19,13 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from common import start_on
 
 #: In the environment of all that a trial starts, and of this process where /dev/shm is its own.
 MARK, OWN = "BUBBLEFIT_KILLS", "BUBBLEFIT_KILLS_OWN"
@@ -193,22 +192,13 @@ def until(done: Any, seconds: float) -> bool:
     return True
 
 
-def ended(process: int) -> int | None:
-    """Return the exit code (-9: killed), None while the process lives."""
-    found, status = os.waitpid(process, os.WNOHANG)
-    return os.waitstatus_to_exitcode(status) if found else None
-
-
 def finish(process: int) -> int:
-    """Return the exit code; -1000 where the process took too long and was killed."""
-    end = time.monotonic() + LONGEST
-    while (code := ended(process)) is None:
-        if time.monotonic() > end:
-            os.kill(process, signal.SIGKILL)
-            os.waitpid(process, 0)
-            return -1000
-        time.sleep(0.01)
-    return code
+    """Return the exit code (-9: killed); -1000 where the process took too long and was killed."""
+    if until(lambda: not alive_still(process), LONGEST):
+        return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    return -1000
 
 
 def killed(trial: Trial, process: int, draw: random.Random) -> str:
@@ -332,8 +322,8 @@ def lines(name: str, told: Told) -> Iterator[str]:
     yield from (f"    {line}" for line in [*told.other, *told.left])
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Run and return the exit code."""
+def main(kills: int = 4, seed: int = 1, *commands: str) -> None:
+    """Kill each command KILLS times; exit with 1 where anything differs or is left."""
     if OWN not in os.environ and shutil.which("unshare"):
         words = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
         command = ["unshare", "-m", "sh", "-c", words, "sh", sys.executable, *sys.argv]
@@ -341,16 +331,14 @@ def main(arguments: Sequence[str]) -> int:
             ["unshare", "-m", "sh", "-c", "mount -t tmpfs tmpfs /dev/shm"], capture_output=True
         )
         if allowed.returncode == 0:
-            return subprocess.run(command, env={**os.environ, OWN: "1"}).returncode
-    kills = int(arguments[0]) if arguments else 4
-    seed = int(arguments[1]) if len(arguments) > 1 else 1
+            sys.exit(subprocess.run(command, env={**os.environ, OWN: "1"}).returncode)
     bad = False
     with tempfile.TemporaryDirectory(prefix="kills-") as place:
-        for name in arguments[2:] or COMMANDS:
+        for name in commands or COMMANDS:
             told = trials(Path(place), name, kills, seed)
             bad = bad or bool(told.other or told.left)
             print("\n".join(lines(name, told)), flush=True)
-    return int(bad)
+    sys.exit(int(bad))
 
 
 def _write_points(path: Path) -> None:
@@ -372,4 +360,4 @@ if __name__ == "__main__":
     import bubblefit.runs.predictions
     import bubblefit.runs.validation  # noqa: F401
 
-    sys.exit(main(sys.argv[1:]))
+    start_on(main)

@@ -32,15 +32,7 @@ from bubblefit.meshes.mesh import Mesh
 from bubblefit.runs.validation import validate
 from bubblefit.solvers.membrane import factorisation, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from common import (
-    BENDING,
-    EXAMPLES,
-    LAW_4_2,
-    PRESSURES,
-    THICKNESS,
-    known_law,
-    start_on,
-)
+from common import BENDING, EXAMPLES, LAW_4_2, PRESSURES, THICKNESS, known_law, start_on
 
 #: %, of the apex with seven increments; with the modulus at their midpoints it was 0.21.
 GOAL = 0.002

@@ -18,14 +18,7 @@ from bubblefit.solvers.bars import BARS, INCREMENTS
 from bubblefit.solvers.marc.deck import TOLERANCE
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from common import (
-    ROOT,
-    known_model_and_law,
-    known_project,
-    known_setup,
-    objectives_of,
-    start_on,
-)
+from common import ROOT, known_model_and_law, known_project, known_setup, objectives_of, start_on
 from scipy.integrate import quad
 
 Modulus = Callable[[float], float]

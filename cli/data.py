@@ -146,12 +146,9 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         files, note = frame_files(frames, "FRAMES")
         check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
         asked = FrameOptions(
-            QUANTITIES,
-            columns_named(options["columns"]),
-            options["flag_column"],
-            length_scale=LENGTH_UNITS[options["length_unit"]],
-            planar=True,
-        )
+            QUANTITIES, columns_named(options["columns"]), options["flag_column"],
+            length_scale=LENGTH_UNITS[options["length_unit"]], planar=True,
+        )  # fmt: skip
         read = read_frames(files, asked, options["format"])
         lower, upper = options["lower"], options["upper"]
         record = virtual_strain_gauge(read, lower, upper, options["max_gap"])
@@ -269,11 +266,9 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
             check_out(target, files, options["overwrite"])
     try:
         asked = FrameOptions(
-            PLACES,
-            columns_named(options["columns"]),
-            options["flag_column"],
+            PLACES, columns_named(options["columns"]), options["flag_column"],
             length_scale=LENGTH_UNITS[options["length_unit"]],
-        )
+        )  # fmt: skip
         read = read_frames(files, asked, options["format"])
     except InputError as error:
         if error.path is not None:

@@ -5,27 +5,23 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from ..errors import InputError
 from ..inference.methods import method_names
-from ..inference.posterior import LEVEL
 from ..notes import NOTES, Note, foremost
 from ..notes import lines as note_lines
-from ..project.cards import usual_folder
-from ..project.project import Project
-from ..reports.fit_page import sigma_words
-from ..reports.html import percent
-from ..runs.fit import fit
-from ..runs.result import Fit, answers
-from ..runs.starts import timed
 from . import options as given
 from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
 from .terminal import FILE, WORSE, Decorator, command, resumable, show, verbose, written_to
+
+if TYPE_CHECKING:
+    from ..project.project import Project
+    from ..runs.result import Fit
 
 #: Words for the modulus in the table of the terminal.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
@@ -114,13 +110,11 @@ def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
 
 
 def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
-    """Read the project, fit the chosen tests (of a kind), write the folder and print the summary.
+    """Fit the chosen tests (of a kind) of a project, write the folder and print the summary."""
+    from ..project.cards import usual_folder
+    from ..runs.fit import fit
+    from ..runs.starts import timed
 
-    Raises
-    ------
-    InputError, OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
-    KeyboardInterrupt : after naming --resume.
-    """
     path: Path = options["project"]
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
     project = settings_given(project, options)
@@ -129,16 +123,10 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     starts = options["starts"] or project.fit.starts
     with resumable(folder), StudyProgress(starts, quiet) as progress:
         result = fit(
-            project,
-            _tests(options["tests"], kind, project.tests, path),
-            starts=options["starts"],
-            trust=options["trust"],
-            out=folder,
-            resume=options["resume"],
-            overwrite=options["overwrite"],
-            progress=progress.saw,
-            command_line=command_line(),
-        )
+            project, _tests(options["tests"], kind, project.tests, path), starts=options["starts"],
+            trust=options["trust"], out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+        )  # fmt: skip
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
     _end(result, folder, options["fail_above"], options["as_json"])
@@ -179,6 +167,11 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
 
 def modulus_lines(fit: Fit) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
+    from ..inference.posterior import LEVEL
+    from ..reports.fit_page import sigma_words
+    from ..reports.html import percent
+    from ..runs.result import answers
+
     sure = fit.best.certainty
     of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
     lines = [
@@ -222,6 +215,8 @@ def test_lines(fit: Fit) -> list[str]:
 
 def sure_lines(fit: Fit) -> list[str]:
     """Return the unknowns beside the moduli, and one sigma of the moduli from each test."""
+    from ..reports.fit_page import sigma_words
+
     lines = [
         f"{verdict.name}: {verdict.words}"
         for verdict in fit.verdicts

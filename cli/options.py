@@ -6,19 +6,20 @@ import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError, OutputError
-from ..materials.card import MaterialCard, read_card
-from ..project.cards import usual_folder
-from ..project.project import Project, read_project
 from ..readers.frames import QUANTITIES
 from ..readers.sections import LENGTH_UNITS
 from ..solvers.registry import ANY
 from ..solvers.registry import command_line as solver_options
 from .terminal import COMMAND_LINE, FILE, Decorator
+
+if TYPE_CHECKING:
+    from ..materials.card import MaterialCard
+    from ..project.project import Project
 
 Command = Callable[..., Any]
 
@@ -144,6 +145,8 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 def folder_beside(project: Path, suffix: str) -> Path:
     """Return the usual output folder of a command that does not fit: out/NAME-`suffix`."""
+    from ..project.cards import usual_folder
+
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")
 
@@ -151,12 +154,7 @@ def folder_beside(project: Path, suffix: str) -> Path:
 def result_folder(
     project: Path, suffix: str, out: Path | None, overwrite: bool, resume: bool = False
 ) -> Path:
-    """Return the output folder of one analysis or study: `out`, or out/NAME-`suffix`.
-
-    Raises
-    ------
-    OutputError : it holds a result already and may not be written over.
-    """
+    """Return the output folder of one analysis or study: `out`, or out/NAME-`suffix`."""
     folder = out or folder_beside(project, suffix)
     if (folder / "result.json").exists() and not (overwrite or resume):
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
@@ -169,12 +167,9 @@ def read_with_solver(
     data: Path | Mapping[str, Path] | None = None,
     need_data: bool = True,
 ) -> Project:
-    """Read a project; the solver and its options of the command line replace those of the file.
+    """Read a project; the solver and its options of the command line replace those of the file."""
+    from ..project.project import read_project
 
-    Raises
-    ------
-    InputError : in the project, or an option of a solver that does not run.
-    """
     return with_solver(read_project(path, data, need_data), given)
 
 
@@ -182,22 +177,13 @@ def read_to_refit(path: Path, options: Mapping[str, Any]) -> Project:
     """Read a project for a study that fits again, with solver, jobs and scheduler as given.
 
     options : of the command, by name.
-
-    Raises
-    ------
-    InputError : as `read_with_solver`; a scheduler's address that is none.
     """
     project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
     return project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
 
 
 def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
-    """Return the project with the solver and the solver's options of the command line.
-
-    Raises
-    ------
-    InputError : an option of a solver that does not run.
-    """
+    """Return the project with the solver and the solver's options of the command line."""
     mine = {k: v for k, v in given.items() if k not in ("solver", "settings", "cache")}
     if not given.get("cache", True):
         project = project.with_fit(cache=False)
@@ -205,12 +191,9 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
 
 
 def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
-    """Read cards by name: the card's own, else its file's, with the path where two agree.
+    """Read cards by name: the card's own, else its file's, with the path where two agree."""
+    from ..materials.card import read_card
 
-    Raises
-    ------
-    InputError : a file is no card, or is given twice.
-    """
     named: dict[str, MaterialCard] = {}
     for path in cards:
         card = read_card(path)
@@ -224,12 +207,7 @@ def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
 
 
 def numbers(text: str, option: str) -> list[float]:
-    """Return the numbers of a text that has commas between them.
-
-    Raises
-    ------
-    InputError : naming the option.
-    """
+    """Return the numbers of a text that has commas between them."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -253,12 +231,7 @@ def frame_options(command: Command) -> Command:
 
 
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
-    """Check that a file may be written: not one that is read, nor one that exists.
-
-    Raises
-    ------
-    OutputError : it may not be written.
-    """
+    """Check that a file may be written: not one that is read, nor one that exists."""
     if out.resolve() in [file.resolve() for file in inputs if file is not None]:
         raise OutputError(f"{out}: is one of the files to be read; choose another --out")
     if out.exists() and not overwrite:

@@ -63,14 +63,7 @@ def run_predictions(
     tests: Sequence[str] | None = None,
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
 ) -> None:
-    """Predict, write the folder and print the outcome.
-
-    Raises
-    ------
-    InputError, OutputError, SolverFailure : as `bubblefit.predict`; --fail-above without any
-        measurement.
-    KeyboardInterrupt : after naming --resume.
-    """
+    """Predict, write the folder and print the outcome."""
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
@@ -78,18 +71,10 @@ def run_predictions(
     quiet = options["quiet"] or options["as_json"]
     with resumable(folder), RunsProgress(quiet) as progress:
         predictions = predict(
-            project,
-            tests,
-            cards,
-            samples=options["samples"],
-            jobs=options["jobs"],
-            scheduler=options["scheduler"],
-            out=folder,
-            resume=options["resume"],
-            overwrite=options["overwrite"],
-            progress=progress.saw,
-            command_line=command_line(),
-        )
+            project, tests, cards, samples=options["samples"], jobs=options["jobs"],
+            scheduler=options["scheduler"], out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+        )  # fmt: skip
     predictions.report(folder)
     _end(predictions, folder, options["fail_above"], options["as_json"])
 
@@ -329,15 +314,9 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
         error = found
     else:
         return Project(
-            path=HERE,
-            fabric=fabric,
-            scales=place.scales,
-            tests={test.name: test},
-            law=LawSection(),
-            fit=FitSection(),
-            cards={},
-            solver_options=solver_settings(HERE, {}),
-        )
+            path=HERE, fabric=fabric, scales=place.scales, tests={test.name: test},
+            law=LawSection(), fit=FitSection(), cards={}, solver_options=solver_settings(HERE, {}),
+        )  # fmt: skip
     if error.path != HERE:
         raise error
     field = error.field.lstrip(".")

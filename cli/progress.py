@@ -6,7 +6,7 @@ import sys
 import time
 from collections import Counter
 from contextlib import ExitStack
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -18,12 +18,13 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from ..files import kernels_are_compiled
-from ..runs.predictions import RunEvent
-from ..runs.simulation import Step
-from ..runs.starts import EvaluationRecord, Stage, StartRecord
-from ..solvers.base import Announcement, hearing
 from .terminal import EVENTS
+
+if TYPE_CHECKING:
+    from ..runs.predictions import RunEvent
+    from ..runs.simulation import Step
+    from ..runs.starts import Stage
+    from ..solvers.base import Announcement
 
 PLAIN_EVERY_S = 60.0
 COMPILING = (
@@ -55,6 +56,9 @@ class LiveLine:
             )
 
     def __enter__(self) -> Self:
+        from ..files import kernels_are_compiled
+        from ..solvers.base import hearing
+
         if not self.quiet and not kernels_are_compiled():
             print(COMPILING, file=sys.stderr, flush=True)
         self._hearing.enter_context(hearing(self.heard))
@@ -177,6 +181,8 @@ class StudyProgress(CountProgress):
 
     def saw(self, record: object) -> None:
         """Record a stage that begins, an analysis or the end of a start; None: time passes."""
+        from ..runs.starts import EvaluationRecord, Stage, StartRecord
+
         if isinstance(record, Stage):
             self.begin(record)
         elif isinstance(record, EvaluationRecord):
@@ -222,6 +228,8 @@ class FitsProgress(StudyProgress):
     def saw(self, record: object) -> None:
         """Record a fit that begins (its name), or a record as `StudyProgress`."""
         if isinstance(record, str):
+            from ..runs.starts import Stage
+
             self.begin(Stage("starts", self.starts))
             if not self.quiet:
                 print(self.said_of_fit.format(record), file=sys.stderr, flush=True)

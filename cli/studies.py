@@ -1,6 +1,6 @@
 """Study commands: profile, bootstrap, plan, compare, validate, and `study mesh`, `study nu12`.
 
-Each reads the project, calls one function of `studies` and ends with `_finish`.
+Each reads the project, calls one function of `runs` and ends with `_finish`.
 """
 
 from __future__ import annotations

@@ -139,12 +139,7 @@ class UsageLine(click.ClickException):
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Turn usage errors of click within the block into one line.
-
-    Raises
-    ------
-    UsageLine : instead of click.UsageError.
-    """
+    """Turn usage errors of click within the block into one line."""
     try:
         yield
     except click.UsageError as error:
@@ -195,12 +190,7 @@ class Suggesting(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return what click returns.
-
-        Raises
-        ------
-        UsageLine : there is no such command; names the nearest one.
-        """
+        """Return what click returns."""
         name = args[0]
         known = self.list_commands(ctx)
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
@@ -242,12 +232,7 @@ class Events:
         self._last: Any = None
 
     def begin(self, path: Path, command: str) -> None:
-        """Open the file and write the first event; a file outside /dev is replaced.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Open the file and write the first event; a file outside /dev is replaced."""
         with output_errors(path):
             # A device or a redirected stdout is appended to.
             mode = "a" if path.is_char_device() or path.is_relative_to("/dev") else "w"

@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
 from bubblefit.experiments.cylinder import report as cylinders
+from bubblefit.experiments.registry import report_of
 from bubblefit.notes import FEW, Note, NoteKind, lines
 from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page, study_pages, vega
@@ -140,7 +141,7 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
     for name in ("_optima", "_moduli"):
         patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
     patch.setattr(fit_page, "_pinned", lambda *_: [])
-    patch.setattr(type(fit.setup.tests[0]), "show", lambda *_: Exhibit())
+    patch.setattr(report_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
     page = fit.report(folder)
     return Told(lines_of(fit, folder, every=True), _json(folder), folder, page.read_text())
 

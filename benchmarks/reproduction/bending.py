@@ -8,12 +8,14 @@ statement with what the runs say, and whether it holds; exits 1 where one that i
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -125,15 +127,13 @@ def _inflation(study: Study) -> Statement:
         "three pressures of each diameter (6.2)"
     )
     said, good = [], []
-    for card in _named(study, "uniaxial"):
-        for diameter, pressures in PRESSURES.items():
-            for gauge, strain in zip(pressures, INFLATION, strict=True):
-                for case in study.cylinders:
-                    same = _same(case.diameter, diameter) and _same(case.pressure, gauge)
-                    if same and (case.name, card) in study.runs:
-                        value = study.runs[case.name, card].strain
-                        good.append(abs(value - strain) <= NEAR)
-                        said.append(f"{case.name} {value:.3f} ({strain:.2f})")
+    for card, (diameter, pressures) in product(_named(study, "uniaxial"), PRESSURES.items()):
+        for gauge, strain in zip(pressures, INFLATION, strict=True):
+            case = _case(study, diameter, gauge)
+            if case is not None and (case.name, card) in study.runs:
+                value = study.runs[case.name, card].strain
+                good.append(abs(value - strain) <= NEAR)
+                said.append(f"{case.name} {value:.3f} ({strain:.2f})")
     return _verdict(text, said, good, "needs a uniaxial card and a case of Table 6.1")
 
 
@@ -167,7 +167,7 @@ def _buckling(study: Study) -> Statement:
             if first and second:
                 ratio = second[1] / first[1]
                 good.append(RATIO[0] <= ratio <= RATIO[1])
-                words = "limit points" if kind == "limit" else "knees"
+                words = {"limit": "limit points", "knee": "knees"}[kind]
                 said.append(f"{card} {ratio:.2f} ({words} {first[1]:.0f}, {second[1]:.0f} N)")
                 break
     return _verdict(text, said, good, "needs both cases, buckling with one card")
@@ -251,8 +251,7 @@ def _order(text: str, study: Study, groups: Sequence[Sequence[Cylinder]], need: 
                     said.append(f"not {one.name} to {other.name} with {card}: {words}")
     if good:
         low, high = 100 * min(changes), 100 * max(changes)
-        steps = f"{sum(good)} of {len(good)} steps, {low:+.0f} to {high:+.0f} %"
-        said.insert(0, steps)
+        said.insert(0, f"{sum(good)} of {len(good)} steps, {low:+.0f} to {high:+.0f} %")
     return _verdict(text, said, good, f"needs {need}")
 
 
@@ -264,18 +263,16 @@ def _by_pressure(study: Study) -> list[list[Cylinder]]:
 
 
 def _case(study: Study, diameter: float, pressure: float) -> Cylinder | None:
-    fits = (
-        c for c in study.cylinders if _same(c.diameter, diameter) and _same(c.pressure, pressure)
-    )
-    return next(fits, None)
+    same = [c for c in study.cylinders if _same(c.diameter, diameter)]
+    return next((c for c in same if _same(c.pressure, pressure)), None)
 
 
-def _named(study: Study, test: str) -> Iterator[str]:
-    return (card for card in study.cards if card.split()[0] == test)
+def _named(study: Study, test: str) -> list[str]:
+    return [card for card in study.cards if card.split()[0] == test]
 
 
 def _same(one: float, other: float) -> bool:
-    return abs(one - other) <= 1e-6 * abs(other)
+    return isclose(one, other, rel_tol=1e-6)
 
 
 def _verdict(text: str, said: Sequence[str], good: Sequence[bool], need: str) -> Statement:
@@ -317,8 +314,11 @@ def _run(said: Mapping[str, Any]) -> Run:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out") / EXAMPLE.parent.name
-    if len(sys.argv) < 2:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").replace("%", "%%"))
+    parser.add_argument("folder", nargs="?", type=Path)
+    given: Path | None = parser.parse_args().folder
+    folder = given or Path("out") / EXAMPLE.parent.name
+    if given is None:
         going_on = ["--resume"] if (folder / "run.json").exists() else []
         command = ["bubblefit", "bend", str(EXAMPLE), "--out", str(folder), *going_on]
         subprocess.run(command, check=True)

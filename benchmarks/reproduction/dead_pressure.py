@@ -11,6 +11,7 @@ membrane's kernel compiled once more with a load that is vertical, on the undefo
 from __future__ import annotations
 
 import importlib.util
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -56,6 +57,7 @@ def dead() -> Iterator[None]:
         spec = importlib.util.spec_from_file_location(f"{kernel.__package__}.dead_kernel", path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module  # its dataclasses look there for their types
         spec.loader.exec_module(module)
         follower, newton.assemble = newton.assemble, module.assemble
         try:

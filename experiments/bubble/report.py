@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...files import replacing
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import progress
-from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.cylinder import report as cylinder_report
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
@@ -52,7 +52,7 @@ def formula(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFa
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without figures and page, which take the longest and are looked at elsewhere."""
-    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: folder)
 
 
@@ -241,7 +241,7 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path: Path, monkeypatc
     assert table["ended"].tolist() == ["failed: made to fail", "finished"] * 2
 
     # tests/runs/test_predictions.py draws those that stop.
-    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]
     assert (

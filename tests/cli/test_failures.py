@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.experiments.cylinder.predicted import CylinderOutcome
+from bubblefit.experiments.cylinder import report as cylinder_report
 from bubblefit.inference import search as correction
 from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import process
@@ -112,7 +112,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """One run that fails ends a start, and nothing is drawn."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     monkeypatch.setattr(correction, "MOST_SHORTER", 0)
-    monkeypatch.setattr(CylinderOutcome, "show", lambda *arguments: Exhibit())
+    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
 
 
 def of(text: str) -> re.Pattern[str]:

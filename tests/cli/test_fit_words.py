@@ -64,7 +64,7 @@ def test_the_table_of_the_moduli(fit: bf.Fit, monkeypatch: pytest.MonkeyPatch) -
         Answer("E1", 0.1073, 490.0, 396.9, 10.0, None, True),
         Answer("G12", 0.05, 13.972, 11.317),
     ]
-    monkeypatch.setattr("bubblefit.cli.fits.answers", lambda _: told)
+    monkeypatch.setattr("bubblefit.runs.result.answers", lambda _: told)
     title, head, *rows = modulus_lines(fit)
     assert title == (
         f"{fit.project.title}: tangent moduli at logarithmic strains, with what noise and mesh "

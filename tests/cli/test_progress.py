@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import pytest
 from bubblefit import files
-from bubblefit.cli import progress
 from bubblefit.cli.progress import COMPILING, SeriesProgress, StudyProgress
 from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
@@ -85,7 +84,7 @@ def test_a_series_says_where_it_is_too(clock: Clock, capsys: pytest.CaptureFixtu
 def test_compilation_is_announced_where_it_comes(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], there: bool, quiet: bool
 ) -> None:
-    monkeypatch.setattr(progress, "kernels_are_compiled", lambda: there)
+    monkeypatch.setattr(files, "kernels_are_compiled", lambda: there)
     with StudyProgress(1, quiet):
         pass
     assert capsys.readouterr().err == ("" if there or quiet else f"{COMPILING}\n")

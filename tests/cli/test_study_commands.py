@@ -210,10 +210,7 @@ def test_bad_options_end_in_one_line(bubble: Path, options: list, words: str) ->
 
 @pytest.mark.parametrize(
     "old, new, words",
-    [
-        ("radius = 100.0", "radius = -1", "bubble[0].radius"),
-        ("[fabric]", "[fabric", "TOML syntax"),
-    ],
+    [("radius = 100.0", "radius = -1", "bubble[0].radius"), ("[fabric]", "[fabric", "TOML syntax")],
 )
 def test_bad_projects_end_in_one_line(bubble: Path, old: str, new: str, words: str) -> None:
     path = bubble / "project.toml"

@@ -190,10 +190,7 @@ def write_points(path: Path, law: HypoelasticLaw | None = None, factor: float = 
 #: The example on a points file of the same strips.
 POINTS = (
     ('match = "polynomial"', 'match = "points"'),
-    (
-        'polynomials = "curves.csv"',
-        'files = ["points.csv"]',
-    ),
+    ('polynomials = "curves.csv"', 'files = ["points.csv"]'),
     (
         "[strips.weights]",
         "\n".join(

@@ -5,14 +5,9 @@ import csv
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-<<<<<<< HEAD:tests/readers/test_surfaces.py
-from bubblefit.experiments.bubble.equilibrium import apex_of, apex_shape
-from bubblefit.experiments.strips.data import strain_regions
-=======
 from bubblefit.experiments.bubble.doubts import apex_of
 from bubblefit.experiments.bubble.placement import apex_shape
-from bubblefit.experiments.strips.polynomials import strain_regions
->>>>>>> w/r5:tests/data/test_surfaces.py
+from bubblefit.experiments.strips.data import strain_regions
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import DisplacementField, read_fields
 from bubblefit.readers.frames import Frame
