@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legval
-from scipy.spatial.distance import cdist
 from scipy.special import chdtr, chdtrc, fdtri
 
 from ..materials.forms.base import Array
@@ -67,6 +66,8 @@ def alike(
             continue
         few = random.permutation(len(own))[: max(20, DISTANCES // len(own))]
         extent = float(np.ptp(at, axis=0).max())
+        from scipy.spatial.distance import cdist
+
         ring = np.minimum(cdist(at[few], at) / (reach * extent) * rings, rings).astype(int)
         ring[np.arange(len(few)), few] = rings  # a point is no neighbour of its own
         value = own[few, None] * own

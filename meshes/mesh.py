@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..files import compiled
 
@@ -66,6 +65,8 @@ def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[n
     """
     corner = mesh.points[:, :2][mesh.quads]
     count = min(NEIGHBOURS, len(mesh.quads))
+    from scipy.spatial import cKDTree
+
     _, candidate = cKDTree(corner.mean(axis=1)).query(points, k=count)
     candidate = candidate.reshape(len(points), count)
     owner = np.full(len(points), -1)

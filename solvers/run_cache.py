@@ -169,9 +169,13 @@ class RunCache:
                     os.unlink(name)
             self._bound(len(content))
         except OSError as error:
-            level = logging.INFO if self._warned else logging.WARNING
-            log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
-            self._warned = True
+            self.not_kept(error)
+
+    def not_kept(self, error: OSError) -> None:
+        """Warn, once, that a run could not be written."""
+        level = logging.INFO if self._warned else logging.WARNING
+        log.log(level, "%s: runs cannot be kept there: %s", self.folder, error.strerror)
+        self._warned = True
 
     def entries(self) -> list[Entry]:
         """Return every run that is there, the least recently used first."""

@@ -17,5 +17,10 @@ def script(place: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     # Where a dataclass looks for its names, and pickle for its functions.
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    # As where it is run: modules beside it are found.
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
     return module
