@@ -14,7 +14,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from ...errors import InputError
 from ...inference.comparison import Comparison, NoiseIs
@@ -72,6 +71,8 @@ class LoadObjective:
             problem = f"expected elongations from 0 to {knots[-1]:g} mm, got "
             raise InputError(None, "load curve", f"{problem}{self.elongation[beyond][0]:g}")
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
+        from scipy.interpolate import CubicSpline
+
         self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
         self.sizes = (len(self.load),)
         self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
