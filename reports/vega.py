@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
@@ -133,18 +134,28 @@ for line in sys.stdin:
 
             made = getattr(vl_convert, name)(spec, **options)
             return made.encode() if isinstance(made, str) else bytes(made)
+        line = json.dumps([name, spec, options]) + "\n"
+        # Once more where the process was killed, as a machine short of memory may do.
+        made_there = self._asked(line) or self._asked(line)
+        if not made_there:
+            raise OutputError("vl-convert ended before it had drawn a chart")
+        return base64.b64decode(made_there)
+
+    def _asked(self, line: str) -> str:
+        """Return the answer of the process beside this one, "" where it has ended."""
         if self.beside is None or self.beside[0] != os.getpid():
-            command = [sys.executable, "-c", self.PROGRAM]
-            pipe = subprocess.PIPE
+            command, pipe = [sys.executable, "-c", self.PROGRAM], subprocess.PIPE
             self.beside = os.getpid(), subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
         program = self.beside[1]
         assert program.stdin is not None and program.stdout is not None
-        program.stdin.write(json.dumps([name, spec, options]) + "\n")
-        program.stdin.flush()
-        line = program.stdout.readline()
-        if not line:
-            raise OutputError("vl-convert ended before it had drawn a chart")
-        return base64.b64decode(line)
+        answer = ""
+        with suppress(OSError):
+            program.stdin.write(line)
+            program.stdin.flush()
+            answer = program.stdout.readline()
+        if not answer:
+            self.beside = None
+        return answer
 
 
 _convert = _Converter()

@@ -106,7 +106,7 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
             f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
             f" {curves.uncoupled}",
             *(() if sheared else [unknown]),
-            *([f"{stiff} is written"] if straight else ()),
+            *([stiff] if straight else ()),
             f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
             "hypoelasticity: the curves are total ones; unloading is along the same curve",
             *density_remarks(options.density),

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from ..commands import bubblefit, in_process, one_line
-from ..data.test_surfaces import cap
+from ..readers.test_surfaces import cap
 
 #: Table A.1 of the thesis: radius, mm, and error, %, of a ball of 40.0 mm.
 TABLE_A1 = [(39.73, 0.67), (39.78, 0.54), (39.90, 0.23), (39.85, 0.38), (39.89, 0.28)]

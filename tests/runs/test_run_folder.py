@@ -15,7 +15,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit import writing
+from bubblefit import files as writing
 from bubblefit.errors import InputError, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
 from bubblefit.experiments.kinds import RunRecord

@@ -63,8 +63,8 @@ from scipy.spatial.transform import Rotation
 from ...commands import in_process, result_in
 from ...complaints import complaint
 from ...drawings import caught
-from ...identification.cases import MODEL as CASE
-from ...identification.cases import reference, targets
+from ...inference.cases import MODEL as CASE
+from ...inference.cases import reference, targets
 from ...projects import small
 
 PART = "bubble"

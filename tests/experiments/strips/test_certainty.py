@@ -11,7 +11,7 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.project.project import read_project
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial, specimen_scatter
 
-from ...identification.scatter import follows, scatter_of
+from ...inference.scatter import follows, scatter_of
 from ...projects import constant_strips
 from .problems import CONSTANT, CONSTANTS, CUBIC, LAW, STRIPS, joint, near, strips
 

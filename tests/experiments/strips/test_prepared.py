@@ -341,7 +341,8 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
         return strain
 
     monkeypatch.setattr(figures, "middle_strain", middle)
-    assert figures._gauge_shear(model, history) == pytest.approx(0.3)
+    strip: Any = SimpleNamespace(direction="bias", model=model, history=history)
+    assert figures.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
     drawn = caught(monkeypatch, figures, "strip_charts")
     monkeypatch.setattr(figures, "write_vtu", lambda *what, **more: drawn.append((what, more)))
     figures.draw_bias(model, history, Path("b.png"), Path("b.vtu"))
