@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from bubblefit.reports import maps as maps_drawn
+from bubblefit.reports import vega
 from bubblefit.reports.charts import (
     MOST_POINTS,
     Chart,
@@ -258,3 +261,24 @@ def test_a_surface_is_whole_and_clear_of_its_colour_bar() -> None:
     assert min(CENTRE) >= scale_of(rim) * 100
     # And as large as that allows.
     assert scale_of(rim) * 100 > 0.9 * min(CENTRE)
+
+
+def drawn_in_a_fork(charts: Charts, pipe: Any) -> None:
+    pipe.send(vega.rendered(charts, ".svg"))
+
+
+def test_a_forked_process_draws_too() -> None:
+    """The thread that draws is not copied by a fork: a call in the copy would wait for ever."""
+    charts = Charts(
+        "c", [Chart("t", "x, mm", "y, mm", [line("a", [0, 1], [0, 1])], "a line")], "a line"
+    )
+    own = vega.rendered(charts, ".svg")
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe()
+    child = context.Process(target=drawn_in_a_fork, args=(charts, there))
+    child.start()
+    try:
+        assert here.poll(60) and here.recv() == own
+    finally:
+        child.kill()
+        child.join()
