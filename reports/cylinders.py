@@ -50,7 +50,7 @@ class BendLine:
 
 @dataclass(frozen=True, eq=False)
 class BendReadings:
-    """What was measured: every repetition's readings, their mean and scatter on one grid (k,)."""
+    """Measured loads: every repetition's readings, their mean and scatter on one grid (k,)."""
 
     readings: Sequence[tuple[ArrayLike, ArrayLike]]
     deflection: ArrayLike

@@ -39,7 +39,7 @@ BAND_COLUMNS = "modulus,log_strain,MPa,lower_MPa,upper_MPa"
 
 @dataclass(frozen=True)
 class Says:
-    """What the target does with the law: it carries, it loses, and what to confirm there."""
+    """The parts of the law that a target carries and loses, and those to confirm there."""
 
     carries: tuple[str, ...]
     loses: tuple[str, ...] = ()
