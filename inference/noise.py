@@ -58,6 +58,8 @@ def alike(
     residuals : blocks (n,), each of one quantity in one frame; they count alike. places : (n, 2) mm
     or (n, 1) of each. reach : of the largest extent, where neighbours end. rings : of distances.
     """
+    from scipy.spatial.distance import cdist
+
     products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
     random = np.random.default_rng(0)
     step = max(1, -(-len(residuals) // BLOCKS))
@@ -66,8 +68,6 @@ def alike(
             continue
         few = random.permutation(len(own))[: max(20, DISTANCES // len(own))]
         extent = float(np.ptp(at, axis=0).max())
-        from scipy.spatial.distance import cdist
-
         ring = np.minimum(cdist(at[few], at) / (reach * extent) * rings, rings).astype(int)
         ring[np.arange(len(few)), few] = rings  # a point is no neighbour of its own
         value = own[few, None] * own
