@@ -1,14 +1,30 @@
-"""Errors that bubblefit raises on purpose. Each message says what to do next."""
+"""Errors and notes: what bubblefit says of its input and of its results.
+
+An error is raised on purpose, and its message says what to do next. A `Note` is a remark on a
+result, of a `NoteKind` that the module declares which makes it; every command presents notes alike:
+`lines` on the terminal and the page, `rows` in result.json and notes.csv. A run is marked in
+tables by the kinds of its notes (`marks`).
+"""
 
 from __future__ import annotations
 
+import re
 import unicodedata
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import ClassVar
 
 #: Letters of a field and of a message that are shown: a key may be as long as its file.
 LONGEST, LONGEST_LINE = 200, 4000
 #: Kinds of characters that would break a line, or steer a terminal.
 _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
+#: The table of the notes in an output folder, and its description on a page.
+NOTES = "notes.csv"
+NOTES_ARE = "what a reader of the numbers should know, note by note"
+#: Up to so many notes that differ in numbers only are printed one by one on the terminal.
+FEW = 3
+#: A number, or several in a row: they differ between notes of the same words.
+NUMBERS = re.compile(r"[-+]?\d[\d.e+-]*(, [-+]?\d[\d.e+-]*)*")
 
 
 class BubblefitError(Exception):
@@ -99,3 +115,99 @@ def one_line(text: str) -> str:
         c.encode("unicode_escape").decode() if unicodedata.category(c) in _UNSEEN else c
         for c in text
     )
+
+
+class NoteKind(str):
+    """Name a kind of note by the words that tables and result.json have for it.
+
+    weight : place among the notes of a fit, of which the terminal prints the weightiest. mark :
+    place among the marks of a run in tables of runs, 0 for none. The same words are the same kind.
+    """
+
+    weight: float
+    mark: int
+    known: ClassVar[dict[str, NoteKind]] = {}
+
+    def __new__(cls, words: str, weight: float = 0.0, mark: int = 0) -> NoteKind:
+        if not words.strip():
+            raise ValueError("a kind of note is named by words")
+        kind = cls.known.setdefault(words, super().__new__(cls, words))
+        kind.weight = max(weight, getattr(kind, "weight", 0.0))
+        kind.mark = mark or getattr(kind, "mark", 0)
+        return kind
+
+    def __getnewargs__(self) -> tuple[str, float, int]:  # type: ignore[override]
+        """Return the arguments that restore the kind in another process."""
+        return str(self), self.weight, self.mark
+
+
+#: Notes in plain words, of a solver of another distribution.
+SOLVER = NoteKind("of the solver")
+
+
+class Note(str):
+    """Hold a sentence, its kind, and what it is about ("" : everything)."""
+
+    kind: NoteKind
+    of: str
+
+    def __new__(cls, kind: NoteKind, words: str, of: str = "") -> Note:
+        note = super().__new__(cls, words)
+        note.kind, note.of = kind, of
+        return note
+
+    def __getnewargs__(self) -> tuple[NoteKind, str, str]:  # type: ignore[override]
+        """Return the arguments that restore the note in another process."""
+        return self.kind, str(self), self.of
+
+    def about(self, name: str) -> Note:
+        """Return the note about `name`, or about a part of `name`."""
+        return Note(self.kind, str(self), f"{name}, {self.of}" if self.of else name)
+
+    @property
+    def line(self) -> str:
+        """Return the sentence with what it is about."""
+        return f"{self.of}: {self}" if self.of else str(self)
+
+
+def as_note(words: str) -> Note:
+    """Return a note as it is, and plain words of solvers of other distributions as a note."""
+    return words if isinstance(words, Note) else Note(SOLVER, words)
+
+
+def marks(notes: Iterable[str]) -> list[NoteKind]:
+    """Return the marks of a run in a table of runs, from its notes."""
+    kinds = {as_note(note).kind for note in notes}
+    return sorted((kind for kind in kinds if kind.mark), key=lambda kind: kind.mark)
+
+
+def foremost(notes: Iterable[Note]) -> Note | None:
+    """Return the weightiest note, the first of its kind; None where there is none."""
+    return max(notes, key=lambda note: note.kind.weight, default=None)
+
+
+def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
+    """Return the notes as plain values, for result.json and tables."""
+    return [{"of": note.of, "kind": str(note.kind), "note": str(note)} for note in notes]
+
+
+def lines(notes: Sequence[Note]) -> list[str]:
+    """Return the notes as lines for the terminal.
+
+    Notes that more than a few things share but for their numbers are one line; notes.csv has each.
+    """
+    alike: dict[tuple[NoteKind, str], list[Note]] = {}
+    for note in notes:
+        alike.setdefault((note.kind, NUMBERS.sub("#", note)), []).append(note)
+    said = []
+    for same in alike.values():
+        if len(same) <= FEW:
+            said += [f"note: {note.line}" for note in same]
+        else:
+            said.append(f"note, {len(same)} times ({NOTES} has each), as {same[0].line}")
+    return said
+
+
+def percent(value: float) -> str:
+    """Return a fraction as percent with two significant digits, whole from 100 % on."""
+    return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -10,6 +10,7 @@ used, so that `import bubblefit` stays quick.
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import os
 import re
@@ -24,7 +25,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from .errors import InputError, OutputError, PlugInFailure
+from .errors import NOTES, InputError, Note, OutputError, PlugInFailure, rows
 
 if TYPE_CHECKING:
     import jinja2
@@ -377,3 +378,16 @@ def compiled(**options: Any) -> Callable[[Any], Any]:
             settings.CACHE_DIR = before
 
     return decorate
+
+
+def write_notes(folder: Path, notes: Iterable[Note]) -> None:
+    """Write notes.csv: of, kind, note; a header alone where there are none.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
+        table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows(notes))

@@ -7,18 +7,17 @@ from typing import Any, cast
 
 import click
 
-from ..errors import InputError, OutputError
+from ..errors import InputError, OutputError, rows
+from ..errors import lines as note_lines
 from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.report import write_tables
 from ..experiments.biaxial.test import BiaxialTest
 from ..experiments.kinds import Output
-from ..files import __version__, replacing
+from ..files import __version__, replacing, write_notes
 from ..materials.card import read_card
 from ..materials.designers import Minimise, Options
 from ..materials.exports.base import Export, Option, options_of
-from ..notes import lines as note_lines
-from ..notes import rows, write_notes
 from ..project.project import read_project
 from ..runs.folder import Store
 from ..solvers.registry import FORMATS

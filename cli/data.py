@@ -14,6 +14,7 @@ import click
 import numpy as np
 
 from ..errors import InputError, OutputError
+from ..errors import lines as note_lines
 from ..experiments.strips.gauge import (
     GaugeTable,
     PairedLoads,
@@ -21,7 +22,6 @@ from ..experiments.strips.gauge import (
     virtual_strain_gauge,
 )
 from ..files import replacing
-from ..notes import lines as note_lines
 from ..project.project import read_project
 from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..errors import InputError
+from ..errors import NOTES, InputError, Note, foremost
+from ..errors import lines as note_lines
 from ..inference.methods import method_names
-from ..notes import NOTES, Note, foremost
-from ..notes import lines as note_lines
 from . import options as given
 from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress

@@ -12,9 +12,8 @@ from typing import Any, Literal
 
 import click
 
-from ..errors import InputError
-from ..notes import Note
-from ..notes import lines as note_lines
+from ..errors import InputError, Note
+from ..errors import lines as note_lines
 from ..project.project import Project, chosen_cards
 from ..runs import compare as laws
 from ..runs import validation, weights

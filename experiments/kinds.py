@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, NoteKind, SolverFailure, as_note
 from ..materials.card import MaterialCard, positive, thickness_difference
-from ..notes import Note, NoteKind, as_note
 from ..readers.frames import FrameSource
 from ..readers.sections import ModulusUnit
 from ..solvers.base import History, instability
@@ -33,6 +32,16 @@ if TYPE_CHECKING:
     from ..inference.comparison import Comparison
     from ..materials.law import HypoelasticLaw, ThicknessChange
     from ..solvers.base import BandEnd, Solver
+
+#: Kinds of notes that are made here.
+BEYOND_CARD = NoteKind("beyond card range", mark=1)
+UNSTABLE = NoteKind("unstable", weight=14, mark=3)
+THICKNESS = NoteKind("other thickness")
+BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
+UNMATCHED = NoteKind("unmatched direction", weight=9)
+DOUBTFUL = NoteKind("doubtful data", weight=12)
+READING = NoteKind("how a file was read")
+
 
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
@@ -459,7 +468,7 @@ BEYOND = 1 + 1e-6
 def unstable_words(unstable: Sequence[str] | None) -> list[Note]:
     """Note that equilibria at these loads (in words) are unstable, where there are any."""
     words = instability(unstable)
-    return [Note(NoteKind.UNSTABLE, f"{words}: the model would not stay there")] if words else []
+    return [Note(UNSTABLE, f"{words}: the model would not stay there")] if words else []
 
 
 def strains_of(history: History) -> Array:
@@ -486,14 +495,14 @@ def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
     """Note where strains (3,) leave the range that a card is valid for."""
     words = "{} strain {:.3f} is beyond the card's valid range {:.3f}: modulus held there"
     found = beyond(reached, card.law.strain_range)
-    return [Note(NoteKind.BEYOND_CARD, words.format(*one)) for one in found]
+    return [Note(BEYOND_CARD, words.format(*one)) for one in found]
 
 
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
     """Note that a card that was run is of another thickness than the fabric's (mm), where it is."""
     words = thickness_difference(card, thickness)
     run = f"{words}; it was run with the card's thickness"
-    return [] if words is None else [Note(NoteKind.THICKNESS, run)]
+    return [] if words is None else [Note(THICKNESS, run)]
 
 
 def beyond_range(reached: Array, ends: Array) -> list[Note]:
@@ -502,7 +511,7 @@ def beyond_range(reached: Array, ends: Array) -> list[Note]:
         "{} strain reached {:.3f}, beyond law.strain_range {:.4g}: the modulus was held at its "
         "end value there; a wider range would let it vary"
     )
-    return [Note(NoteKind.BEYOND_LAW, words.format(*one)) for one in beyond(reached, ends)]
+    return [Note(BEYOND_LAW, words.format(*one)) for one in beyond(reached, ends)]
 
 
 def notes_of(history: History, card: MaterialCard) -> list[Note]:
@@ -676,7 +685,7 @@ class Judgement:
         """Return notes on all other doubts, with their name where they are trusted."""
         return tuple(
             Note(
-                NoteKind.DOUBTFUL,
+                DOUBTFUL,
                 d.text + f" (trusted: {d.name})" * (d.name in self.trusted),
                 self.test,
             )

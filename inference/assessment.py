@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import Note, NoteKind
 from ..materials.forms.base import COMPONENTS, Array, modulus_rows
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind
 from .linear import (
     LEFT,
     POINTS,
@@ -25,8 +25,13 @@ from .noise import Discrepancy, Noise, differences_of_all, discrepancies, notes_
 from .posterior import Posterior, bands_of
 from .problem import Evaluation, FitProblem
 
+#: Kinds of notes that are made here.
+UNCERTAIN = NoteKind("uncertain", weight=6)
+MARGIN = NoteKind("on its margin", weight=3)
+BOUND = NoteKind("on a bound", weight=7)
+
 #: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
-UNCERTAIN = 0.25
+LARGEST_SIGMA = 0.25
 ON_BOUND = 1e-6
 
 
@@ -126,12 +131,12 @@ def certainty(
         which = "with the tests' noise"
     words = [
         Note(
-            NoteKind.UNCERTAIN,
+            UNCERTAIN,
             f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
             f"worst at strain {strains[name][relative.argmax()]:.3f}",
         )
         for name, relative in sigmas.items()
-        if relative.max() > UNCERTAIN
+        if relative.max() > LARGEST_SIGMA
     ]
     left = best.residual if limit is None else limit.residual
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
@@ -180,12 +185,12 @@ def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
         moduli, least = rows @ best.coefficients, p.bounds.least[name]
         if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
             words = f"{name} touches its positivity margin: the data ask for less stiffness"
-            notes.append(Note(NoteKind.MARGIN, words))
+            notes.append(Note(MARGIN, words))
         if p.bounds.largest is not None:
             most = p.bounds.largest[name]
             if (most - moduli <= ON_BOUND * most).any():
                 words = f"{name} touches its upper bound: the data ask for more stiffness"
-                notes.append(Note(NoteKind.BOUND, words))
+                notes.append(Note(BOUND, words))
     if p.bounds.largest is None:
         notes += _on_bounds(p.labels, best.coefficients, *p.box)
     return notes + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
@@ -196,7 +201,7 @@ def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) 
     low = values - lower <= ON_BOUND * width
     high = upper - values <= ON_BOUND * width
     return [
-        Note(NoteKind.BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
+        Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
         for i in np.flatnonzero(low | high).tolist()
     ]
 
@@ -312,7 +317,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
 def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
     """Return notes on unknowns that the data do not determine."""
     return [
-        Note(NoteKind.UNCERTAIN, f"{verdict.name} is {verdict.words}")
+        Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")
         for verdict in found
         if not verdict.determined and (verdict.shared or verdict.prior is None)
     ]

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SolverFailure
+from ..errors import Note, NoteKind, SolverFailure
 from ..materials.forms.base import COMPONENTS, Array, modulus_rows
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind
 from ..solvers.base import History
 from .comparison import Comparison, Nuisance
 from .descent import bounded_step
@@ -23,6 +22,10 @@ from .noise import Noise, misfits
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
+
+#: Kinds of notes that are made here.
+SECOND_ORDER = NoteKind("second order")
+
 
 #: Of the largest curvature of the misfit: below, the data say nothing of a direction.
 FLAT = 1e-13
@@ -242,7 +245,7 @@ class Order:
         """Return a note where the second order matters."""
         if not self.used and self.why != NOT_DEFINITE:
             return []
-        return [Note(NoteKind.SECOND_ORDER, f"the uncertainty is of {self.words}")]
+        return [Note(SECOND_ORDER, f"the uncertainty is of {self.words}")]
 
 
 def large(problem: FitProblem, residual: Array) -> bool:

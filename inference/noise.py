@@ -26,10 +26,16 @@ import numpy as np
 from numpy.polynomial.legendre import legval
 from scipy.special import chdtr, chdtrc, fdtri
 
+from ..errors import Note, NoteKind
 from ..materials.forms.base import Array
-from ..notes import Note, NoteKind
 from .comparison import NoiseIs, Objective
 from .problem import FitProblem
+
+#: Kinds of notes that are made here.
+ABOVE_NOISE = NoteKind("above the noise", weight=13)
+BELOW_NOISE = NoteKind("below the noise")
+DISCREPANCY = NoteKind("wrong form", weight=15)
+
 
 #: Rings around a point that others are compared with, unless given.
 RINGS = 60
@@ -294,11 +300,7 @@ def _shapes(degree: int) -> int:
 
 def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
     """Return notes where more is left than noise can be."""
-    return [
-        Note(NoteKind.DISCREPANCY, _words(one), name)
-        for name, one in found.items()
-        if one.significant
-    ]
+    return [Note(DISCREPANCY, _words(one), name) for name, one in found.items() if one.significant]
 
 
 def _words(one: Discrepancy) -> str:
@@ -468,9 +470,9 @@ class NoiseTest:
         """Return the kind of note to give; None where the residual is as expected."""
         expected = np.sqrt(self.free / self.independent)
         if self.above < CHANCE and self.misfit.ratio > (1 + MATTERS) * expected:
-            return NoteKind.ABOVE_NOISE
+            return ABOVE_NOISE
         if self.below < CHANCE and self.misfit.ratio < (1 - MATTERS) * expected:
-            return NoteKind.BELOW_NOISE
+            return BELOW_NOISE
         return None
 
     @property
@@ -525,7 +527,7 @@ def _words_chi_square(test: NoiseTest, kind: NoteKind) -> str:
         f"({m.noise:.3g} {m.unit}; {test.values} values count as {test.independent:.3g} "
         "independent ones)"
     )
-    if kind == NoteKind.ABOVE_NOISE:
+    if kind == ABOVE_NOISE:
         return (
             f"{left}: the noise is given too small, or model or data are off by more than noise, "
             "and the uncertainty reckons with what is left as if it were noise"

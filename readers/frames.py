@@ -18,10 +18,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..notes import Note, NoteKind
+from ..errors import InputError, Note, NoteKind
 from .columns import LONGEST, split_unit
 from .registry import read_file
+
+#: Kinds of notes that are made here.
+ORDER = NoteKind("order of frames")
+
 
 Array = NDArray[np.float64]
 
@@ -389,7 +392,7 @@ def frame_files(
         f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
         " them by number"
     )
-    return files, Note(NoteKind.ORDER, words)
+    return files, Note(ORDER, words)
 
 
 def _numbers(file: Path) -> list[tuple[bool, int, str]]:

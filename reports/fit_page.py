@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import NOTES, NOTES_ARE
 from ..experiments.kinds import by_strain
 from ..experiments.registry import report_of
-from ..files import __version__, replacing
+from ..files import __version__, replacing, write_notes
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
-from ..notes import NOTES, NOTES_ARE, write_notes
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Store
 from ..runs.record import Record
 from ..runs.result import STRAINS, Fit, answer_at, coefficients_of

@@ -22,8 +22,8 @@ from markupsafe import Markup
 from PIL import Image, UnidentifiedImageError
 
 from ..errors import OutputError
+from ..errors import percent as percent
 from ..files import TEMPLATES, environment, replacing
-from ..notes import percent as percent
 from . import maps, vega
 from .charts import Charts
 from .content import Report, round_trip, write_page_data

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
-from ..files import __version__, replacing, write_text
-from ..notes import MARKS, NOTES, NOTES_ARE, as_note, marks, write_notes
+from ..files import __version__, replacing, write_notes, write_text
 from ..runs.fit import Check
 from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Store
 from ..runs.predictions import Predictions
@@ -60,10 +60,9 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     noted = sum(bool(run.notes) for run in each)
     if noted:
         summary += f" {noted} have notes."
-    for mark in MARKS:
-        count = sum(mark in marks(run.notes) for run in each)
-        if count:
-            summary += f" Marked {mark.value!r}: {count}."
+    marked = Counter(kind for run in each for kind in marks(run.notes))
+    for kind in sorted(marked, key=lambda kind: kind.mark):
+        summary += f" Marked {str(kind)!r}: {marked[kind]}."
     if predictions.worst is not None:
         summary += f" Largest error against measured values: {percent(predictions.worst)}."
     record = [] if predictions.record is None else record_tables(predictions.record)
@@ -110,7 +109,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
 def _notes(predictions: Predictions) -> list[Table]:
     walls = ["wall"] if any(run.wall for run in predictions.each) else []
     rows: list[list[object]] = [
-        [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind.value, str(note)]
+        [run.test.name, run.card, *(walls and [run.wall]), as_note(note).kind, str(note)]
         for run in predictions.each
         for note in run.notes
     ]

@@ -14,14 +14,13 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from ..errors import SolverFailure
+from ..errors import NOTES, NOTES_ARE, Note, SolverFailure, percent
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
-from ..files import replacing, write_text
+from ..files import replacing, write_notes, write_text
 from ..inference.likelihood import THRESHOLD
 from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS
-from ..notes import NOTES, NOTES_ARE, Note, percent, write_notes
 from ..runs import bootstrap, plan, profile, weights
 from ..runs.compare import LawComparison, noise
 from ..runs.folder import RESULT

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverFailure
+from ..errors import SOLVER, InputError, Note, NoteKind, SolverFailure
 from ..experiments.kinds import FittableTest, Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
@@ -35,11 +35,16 @@ from ..inference.search import evaluate_law
 from ..materials.card import CardCertainty, MaterialCard, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind
 from ..project.project import Project
 from .series import card_of, card_words, fitted_card
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .starts import StartRecord
+
+#: Kinds of notes that are made here.
+MESH = NoteKind("mesh error", weight=5)
+TAKEN_OUT = NoteKind("mesh error taken out")
+NOT_THE_CARD = NoteKind("not where the card is")
+
 
 Array = NDArray[np.float64]
 
@@ -149,7 +154,7 @@ def _repeated(
 #: Factor of the finer mesh.
 FINER = 2.0
 #: Values of `fit.mesh_error`.
-TOLD, TAKEN_OUT = "told", "taken out"
+TOLD, CORRECTED = "told", "taken out"
 #: Relative error of a modulus that needs no note, whatever the noise.
 LEAST = 0.01
 
@@ -187,7 +192,7 @@ def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
                 f"on a fine mesh {name} would be {by:+.2g} % at strain {strain:.3f}, more than the "
                 f"noise makes uncertain ({100 * sure.sigma[name][worst]:.2g} %): more elements help"
             )
-            notes.append(Note(NoteKind.MESH, words))
+            notes.append(Note(MESH, words))
     return notes
 
 
@@ -199,7 +204,7 @@ def note_of_limit(mesh: dict[str, Array]) -> Note:
         "ever finer meshes, to first order; objective, residuals and what is drawn of the tests "
         "are those of the mesh of the fit"
     )
-    return Note(NoteKind.TAKEN_OUT, words)
+    return Note(TAKEN_OUT, words)
 
 
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
@@ -214,11 +219,11 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     slopes = best.differentiated
     if slopes is None:
         return best
-    out = setup.project.fit.mesh_error == TAKEN_OUT
+    out = setup.project.fit.mesh_error == CORRECTED
     limit, notes = _limit(setup, problem, best)
     law = best.law
     if limit is None and out:
-        notes.append(Note(NoteKind.MESH, NOT_TAKEN_OUT))
+        notes.append(Note(MESH, NOT_TAKEN_OUT))
     elif limit is not None and out:
         law = problem.unknowns.law(law, slopes.unknowns + limit.step)
     sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
@@ -260,7 +265,7 @@ def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit |
         return limit_of_meshes(setup, problem, best), []
     except (InputError, SolverFailure) as error:
         words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
-        return None, [Note(NoteKind.MESH, words)]
+        return None, [Note(MESH, words)]
 
 
 #: Number of draws for the certainty of a card.
@@ -352,7 +357,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     named = project.fit.solver
     if make_solver(project).external:
         said = f"run by {SURROGATE}, which leads {named}: that gives no derivatives"
-        notes.append(Note(NoteKind.SOLVER, said))
+        notes.append(Note(SOLVER, said))
         project = project.with_solver(SURROGATE, {})
     material = card_of(project, card if card is not None else fitted_card(project))
     setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
@@ -373,7 +378,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     far = [f"{name} by {100 * by:+.2g} %" for name, by in moved.items() if abs(by) > MOVED]
     if far:
         words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
-        notes.append(Note(NoteKind.NOT_THE_CARD, words))
+        notes.append(Note(NOT_THE_CARD, words))
     words = "of the fit" if card is None else card_words(card)
     return Optimum(setup, problem, best, words, analyses + 1, moved, tuple(notes))
 

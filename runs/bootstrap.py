@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, Note, NoteKind, percent, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
 from ..files import __version__
 from ..inference.descent import descend
@@ -21,8 +22,6 @@ from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
 from ..inference.resampling import Group, Unit, draw_counts, factors_of, rows_of
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, percent, rows
-from ..notes import lines as note_lines
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
@@ -34,6 +33,10 @@ from .validation import TESTS, name_of, parts_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Kinds of notes that are made here.
+FEW_UNITS = NoteKind("few to draw from")
+
 
 Array = NDArray[np.float64]
 
@@ -191,10 +194,10 @@ class Bootstrap(Presented):
                     f"{count} {self.over} only: so few drawn from themselves scatter less than "
                     "others would, and the percentiles are too narrow"
                 )
-                notes.append(Note(NoteKind.FEW_UNITS, words, group.name))
+                notes.append(Note(FEW_UNITS, words, group.name))
         if len(self.samples) < FEW_SAMPLES:
             words = f"{len(self.samples)} samples: the ends of the bands are those of one or two"
-            notes.append(Note(NoteKind.FEW_UNITS, words))
+            notes.append(Note(FEW_UNITS, words))
         return notes
 
     @property

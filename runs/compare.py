@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, NoFeasibleStart
+from ..errors import InputError, NoFeasibleStart, Note, NoteKind, rows
 from ..experiments.kinds import FittableTest, Masks
 from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.resampling import folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
-from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from .best import noise_of
@@ -31,6 +30,10 @@ from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Kinds of notes that are made here.
+FOLD = NoteKind("fold without an error")
+
 
 #: Knots of a spline where neither the project nor the caller gives a number.
 KNOTS = 6
@@ -287,7 +290,7 @@ class LawComparison(Presented):
         notes = []
         for form in self.forms:
             lost = [fold.fold + 1 for fold in form.folds if fold.value is None]
-            own = [Note(NoteKind.FOLD, LOST, f"fold {fold}") for fold in lost]
+            own = [Note(FOLD, LOST, f"fold {fold}") for fold in lost]
             notes += [note.about(form.name) for note in (*form.fit.notes, *own)]
         return notes
 

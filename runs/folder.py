@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, OutputError
+from ..errors import InputError, Note, NoteKind, OutputError
 from ..experiments.kinds import RunRecord
 from ..files import output_errors, remove_unfinished, replacing, write_text
-from ..notes import Note, NoteKind
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
 

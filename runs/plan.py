@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, SolverFailure, percent, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import (
+    BEYOND_LAW,
     Candidate,
     FittableTest,
     MakeSolver,
@@ -32,12 +34,11 @@ from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, percent, rows
-from ..notes import lines as note_lines
 from ..project.project import Project
 from .presenters import Presented
 from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
+from .simulation import FAILED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -341,7 +342,7 @@ def plan(
             more, words, added = _added(candidate, present, make)
         except (SolverFailure, InputError) as error:
             said = f"left out, it cannot be computed: {str(error).splitlines()[0]}"
-            notes.append(Note(NoteKind.FAILED, said, candidate.name))
+            notes.append(Note(FAILED, said, candidate.name))
             continue
         notes += added
         sigma = asked.sigma(before + count * more)
@@ -392,7 +393,7 @@ def _added(
         said.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
         for strain, at, end in beyond(strains_of(history), law.strain_range):
             words = f"{strain} strain {at:.3f} is beyond {end:.3f}: the modulus is held there"
-            notes.append(Note(NoteKind.BEYOND_LAW, words, candidate.name))
+            notes.append(Note(BEYOND_LAW, words, candidate.name))
         if comparison.must_be_stable:
             notes += [note.about(candidate.name) for note in unstable_words(history.unstable)]
     return whole, f"{'; '.join(said)} ({candidate.noise_is})", notes

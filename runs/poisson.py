@@ -10,16 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, SolverFailure, rows
+from ..errors import lines as note_lines
 from ..materials.card import MaterialCard
-from ..notes import Note, NoteKind, rows
-from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
 from .presenters import Presented
-from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
-from .simulation import Progress
+from .series import (
+    Part,
+    Series,
+    card_of,
+    card_words,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+)
+from .simulation import FAILED, Progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -210,7 +217,7 @@ def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
         except SolverFailure as failure:
             responses.append(None)
             failed[f"{value:g}"] = failure.reason
-            notes.append(Note(NoteKind.FAILED, failure.reason, at))
+            notes.append(Note(FAILED, failure.reason, at))
             if len(failed) == len(values):
                 raise
             continue

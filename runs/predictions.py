@@ -10,7 +10,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, SolverFailure, as_note, marks
+from ..errors import lines as note_lines
+from ..errors import rows as note_rows
 from ..experiments.kinds import (
     Predicted,
     PredictedOutcome,
@@ -26,9 +28,6 @@ from ..experiments.kinds import (
 from ..experiments.registry import kind_named
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, as_note, marks
-from ..notes import lines as note_lines
-from ..notes import rows as note_rows
 from ..project.cards import Cards
 from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, Note, NoteKind, rows
+from ..errors import lines as note_lines
 from ..inference.likelihood import (
     BOUND,
     FAILED,
@@ -23,16 +24,18 @@ from ..inference.likelihood import (
 from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import WeightedProblem
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, rows
-from ..notes import lines as note_lines
 from ..project.project import Project
-from .best import Card, Optimum, find_optimum
+from .best import NOT_THE_CARD, Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .presenters import Presented
 from .setup import FitSetup
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Kinds of notes that are made here.
+NOT_CLOSED = NoteKind("profile not closed")
+
 
 #: Ratio of the distances of the ends from the best beyond which an interval is asymmetric.
 ASYMMETRIC = 1.3
@@ -132,10 +135,10 @@ class Profile:
                     f"not closed {word}: {_why(side)}; -2 log L is {ratio:.2g} of "
                     f"{THRESHOLD:.3g} there"
                 )
-                notes.append(Note(NoteKind.NOT_CLOSED, words, self.name))
+                notes.append(Note(NOT_CLOSED, words, self.name))
         if min(*self.below.ratios, *self.above.ratios) < BETTER:
             words = "another optimum fits the data better than the card's: fit with more starts"
-            notes.append(Note(NoteKind.NOT_THE_CARD, words, self.name))
+            notes.append(Note(NOT_THE_CARD, words, self.name))
         return notes
 
     @property

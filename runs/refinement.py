@@ -19,17 +19,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, SolverFailure, as_note, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import Refined
 from ..materials.card import MaterialCard
 from ..meshes.mesh import Mesh
-from ..notes import Note, NoteKind, as_note, rows
-from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
 from .presenters import Presented
-from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
-from .simulation import Progress
+from .series import (
+    Part,
+    Series,
+    card_of,
+    card_words,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+)
+from .simulation import FAILED, Progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -292,7 +299,7 @@ class Refinement(Presented):
                 size = f"{run.level.elements} quads"
                 if self.what == "increments":
                     size = f"{run.level.part.increments} increments"
-                failed = [Note(NoteKind.FAILED, run.failure)] if run.failure else []
+                failed = [Note(FAILED, run.failure)] if run.failure else []
                 notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
         return [*notes, *self.warnings]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, Note, NoteKind, as_note, rows
 from ..experiments.kinds import (
     Findings,
     FittedTest,
@@ -26,15 +26,14 @@ from ..experiments.kinds import (
 from ..experiments.registry import report_of
 from ..files import __version__
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
-from ..inference.noise import Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
+from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import Posterior
 from ..inference.problem import FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, as_note, rows
 from ..project.project import Project
-from .best import TAKEN_OUT, TOLD, BestFit, card_certainty
+from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, write_table
 from .presenters import write_report
 from .record import Record, versions
@@ -43,6 +42,11 @@ from .starts import coarse_columns
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Kinds of notes that are made here.
+STARTS = NoteKind("starts that failed", weight=2)
+ALONE = NoteKind("undetermined alone", weight=1)
+
 
 Array = NDArray[np.float64]
 
@@ -425,7 +429,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),
             "largest_relative_total": _largest(sure.total),
-            "mesh_error": TAKEN_OUT if sure.taken_out else TOLD,
+            "mesh_error": CORRECTED if sure.taken_out else TOLD,
             "second_order": None if sure.order is None else sure.order.numbers,
             "smooth_beyond_noise": {
                 name: {**asdict(d), "told": d.significant} for name, d in sure.discrepancy.items()
@@ -505,7 +509,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
             f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
             f"failed ({cut[0].failure}): --resume tries them again"
         )
-        notes.append(Note(NoteKind.STARTS, said))
+        notes.append(Note(STARTS, said))
     notes += [note for judgement in fit.judgements for note in judgement.notes]
     ends = np.asarray(fit.law.strain_range)
     # What the solver that counts does not look at, the one that leads may have.
@@ -526,7 +530,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     left = [
         note
         for note in notes_of_noise(fit.noise_tests)
-        if note.kind != NoteKind.BELOW_NOISE or note.of not in computed
+        if note.kind != BELOW_NOISE or note.of not in computed
     ]
     notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():
@@ -534,7 +538,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         notes += [note.about(name) for note in told] if len(fit.findings) > 1 else told
     notes += [
         Note(
-            NoteKind.ALONE,
+            ALONE,
             f"{source} alone does not determine {name} (1 sigma above {100 * NOTHING:.0f} % "
             "everywhere)",
         )

@@ -9,12 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ..errors import InputError
+from ..errors import InputError, Note
 from ..experiments.kinds import Refined, Studied, Test, notes_of, other_thickness
 from ..experiments.registry import kinds
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note
 from ..project.cards import FITTED, usual_folder
 from ..project.project import Project, chosen_cards
 from ..solvers.base import History, Solver

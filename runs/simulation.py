@@ -8,19 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import SolverFailure
+from ..errors import Note, NoteKind, SolverFailure, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import CardRun, Output, Simulation, Test, notes_of, other_thickness
 from ..experiments.registry import report_of
-from ..files import write_text
+from ..files import write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, rows, write_notes
-from ..notes import lines as note_lines
 from ..project.project import Project
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import Once, RunCache, run_cache
 from .starts import timed
+
+#: A remark on a run that has no result.
+FAILED = NoteKind("failed")
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,7 @@ def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[
     notes = []
     for part, run in parts.items():
         if isinstance(run.outcome, SolverFailure):
-            own = [Note(NoteKind.FAILED, run.outcome.reason)]
+            own = [Note(FAILED, run.outcome.reason)]
         else:
             own = notes_of(run.outcome, card)
         notes += [(note.about(part) if len(parts) > 1 else note).about(name) for note in own]

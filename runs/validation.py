@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, Note, NoteKind, rows
 from ..experiments.kinds import (
+    BEYOND_CARD,
     Divisible,
     FittableTest,
     FittedTest,
@@ -34,7 +35,6 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
@@ -44,6 +44,7 @@ from .presenters import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
+from .simulation import FAILED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,7 +126,7 @@ def held_out_part(
 
 def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
     """Return the errors of a test, or a part of it, without any."""
-    return HeldOut(name, None, {}, units, (Note(NoteKind.FAILED, why, name),))
+    return HeldOut(name, None, {}, units, (Note(FAILED, why, name),))
 
 
 def _fitted(
@@ -150,7 +151,7 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
         part = comparison.name if len(problem.comparisons) > 1 else ""
         words = [
             Note(
-                NoteKind.BEYOND_CARD,
+                BEYOND_CARD,
                 f"{strain} strain {at:.3f} is beyond {end:.3f}, up to which the law is known: "
                 "modulus held there",
                 part,

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, Note, rows
 from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
-from ..notes import Note, NoteKind, rows
 from ..project.project import Project
 from .compare import errors
 from .fit import FitEvent, stored_fit
@@ -22,6 +21,7 @@ from .presenters import Presented
 from .result import Fit
 from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints
+from .simulation import FAILED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,7 +114,7 @@ class WeightStudy(Presented):
     def notes(self) -> list[Note]:
         """Fits that failed, then the notes of the one at the project's weights."""
         failed = [
-            Note(NoteKind.FAILED, run.failure, f"weight times {run.count:.3g}")
+            Note(FAILED, run.failure, f"weight times {run.count:.3g}")
             for run in self.runs
             if run.failure
         ]

@@ -13,11 +13,15 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.mesh import Mesh, log_strain_of
-from ..notes import Note
 from .membrane.kernel import reference_elements
+
+#: Kinds of notes that are made here.
+EARLY = NoteKind("stopped early", mark=4)
+SNAP = NoteKind("snap", mark=2)
+
 
 log = logging.getLogger(__name__)
 

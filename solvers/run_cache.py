@@ -26,10 +26,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BubblefitError, OutputError
+from ..errors import BubblefitError, Note, NoteKind, OutputError, as_note
 from ..files import __version__, cache_folder, write_text
 from ..materials.law import HypoelasticLaw
-from ..notes import Note, NoteKind, as_note
 from .base import (
     BandedSolver,
     DifferentiatingSolver,

@@ -15,97 +15,125 @@ from typing import NamedTuple
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
+from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
+from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
 from bubblefit.experiments.cylinder import report as cylinders
+from bubblefit.experiments.kinds import (
+    BEYOND_CARD,
+    BEYOND_LAW,
+    DOUBTFUL,
+    READING,
+    THICKNESS,
+    UNMATCHED,
+    UNSTABLE,
+)
 from bubblefit.experiments.registry import report_of
-from bubblefit.notes import FEW, Note, NoteKind, lines
+from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
+from bubblefit.experiments.strips.report import LEFT_OUT
+from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.linear import SECOND_ORDER
+from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE, DISCREPANCY
+from bubblefit.materials.exports.base import CONFIRM, LOSES
 from bubblefit.project.project import read_project
+from bubblefit.readers.frames import ORDER
 from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
+from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT
+from bubblefit.runs.bootstrap import FEW_UNITS
+from bubblefit.runs.compare import FOLD
 from bubblefit.runs.poisson import vary_nu12
 from bubblefit.runs.predictions import Predictions, predict
+from bubblefit.runs.profile import NOT_CLOSED
 from bubblefit.runs.refinement import refine
-from bubblefit.runs.simulation import simulate_cards
+from bubblefit.runs.result import ALONE, STARTS
+from bubblefit.runs.simulation import FAILED, simulate_cards
 from bubblefit.solvers import registry
+from bubblefit.solvers.base import EARLY, SNAP
+from bubblefit.solvers.calculix.cylinder import GAS
+from bubblefit.solvers.calculix.deck import TILT
+from bubblefit.solvers.marc.cylinder import UNBALANCED, UNCONFIRMED
+from bubblefit.solvers.marc.sheets import NO_REACTIONS
+from bubblefit.solvers.marc.solver import REPEATED
+from bubblefit.solvers.membrane.bending import PENETRATION, WRINKLES
 
 from .bars import BarTest
 from .cylinder_cases import Formula, write_project
 from .note_cases import fits, membrane, programs, series
 
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
-K = NoteKind
 #: Who makes notes of a kind, and their words.
 CASES: tuple[tuple[NoteKind, Maker, str], ...] = (
-    (K.EARLY, membrane.notes_of_bending,
+    (EARLY, membrane.notes_of_bending,
      "the run stopped early: no equilibrium between 6 and 8 mm"),
-    (K.EARLY, programs.notes_of_marc_bending,
+    (EARLY, programs.notes_of_marc_bending,
      "the run stopped early; the last increment is at 60 mm"),
-    (K.EARLY, programs.notes_of_marc_bending,
+    (EARLY, programs.notes_of_marc_bending,
      "the time step could not get smaller: no convergence"),
-    (K.EARLY, programs.notes_of_calculix_bending,
+    (EARLY, programs.notes_of_calculix_bending,
      "the run stopped early; the last increment is at 6 mm: no step left"),
-    (K.SNAP, membrane.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
-    (K.SNAP, membrane.notes_of_inflation,
+    (SNAP, membrane.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
+    (SNAP, membrane.notes_of_inflation,
      "snaps, or nearly, between 50 and 100 kPa: passed by leading"),
-    (K.PENETRATION, membrane.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),
-    (K.WRINKLES, membrane.notes_of_bending,
+    (PENETRATION, membrane.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),
+    (WRINKLES, membrane.notes_of_bending,
      r"left to wrinkles \(0\.01 of the taut fabric's\) carries 0\.\d+ %"),
-    (K.GAS, programs.notes_of_calculix_bending,
+    (GAS, programs.notes_of_calculix_bending,
      r"gas: pass 1, p V constant within \S+ \(wanted: 0.0003\)"),
-    (K.TILT, programs.notes_of_tilted_shells,
+    (TILT, programs.notes_of_tilted_shells,
      r"slopes of up to 0\.30 lower its stiffness .* 18\.2 %"),
-    (K.REPEATED, programs.notes_of_marc_bending, "1 increments were repeated after they did not"),
-    (K.UNCONFIRMED, programs.notes_of_marc_bending,
+    (REPEATED, programs.notes_of_marc_bending, "1 increments were repeated after they did not"),
+    (UNCONFIRMED, programs.notes_of_marc_bending,
      "'Contact Normal Force', which is not confirmed"),
-    (K.UNBALANCED, programs.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),
-    (K.NO_REACTIONS, programs.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),
-    (K.SOLVER, series.notes_of_simulation, "thick: as a plug-in says it"),
-    (K.SOLVER, series.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
-    (K.SOLVER, series.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
-    (K.BEYOND_CARD, membrane.notes_of_analysis,
+    (UNBALANCED, programs.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),
+    (NO_REACTIONS, programs.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),
+    (SOLVER, series.notes_of_simulation, "thick: as a plug-in says it"),
+    (SOLVER, series.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
+    (SOLVER, series.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
+    (BEYOND_CARD, membrane.notes_of_analysis,
      r"warp strain 0\.077 is beyond the card's valid range 0\.050"),
-    (K.BEYOND_CARD, series.notes_of_simulation,
+    (BEYOND_CARD, series.notes_of_simulation,
      r"thick: warp strain 0\.095 is beyond the card's valid range"),
-    (K.UNSTABLE, membrane.notes_of_analysis, "unstable equilibrium at .* would not stay there"),
-    (K.THICKNESS, series.notes_of_simulation,
+    (UNSTABLE, membrane.notes_of_analysis, "unstable equilibrium at .* would not stay there"),
+    (THICKNESS, series.notes_of_simulation,
      r"thick: the card was fitted for a thickness of 1 mm, this is 0\.5"),
-    (K.FAILED, series.notes_of_simulation, "stiff: the bar breaks"),
-    (K.FAILED, series.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
-    (K.FAILED, series.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
-    (K.BEYOND_LAW, fits.notes_of_fit,
+    (FAILED, series.notes_of_simulation, "stiff: the bar breaks"),
+    (FAILED, series.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
+    (FAILED, series.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
+    (BEYOND_LAW, fits.notes_of_fit,
      r"one: warp: warp strain reached 0\.135, beyond law\.strain_range 0\.12"),
-    (K.STARTS, fits.notes_of_fit,
+    (STARTS, fits.notes_of_fit,
      r"1 of 2 starts ended because membrane failed \(one: warp: too tired\)"),
-    (K.UNCERTAIN, fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),
-    (K.MESH, fits.notes_of_mesh, r"on a fine mesh E1 would be \+4 % at strain 0\.050"),
-    (K.TAKEN_OUT, fits.notes_of_limit, r"taken out of the moduli \(E1 \+4 %, E2 \+4 %"),
-    (K.MARGIN, fits.notes_of_fit, "E2 touches its positivity margin"),
-    (K.BOUND, fits.notes_of_fit, "E1 touches its upper bound"),
-    (K.BOUND, fits.notes_of_certainty, "pressure_offset lies on its lower bound"),
-    (K.ALONE, fits.notes_of_fit, "two alone does not determine E2 "),
-    (K.INVERSE_CRIME, fits.notes_of_bubble, "computed by the very model that is fitted to them"),
-    (K.ABOVE_NOISE, fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
-    (K.BELOW_NOISE, fits.notes_of_noise, "bubble: the fit leaves .* is given too large"),
-    (K.DISCREPANCY, fits.notes_of_form,
+    (UNCERTAIN, fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),
+    (MESH, fits.notes_of_mesh, r"on a fine mesh E1 would be \+4 % at strain 0\.050"),
+    (TAKEN_OUT, fits.notes_of_limit, r"taken out of the moduli \(E1 \+4 %, E2 \+4 %"),
+    (MARGIN, fits.notes_of_fit, "E2 touches its positivity margin"),
+    (BOUND, fits.notes_of_fit, "E1 touches its upper bound"),
+    (BOUND, fits.notes_of_certainty, "pressure_offset lies on its lower bound"),
+    (ALONE, fits.notes_of_fit, "two alone does not determine E2 "),
+    (INVERSE_CRIME, fits.notes_of_bubble, "computed by the very model that is fitted to them"),
+    (ABOVE_NOISE, fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
+    (BELOW_NOISE, fits.notes_of_noise, "bubble: the fit leaves .* is given too large"),
+    (DISCREPANCY, fits.notes_of_form,
      r"0\.036 mm of what the fit leaves is smooth over the whole sheet"),
-    (K.NOT_THE_CARD, fits.notes_of_profile, "another optimum fits the data better than the card's"),
-    (K.NOT_CLOSED, fits.notes_of_profile,
+    (NOT_THE_CARD, fits.notes_of_profile, "another optimum fits the data better than the card's"),
+    (NOT_CLOSED, fits.notes_of_profile,
      r"strain 0\.02: not closed above: it meets the bound of the fit, 12"),
-    (K.SECOND_ORDER, fits.notes_of_order,
+    (SECOND_ORDER, fits.notes_of_order,
      r"second order: 1 sigma against that of the .*: G12 \+36 %"),
-    (K.FEW_UNITS, fits.notes_of_bootstrap, "one: warp: 2 specimens only: so few drawn"),
-    (K.SURFACES, fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
-    (K.FLAT_SHEET, fits.notes_of_bubble, "the sheet is taken for flat and taut"),
-    (K.UNMATCHED, fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
-    (K.LEFT_OUT, fits.notes_of_fit, "one, warp: 2 points beyond the final length"),
-    (K.DOUBTFUL, fits.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
-    (K.READING, fits.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
-    (K.FOLD, fits.notes_of_comparison, "spline:3, fold 3: no fit without its points ended well"),
-    (K.LOST, series.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
-    (K.ORDER, series.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
-    (K.NO_LOAD, series.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
-    (K.LOSES, series.notes_of_exports, "there the curve ends at log strain 0.3"),
-    (K.CONFIRM, series.notes_of_exports,
+    (FEW_UNITS, fits.notes_of_bootstrap, "one: warp: 2 specimens only: so few drawn"),
+    (SURFACES, fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
+    (FLAT_SHEET, fits.notes_of_bubble, "the sheet is taken for flat and taut"),
+    (UNMATCHED, fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
+    (LEFT_OUT, fits.notes_of_fit, "one, warp: 2 points beyond the final length"),
+    (DOUBTFUL, fits.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
+    (READING, fits.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
+    (FOLD, fits.notes_of_comparison, "spline:3, fold 3: no fit without its points ended well"),
+    (LOST, series.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
+    (ORDER, series.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
+    (NO_LOAD, series.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
+    (LOSES, series.notes_of_exports, "there the curve ends at log strain 0.3"),
+    (CONFIRM, series.notes_of_exports,
      "that tables of G12 are looked up with the engineering shear"),
 )  # fmt: skip
 
@@ -116,10 +144,10 @@ def notes_by(maker: Maker) -> list[Note]:
         return list(maker(Path(folder), patch))
 
 
-@pytest.mark.parametrize("kind", list(NoteKind), ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", [*NoteKind.known.values()], ids=str)
 def test_a_note_of_the_kind_comes(kind):
     cases = [(maker, words) for own, maker, words in CASES if own is kind]
-    assert cases, f"no case provokes a note {kind.value!r}: add one to CASES"
+    assert cases, f"no case provokes a note {kind!r}: add one to CASES"
     for maker, words in cases:
         notes = notes_by(maker)
         said = [note for note in notes if re.search(words, getattr(note, "line", note))]
@@ -210,14 +238,14 @@ TOLD_BY = (
 
 @pytest.mark.parametrize("tell", TOLD_BY, ids=lambda tell: tell.__name__)
 def test_a_note_of_every_kind_stands_everywhere(tell, tmp_path, monkeypatch):
-    notes = [Note(kind, f"words of {kind.name.lower()}.") for kind in NoteKind]
+    notes = [Note(kind, f"words of {kind}.") for kind in NoteKind.known.values()]
     told = tell(tmp_path, monkeypatch, notes)
     if told.folder is not None:
         table = pd.read_csv(told.folder / "notes.csv", keep_default_na=False)
         assert table.to_dict("records") == told.json
     for note in notes:
         own = [row for row in told.json if row["note"] == note]
-        assert own and {row["kind"] for row in own} == {note.kind.value}
+        assert own and {row["kind"] for row in own} == {note.kind}
         assert told.page is None or str(note) in html.unescape(told.page)
         if len(own) > FEW:
             count = f"note, {len(own)} times (notes.csv has each), as {own[0]['of']}: {note}"

@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, Note, rows
+from ...inference.assessment import UNCERTAIN
 from ...materials.designers import (
     POINTS,
     USUAL,
@@ -30,7 +31,7 @@ from ...materials.designers import (
     row_of,
     spread_of,
 )
-from ...notes import Note, NoteKind, rows
+from ..kinds import UNMATCHED, UNSTABLE
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialData, BiaxialTest
@@ -110,7 +111,7 @@ class BiaxialEvaluation:
                 f"nu_warp nu_fill is {c.nu_warp * c.nu_fill:.3g}: a fabric with these constants "
                 "has no stable strain; no program takes them"
             )
-            found.append(Note(NoteKind.UNSTABLE, words, self.test))
+            found.append(Note(UNSTABLE, words, self.test))
         for name, values in self.spread.items():
             low, high = values
             if not low > 0 or high / low > WIDE:
@@ -118,9 +119,9 @@ class BiaxialEvaluation:
                     f"{name} lies between {low:.4g} and {high:.4g} by what is evaluated: say which "
                     "options are meant wherever the constants are given"
                 )
-                found.append(Note(NoteKind.UNCERTAIN, words, self.test))
+                found.append(Note(UNCERTAIN, words, self.test))
         words = f"{self.test} pulls along the yarns only: it says nothing of the shear stiffness"
-        return [*found, Note(NoteKind.UNMATCHED, words)]
+        return [*found, Note(UNMATCHED, words)]
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:

@@ -11,15 +11,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
+from ...errors import Note, SolverFailure
 from ...files import replacing
 from ...materials.card import MaterialCard
 from ...meshes.strip_models import elongations
-from ...notes import Note, NoteKind
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
-from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Simulation, strains_of
+from ..kinds import (
+    READING,
+    STRAINS,
+    UNMATCHED,
+    CardRun,
+    Findings,
+    FittedTest,
+    Output,
+    Simulation,
+    strains_of,
+)
 from .data import BiaxialPath
 from .evaluation import BiaxialEvaluation, kept_table, line_table, option_table
 from .prepared import PERCENT, FittedPath, PreparedBiaxial
@@ -70,9 +79,9 @@ def _warnings(test: BiaxialTest) -> list[Note]:
         f"{test.name} pulls along the yarns only: it says nothing of G12, which rests on other "
         "tests or stays where its fit began"
     )
-    notes = [Note(NoteKind.UNMATCHED, words)]
+    notes = [Note(UNMATCHED, words)]
     said = dict.fromkeys(note for table in test.data.tables for note in table.source.notes)
-    return notes + [Note(NoteKind.READING, words) for words in said]
+    return notes + [Note(READING, words) for words in said]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import Note, NoteKind
 from ...meshes.bubble_model import BubbleModel
-from ...notes import Note, NoteKind
 from ...readers.pressure_log import ClockOffset
 from ..kinds import FittedTest
 from .objective import FieldObjective
@@ -17,6 +17,12 @@ from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS
+
+#: Kinds of notes that are made here.
+INVERSE_CRIME = NoteKind("inverse crime", weight=4)
+SURFACES = NoteKind("unfaithful surfaces", weight=10)
+FLAT_SHEET = NoteKind("sheet taken for flat", weight=11)
+
 
 Array = NDArray[np.float64]
 
@@ -97,20 +103,20 @@ def sheet_warnings(prepared: PreparedBubble) -> list[Note]:
     """Warn of a real test of which nothing is known of the sheet's shape."""
     if prepared.known is not None or prepared.test.sheet.known:
         return []
-    return [Note(NoteKind.FLAT_SHEET, NOT_BELIEVED)]
+    return [Note(FLAT_SHEET, NOT_BELIEVED)]
 
 
 def match_warnings(prepared: PreparedBubble) -> list[Note]:
     """Warn of data computed by the fitted model, and of surfaces too coarse to follow a bubble."""
     test, notes = prepared.test, []
     if prepared.by_this_model:
-        notes.append(Note(NoteKind.INVERSE_CRIME, CRIME))
+        notes.append(Note(INVERSE_CRIME, CRIME))
     if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
         words = (
             f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk "
             "closely and bias the moduli, also without noise; matching by points does not"
         )
-        notes.append(Note(NoteKind.SURFACES, words))
+        notes.append(Note(SURFACES, words))
     return notes
 
 

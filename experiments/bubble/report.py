@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
+from ...errors import SolverFailure, percent
 from ...files import replacing
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
@@ -23,7 +23,6 @@ from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
-from ...notes import percent
 from ...readers.fields import DisplacementField
 from ...readers.surfaces import write_surfaces
 from ...reports.bubbles import (

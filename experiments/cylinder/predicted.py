@@ -11,10 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import SolverFailure
+from ...errors import SolverFailure, marks
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
-from ...notes import marks
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
 from ..kinds import PredictedRun, RunRecord, Studied, band_of

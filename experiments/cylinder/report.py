@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...errors import marks, percent
 from ...files import replacing
 from ...materials.card import BAND, LEVEL, MaterialCard
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
-from ...notes import marks, percent
 from ...readers.bending import scatter
 from ...reports.charts import Charts
 from ...reports.content import Exhibit, Part, Table, Words

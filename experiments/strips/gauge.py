@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
+from ...errors import InputError, Note, NoteKind, as_note, rows
 from ...files import replacing
-from ...notes import Note, NoteKind, as_note, rows
 from ...readers.curves import LoadCurve, direction_named
 from ...readers.frames import Frame
 from ...readers.machine_tables import read_machine_loads, read_times
@@ -23,6 +22,11 @@ from ...readers.machine_tables import read_machine_loads, read_times
 if TYPE_CHECKING:
     import pandas as pd
     from scipy.spatial import Delaunay
+
+#: Kinds of notes that are made here.
+LOST = NoteKind("correlation lost")
+NO_LOAD = NoteKind("frames without load")
+
 
 Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
@@ -162,7 +166,7 @@ def virtual_strain_gauge(
             f"{at}: correlation lost in {len(why)} of {len(frames)} frames ({which}): {first};"
             " these give no length. Move the gauge to keep them"
         )
-        warnings.append(Note(NoteKind.LOST, words))
+        warnings.append(Note(LOST, words))
     return _record(places[0], places[1], tuple(warnings))
 
 
@@ -381,7 +385,7 @@ class GaugeTable:
         if without := self.without_load:
             words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
             words += f"are left out: {', '.join(without)}"
-            notes.append(Note(NoteKind.NO_LOAD, words))
+            notes.append(Note(NO_LOAD, words))
         return notes
 
     @property

@@ -11,13 +11,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
-from ...notes import Note, NoteKind
 from ...reports.content import Exhibit, Table
 from ...reports.moduli import moduli_together
 from ...reports.strips import (
@@ -31,11 +30,26 @@ from ...reports.strips import (
 from ...reports.vega import save
 from ...reports.vtu import write_vtu
 from ...solvers.base import History
-from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
+from ..kinds import (
+    READING,
+    STRAINS,
+    UNMATCHED,
+    CardRun,
+    Findings,
+    FittedTest,
+    Output,
+    Shown,
+    Simulation,
+    strains_of,
+)
 from .data import Strip, compare_orders
 from .doubts import curves_of
 from .prepared import FittedStrip, PreparedStrips
 from .test import StripsTest
+
+#: Kinds of notes that are made here.
+LEFT_OUT = NoteKind("points left out")
+
 
 #: The modulus that each direction pins down.
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
@@ -47,13 +61,13 @@ def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> Iterator[Note]
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            yield Note(NoteKind.UNMATCHED, words + "directions")
+            yield Note(UNMATCHED, words + "directions")
     for words in dict.fromkeys(n for s in strips for curve in s.strip.curves for n in curve.notes):
-        yield Note(NoteKind.READING, words)
+        yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
     for s in strips:
         if test.match_by == "points" and s.strip.beyond:
-            yield Note(NoteKind.LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
+            yield Note(LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
 
 
 def misfit_table(strips: Sequence[FittedStrip]) -> Table:

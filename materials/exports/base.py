@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, one_line
+from ...errors import InputError, Note, NoteKind, one_line
 from ...files import __version__
-from ...notes import Note, NoteKind
 from ..card import LEVEL, MaterialCard, strains_of
 from ..forms.base import COMPONENTS, UNLIMITED, Array, ratios_of
 from ..law import HypoelasticLaw
@@ -26,6 +25,11 @@ from ..responses import (
     trellis_curve,
     uniaxial_curve,
 )
+
+#: Kinds of notes that are made here.
+LOSES = NoteKind("loses")
+CONFIRM = NoteKind("to confirm")
+
 
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
@@ -48,8 +52,8 @@ class Says:
     @property
     def notes(self) -> list[Note]:
         """Return notes on all that is lost and all that is to be confirmed."""
-        lost = [Note(NoteKind.LOSES, words) for words in self.loses]
-        return [*lost, *(Note(NoteKind.CONFIRM, words) for words in self.confirm)]
+        lost = [Note(LOSES, words) for words in self.loses]
+        return [*lost, *(Note(CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
         """Return lines of at most WIDTH characters."""

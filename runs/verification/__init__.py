@@ -1,6 +1,6 @@
 """Compare published and closed-form numbers with those of the program as it is installed.
 
-from bubblefit.runs.verification import numbers
+from . import numbers
 for subject, several in numbers(): print(subject, [(n.what, n.ours, n.theirs) for n in several])
 """
 

@@ -23,19 +23,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
 from ...meshes.mesh import enclosed_volume
-from ...notes import Note, NoteKind
 from .. import rigid
-from ..base import History, extremes, log_strain
+from ..base import EARLY, History, extremes, log_strain
 from ..decks import render
 from .deck import MESH_FILE, Converged, Run, Setup, mesh_text
 from .frd import FrdFile
 from .library import MATERIAL, STATE_VARIABLES, constants
 from .sheets import NEAR, whole_times
+
+#: Kinds of notes that are made here.
+GAS = NoteKind("gas")
+
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -434,7 +437,7 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         cavity_volume=at(bent.volume),
         iterations=bent.iterations,
         path=bent.displacement,
-        remarks=(Note(NoteKind.EARLY, early),) if early else (),
+        remarks=(Note(EARLY, early),) if early else (),
         early=early if len(wanted) <= len(model.deflections) else "",
     )
 
@@ -487,4 +490,4 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)
     words = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
     words += f"pressure {rise:+.3g} kPa at the end"
-    return replace(history, remarks=(*history.remarks, Note(NoteKind.GAS, words)))
+    return replace(history, remarks=(*history.remarks, Note(GAS, words)))

@@ -14,14 +14,17 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...files import __version__
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Mesh
-from ...notes import Note, NoteKind
 from ..decks import render
 from .library import MATERIAL, STATE_VARIABLES
+
+#: Kinds of notes that are made here.
+TILT = NoteKind("tilted sheet")
+
 
 Element = Literal["S4", "S8R"]
 ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
@@ -275,4 +278,4 @@ def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
         return ()
     lower = f"the sheet's slopes of up to {slope:.2f} lower its stiffness there by up to"
     words = f"CalculiX takes warp and fill as x and y: {lower} {200 * slope**2:.1f} %"
-    return (Note(NoteKind.TILT, words),)
+    return (Note(TILT, words),)

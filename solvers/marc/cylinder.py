@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import enclosed_volume
-from ...notes import Note, NoteKind
-from ..base import History, extremes, log_strain
+from ..base import EARLY, History, extremes, log_strain
 from ..rigid import collar_body, support_body
 from .deck import (
     Run,
@@ -26,7 +25,12 @@ from .deck import (
     time_table,
 )
 from .settings import MarcSettings
-from .sheets import NO_REACTIONS, REACTION, by_time, displacements, pressure_context, whole_times
+from .sheets import NO_FORCES, REACTION, by_time, displacements, pressure_context, whole_times
+
+#: Kinds of notes that are made here.
+UNCONFIRMED = NoteKind("unconfirmed")
+UNBALANCED = NoteKind("unbalanced forces")
+
 
 Array = NDArray[np.float64]
 
@@ -132,7 +136,7 @@ CONTACT = "Contact Normal Force"
 #: how low or high they lie, in radii.
 BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
 #: Part of the collar's force by which it may differ from the supports' before a remark says so.
-UNBALANCED = 0.02
+BALANCE = 0.02
 
 
 def inflated(path: Path, model: CylinderModel) -> Array:
@@ -172,7 +176,7 @@ def cylinder_history(
     if len(times) < len(wanted):
         last = wanted[times[-1]]
         early = f"the run stopped early; the last increment is at {last:g} mm of deflection"
-        remarks.append(Note(NoteKind.EARLY, early))
+        remarks.append(Note(EARLY, early))
     mesh = model.mesh
     volume = model.copies * np.array([enclosed_volume(mesh.points + one, mesh.quads) for one in u])
     full = float(volume[0])
@@ -211,7 +215,7 @@ def _forces(
     """Return what the bodies do to the whole cylinder, (frames, 3) N, and notes on it."""
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
-        raise SolverFailure(NO_REACTIONS, "marc")
+        raise SolverFailure(NO_FORCES, "marc")
     found = {body: np.zeros((len(frames), 3)) for body in ("supports", "collar")}
     for body, nodes in may_touch(model).items():
         # Along x and z the forces of a quarter cancel against those of the others. The inflated
@@ -220,14 +224,14 @@ def _forces(
     words = (
         f"the collar's force is the sum of {name!r}, which is not confirmed (bubblefit docs marc)"
     )
-    remarks = [Note(NoteKind.UNCONFIRMED, words)]
+    remarks = [Note(UNCONFIRMED, words)]
     collar, supports = found["collar"][-1, 1], found["supports"][-1, 1]
-    if abs(collar + supports) > UNBALANCED * abs(collar):
+    if abs(collar + supports) > BALANCE * abs(collar):
         words = (
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
             "see run 5 in `bubblefit docs marc`"
         )
-        remarks.append(Note(NoteKind.UNBALANCED, words))
+        remarks.append(Note(UNBALANCED, words))
     return found, remarks
 
 

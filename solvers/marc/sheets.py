@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import UniaxialModel
-from ...notes import Note, NoteKind
 from ..base import History, extremes, log_strain
 from ..pulls import at_elongations, grip_pulls
 from .deck import (
@@ -30,6 +29,10 @@ from .deck import (
 from .settings import MarcSettings
 from .t19 import T19File
 
+#: Kinds of notes that are made here.
+NO_REACTIONS = NoteKind("no reactions")
+
+
 Array = NDArray[np.float64]
 WARP = np.array([1.0, 0.0, 0.0])
 #: The set of all nodes.
@@ -37,7 +40,7 @@ FLAT = "all_nodes"
 MOVED, REACTION = "Displacement", "Reaction Force"
 #: Six digits: times of some hundreds are good to this, nodes to this part of the mesh's size.
 NEAR_TIME, NEAR_PLACE = 1e-2, 1e-5
-NO_REACTIONS = (
+NO_FORCES = (
     f"the .t19 holds no {REACTION!r}; ask for it in a block 'post' of your own "
     "(bubblefit docs marc)"
 )
@@ -185,7 +188,7 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
         sums,
         iterations=iterations,
         path=u,
-        remarks=() if forces is not None else (Note(NoteKind.NO_REACTIONS, NO_REACTIONS),),
+        remarks=() if forces is not None else (Note(NO_REACTIONS, NO_FORCES),),
     )
 
 
@@ -205,7 +208,7 @@ def strip_history(
     frames = whole_times(path, model.mesh, count)
     u, forces = displacements(frames), reactions(frames)
     if forces is None:
-        raise SolverFailure(NO_REACTIONS, "marc")
+        raise SolverFailure(NO_FORCES, "marc")
     gauge = _opened(u, model)
 
     def at_levels(values: Array) -> Array:

@@ -7,20 +7,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import SolverFailure
+from ...errors import Note, NoteKind, SolverFailure
 from ...materials.exports.subroutines import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.strip_models import UniaxialModel
-from ...notes import Note, NoteKind
-from ..base import History, Progress, SolverCheck, analysis_of
+from ..base import EARLY, History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark
 from ..settings import KEYS
 from . import cylinder, sheets
 from .deck import Reader, Run
 from .job import Job, find_marc, run_job
 from .settings import MarcSettings, marc_settings
+
+#: Kinds of notes that are made here.
+REPEATED = NoteKind("repeated increments")
+
 
 #: Settings that change what the deck or the subroutine says, or what Marc makes of them.
 MATTERING = (
@@ -132,10 +135,10 @@ class MarcSolver:
         history = analysis_of(ANALYSES, model, self.name)(model, law, settings, once)
         remarks = [*history.remarks]
         if early:
-            remarks.append(Note(NoteKind.EARLY, early))
+            remarks.append(Note(EARLY, early))
         if repeats:
             words = f"{repeats} increments were repeated after they did not converge"
-            remarks.append(Note(NoteKind.REPEATED, words))
+            remarks.append(Note(REPEATED, words))
         why = f"{history.early}: {early}" if history.early and early else history.early
         return replace(history, remarks=tuple(remarks), early=why)
 

@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import Bending, ClosedGas, CylinderModel, InflatedModel, RigidCylinder
-from ...notes import Note, NoteKind
-from ..base import History
+from ..base import EARLY, SNAP, History
 from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall
 from .closed import ClosedMembrane, brought_to_touch, closed_membrane, gaps
@@ -27,6 +26,11 @@ from .newton import (
     straight_on,
 )
 
+#: Kinds of notes that are made here.
+PENETRATION = NoteKind("penetration")
+WRINKLES = NoteKind("wrinkle stiffness")
+
+
 Array = NDArray[np.float64]
 
 #: Viscosity over pressure over the size of a facet: in the first step, which hardly moves; factors
@@ -36,7 +40,7 @@ FIRST, DOWN, UP, MOST_STEPS = 20.0, 0.3, 8.0, 60
 #: where a step moved no node by more than this share of a facet's size.
 LEAST, MOST, LITTLE, NEAR = 1e-3, 1e5, 10.0, 0.05
 #: A node further from the extrapolation than this many times the collar's way has snapped.
-SNAP = 4.0
+LEAP = 4.0
 #: mm that the supports bite into the inflated membrane, which then hangs free on them.
 BITE = 0.02
 #: A gas at this many times the pressure nearly prescribes the volume that it fills.
@@ -118,7 +122,7 @@ def analyse(
     try:
         steps = march(moving, plan.displacements, asked, (0.0, inflated), len(model.pressures))
         for wanted, found in zip(plan.displacements, steps, strict=True):
-            if len(path) > 2 and np.abs(found - moving.expected).max() > SNAP * (
+            if len(path) > 2 and np.abs(found - moving.expected).max() > LEAP * (
                 wanted - moves[-1]
             ):
                 snaps.append(wanted)
@@ -137,23 +141,23 @@ def analyse(
             np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
     except NoEquilibrium as failure:
         early = f"the run stopped early: {failure.reason}"
-        remarks.append(Note(NoteKind.EARLY, early))
+        remarks.append(Note(EARLY, early))
     reported = range(len(plan.displacements)) if plan.reported is None else plan.reported
     frames = [0, *(i + 1 for i in reported if i + 1 < len(path))]
     if len(frames) == 1:
         raise SolverFailure(f"no frame of the bending: {remarks[0]}")
     if snaps:
         where = ", ".join(f"{d:.4g}" for d in snaps)
-        remarks.append(Note(NoteKind.SNAP, f"snaps, or nearly, before {where} mm of deflection"))
+        remarks.append(Note(SNAP, f"snaps, or nearly, before {where} mm of deflection"))
     words = f"rigid bodies penetrate {deepest:.3g} mm at most"
-    remarks.append(Note(NoteKind.PENETRATION, words))
+    remarks.append(Note(PENETRATION, words))
     most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
         words = (
             f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
             f"fabric's) carries {100 * of_wrinkles / most:.2g} % of the largest load"
         )
-        remarks.append(Note(NoteKind.WRINKLES, words))
+        remarks.append(Note(WRINKLES, words))
     # The other half takes up forces normal to a symmetry plane.
     force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
     reactions: dict[str, Array] = {}
@@ -249,7 +253,7 @@ def analyse_inflated(
         volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
     remarks = tuple(
         Note(
-            NoteKind.SNAP,
+            SNAP,
             f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
             "leading the volume",
         )

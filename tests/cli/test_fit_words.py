@@ -13,13 +13,15 @@ import numpy as np
 import pytest
 from bubblefit.cli.fits import lines_of, misfit_lines, modulus_lines, warning_lines
 from bubblefit.cli.terminal import written_to
-from bubblefit.inference.noise import Misfit
-from bubblefit.notes import GRAVEST, Note, NoteKind, foremost
-from bubblefit.runs.result import Answer, answers
+from bubblefit.errors import SOLVER, Note, foremost
+from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
+from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
+from bubblefit.inference.assessment import BOUND, UNCERTAIN
+from bubblefit.inference.noise import ABOVE_NOISE, DISCREPANCY, Misfit
+from bubblefit.runs.best import MESH
+from bubblefit.runs.result import ALONE, STARTS, Answer, answers
 
 from ..projects import constant_strips
-
-K = NoteKind
 
 
 @pytest.fixture(scope="module")
@@ -100,20 +102,20 @@ def test_the_misfit_stands_beside_the_noise() -> None:
 
 
 def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure() -> None:
-    wrong = [K.DISCREPANCY, K.UNSTABLE, K.ABOVE_NOISE, K.DOUBTFUL, K.FLAT_SHEET, K.SURFACES]
-    unsure = [K.BOUND, K.UNCERTAIN, K.MESH]
-    places = [GRAVEST.index(kind) for kind in (*wrong, *unsure, K.STARTS)]
-    assert places == sorted(places) and len(set(GRAVEST)) == len(GRAVEST)
-    notes = [Note(K.STARTS, "one"), Note(K.MESH, "two"), Note(K.DISCREPANCY, "three")]
+    wrong = [DISCREPANCY, UNSTABLE, ABOVE_NOISE, DOUBTFUL, FLAT_SHEET, SURFACES]
+    unsure = [BOUND, UNCERTAIN, MESH]
+    weights = [kind.weight for kind in (*wrong, *unsure, STARTS)]
+    assert weights == sorted(weights, reverse=True)
+    notes = [Note(STARTS, "one"), Note(MESH, "two"), Note(DISCREPANCY, "three")]
     for order in permutations(notes):
         assert foremost(order) == "three"
-    assert foremost([Note(K.SOLVER, "none of these"), Note(K.ALONE, "it")]) == "it"
-    assert foremost([Note(K.MESH, "first"), Note(K.MESH, "second")]) == "first"
+    assert foremost([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == "it"
+    assert foremost([Note(MESH, "first"), Note(MESH, "second")]) == "first"
     assert foremost([]) is None
 
 
 def test_one_warning_and_how_many_more(tmp_path: Path) -> None:
-    notes = [Note(K.STARTS, "some failed"), Note(K.BOUND, "E1 touches", "two"), Note(K.MESH, "m")]
+    notes = [Note(STARTS, "some failed"), Note(BOUND, "E1 touches", "two"), Note(MESH, "m")]
     where = f"{tmp_path / 'notes.csv'} (or --verbose)"
     assert warning_lines(notes, tmp_path) == [
         "warning: two: E1 touches",

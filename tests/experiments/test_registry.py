@@ -8,10 +8,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError, PlugInFailure
+from bubblefit.errors import SOLVER, InputError, PlugInFailure
 from bubblefit.experiments import registry
 from bubblefit.experiments.keys import named_format
 from bubblefit.experiments.kinds import (
+    BEYOND_CARD,
+    BEYOND_LAW,
+    DOUBTFUL,
+    THICKNESS,
+    UNSTABLE,
     Doubt,
     Expected,
     Fabric,
@@ -29,7 +34,6 @@ from bubblefit.experiments.kinds import (
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds, report_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import NoteKind
 from bubblefit.solvers.base import History
 
 from ..complaints import complaint
@@ -156,8 +160,8 @@ def test_what_stops_a_fit_and_what_is_noted():
     assert [d.name for d in found.doubts] == ["b", "c", "d", "a"]
     assert [d.name for d in found.errors] == ["b", "d"]
     assert [(n.kind, str(n), n.of) for n in found.notes] == [
-        (NoteKind.DOUBTFUL, "known (trusted: c)", "t"),
-        (NoteKind.DOUBTFUL, "perhaps (trusted: a)", "t"),
+        (DOUBTFUL, "known (trusted: c)", "t"),
+        (DOUBTFUL, "perhaps (trusted: a)", "t"),
     ]
     words = complaint(found.demand, Path("p.toml"))
     assert "sure [b]; too [d]." in words and "--trust" in words
@@ -172,24 +176,24 @@ def test_the_words_of_notes():
     assert beyond_card(within, card) == beyond_range(within, ends) == []
     assert len(beyond_card(ends * (1 + 1.1e-6), card)) == 3
     for found, kind in (
-        (beyond_card(beyond, card), NoteKind.BEYOND_CARD),
-        (beyond_range(beyond, ends), NoteKind.BEYOND_LAW),
+        (beyond_card(beyond, card), BEYOND_CARD),
+        (beyond_range(beyond, ends), BEYOND_LAW),
     ):
         assert [note.kind for note in found] == [kind]
         assert "fill" in found[0] and "0.210" in found[0] and "0.2" in found[0]
     assert by_strain([1, 2, 3]) == {"warp": 1.0, "fill": 2.0, "shear": 3.0}
     assert other_thickness(card, 0.8) == []
     (note,) = other_thickness(card, 0.4)
-    assert note.kind is NoteKind.THICKNESS and note.endswith(
+    assert note.kind is THICKNESS and note.endswith(
         "with the card's moduli the fabric is 50 % softer; it was run with the card's thickness"
     )
     record = SimpleNamespace(strain=beyond, remarks=("made up",), unstable=("132 kPa",))
     assert [n.kind for n in notes_of_record(record, card)] == [
-        NoteKind.SOLVER, NoteKind.BEYOND_CARD, NoteKind.UNSTABLE
+        SOLVER, BEYOND_CARD, UNSTABLE
     ]  # fmt: skip
     record.strain = None
-    assert [n.kind for n in notes_of_record(record, card)] == [NoteKind.SOLVER, NoteKind.UNSTABLE]
+    assert [n.kind for n in notes_of_record(record, card)] == [SOLVER, UNSTABLE]
     assert unstable_words(None) == unstable_words(()) == []
     (note,) = unstable_words(("132 kPa",))
-    assert note.kind is NoteKind.UNSTABLE and note.endswith(": the model would not stay there")
+    assert note.kind is UNSTABLE and note.endswith(": the model would not stay there")
     assert "132 kPa" in note

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import (
+    BOUND,
     Certainty,
     _on_bounds,
     certainty,
@@ -16,6 +17,8 @@ from bubblefit.inference.comparison import Nuisance, NuisanceOf
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import LawQuery, Limit, information, summary
 from bubblefit.inference.noise import (
+    ABOVE_NOISE,
+    BELOW_NOISE,
     CHANCE,
     Misfit,
     Noise,
@@ -30,7 +33,6 @@ from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.notes import NoteKind
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.ndimage import gaussian_filter
 
@@ -152,7 +154,7 @@ def test_bounds_are_touched_within_a_millionth_of_their_width():
     values = np.array([2.0 + 1e-6, 2.0 + 3e-6, 4.0 - 1e-6, 4.0 - 3e-6, 3.0])
     notes = _on_bounds("abcde", values, np.full(5, 2.0), np.full(5, 4.0))
     assert [str(note)[:19] for note in notes] == ["a lies on its lower", "c lies on its upper"]
-    assert {note.kind for note in notes} == {NoteKind.BOUND}
+    assert {note.kind for note in notes} == {BOUND}
 
 
 INFORMATION_LAW = HypoelasticLaw.linear(300.0, 200.0, 10.0)
@@ -341,7 +343,7 @@ def test_noise_as_it_is_given_is_seldom_told(length):
         for times in told:
             tests = noise_tests(problem, NOISE * times * noise / problem.scale)
             kinds = [note.kind for note in notes_of_noise(tests)]
-            expected = {0.5: [NoteKind.BELOW_NOISE], 2.0: [NoteKind.ABOVE_NOISE]}
+            expected = {0.5: [BELOW_NOISE], 2.0: [ABOVE_NOISE]}
             told[times] += kinds == expected.get(times, kinds) and bool(kinds)
     assert told[1.0] <= 2
     assert told[0.5] == told[2.0] == count
@@ -367,7 +369,7 @@ def test_what_is_told():
     assert little.above < CHANCE
     notes = notes_of_noise({"warp": above, "fill": below, "bias": few, "other": little})
     assert [(n.kind, n.of) for n in notes] == [
-        (NoteKind.ABOVE_NOISE, "warp"), (NoteKind.BELOW_NOISE, "fill"),
+        (ABOVE_NOISE, "warp"), (BELOW_NOISE, "fill"),
     ]  # fmt: skip
     said = "4.54 N RMS, 1.51 times the noise given (3 N; 300 values count as 30 independent ones)"
     assert said in notes[0]

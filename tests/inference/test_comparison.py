@@ -11,7 +11,7 @@ from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.noise import Noise, alike_in_all, notes_of_discrepancies
+from bubblefit.inference.noise import DISCREPANCY, Noise, alike_in_all, notes_of_discrepancies
 from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.resampling import folds_of
 from bubblefit.inference.unknowns import Unknowns
@@ -19,7 +19,6 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
-from bubblefit.notes import NoteKind
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -342,7 +341,7 @@ def test_a_wrong_form_is_told():
     expected = float(np.sqrt(np.mean(beside**2)))
     assert np.mean([one.rms for one in ten]) == pytest.approx(expected, rel=0.1)
     (note,) = notes_of_discrepancies({"strips: warp": ten[0]})
-    assert (note.kind, note.of) == (NoteKind.DISCREPANCY, "strips: warp")
+    assert (note.kind, note.of) == (DISCREPANCY, "strips: warp")
     assert f"{ten[0].rms:.2g} N of what the fit leaves is alike in all 10 specimens" in note
 
 

@@ -18,6 +18,7 @@ from bubblefit.inference.assessment import moduli_error
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import (
     NOT_DEFINITE,
+    SECOND_ORDER,
     TOO_LITTLE,
     Linear,
     Second,
@@ -41,7 +42,6 @@ from bubblefit.inference.unknowns import (
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.notes import NoteKind
 from bubblefit.runs import best as budget
 from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -467,7 +467,7 @@ def test_which_order_a_fit_is_of(wrong, monkeypatch):
         assert by > 0.1
         np.testing.assert_allclose(sure.sigma[name] / first.sigma[name] - 1, by, rtol=1e-6)
     (note,) = sure.order.notes
-    assert note.kind == NoteKind.SECOND_ORDER and sure.order.words in note
+    assert note.kind == SECOND_ORDER and sure.order.words in note
     assert sure.order.numbers["order"] == 2 and sure.order.analyses <= 8
 
     def given(share: float) -> None:

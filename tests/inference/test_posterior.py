@@ -10,6 +10,7 @@ from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_r
 from bubblefit.inference.linear import Limit, posteriors_of
 from bubblefit.inference.linear import Linear as LinearFit
 from bubblefit.inference.noise import (
+    DISCREPANCY,
     Discrepancy,
     Noise,
     discrepancy,
@@ -21,7 +22,6 @@ from bubblefit.inference.problem import Evaluation, WeightedProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import NoteKind
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import minimize
 from scipy.stats import halfnorm, kstest, norm, truncnorm, uniform
@@ -397,6 +397,6 @@ def test_the_words():
         "computed": Discrepancy(61.8, 1.66, 2e-8, "mm", least=4e-4),
     }
     (note,) = notes_of_discrepancies(found)
-    assert (note.kind, note.of) == (NoteKind.DISCREPANCY, "bubble")
+    assert (note.kind, note.of) == (DISCREPANCY, "bubble")
     assert note.startswith("0.036 mm of what the fit leaves is smooth")
     assert "(22.6 times" in note and "1.25 in one of a hundred" in note

@@ -14,7 +14,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.errors import SolverFailure
+from bubblefit.errors import Note, SolverFailure
 from bubblefit.experiments.bubble import findings as bubble_findings
 from bubblefit.experiments.bubble.findings import sheet_warnings
 from bubblefit.inference.assessment import Certainty, certainty
@@ -25,7 +25,6 @@ from bubblefit.inference.noise import Discrepancy, Misfit, NoiseTest, notes_of_d
 from bubblefit.inference.noise import notes_of_noise as notes_of_noise_tests
 from bubblefit.inference.resampling import Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
-from bubblefit.notes import Note
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs.bootstrap import Bootstrap
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bubblefit.errors import Note
 from bubblefit.meshes.cylinder_model import inflated_cylinder
-from bubblefit.notes import Note
 from bubblefit.solvers.calculix import cylinder as cylinder_analysis
 from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks

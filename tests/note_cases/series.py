@@ -8,12 +8,12 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
+from bubblefit.errors import Note, NoteKind
 from bubblefit.experiments import registry as experiments
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports import subroutines
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.runs.poisson import vary_nu12

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.errors import Note
 from bubblefit.experiments.strips.gauge import (
+    LOST,
     GaugeRecord,
     GaugeTable,
     PairedLoads,
@@ -16,7 +18,6 @@ from bubblefit.experiments.strips.gauge import (
     triangulated,
     virtual_strain_gauge,
 )
-from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.curves import LoadCurve, read_load_curves
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
@@ -277,7 +278,7 @@ LENGTH = np.array([20.0, 23.0, np.nan, 22.0])
 ELONGATION = LENGTH - 20.0
 RECORD = GaugeRecord(
     20.0, LENGTH, ELONGATION, ELONGATION / 20, np.log(LENGTH / 20), (2,),
-    (Note(NoteKind.LOST, "the lower end is lost in c.csv"),),
+    (Note(LOST, "the lower end is lost in c.csv"),),
 )  # fmt: skip
 ENDS = (1.5, -10.0), (1.5, 10.0)
 ALONE = GaugeTable(FILES, *ENDS, RECORD)

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.errors import FEW, InputError, Note, OutputError, SolverFailure, rows
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import Output, PredictedRun, RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import FEW, Note, NoteKind, rows
 from bubblefit.project import project as project_module
 from bubblefit.project.project import Project, chosen_cards, read_project
 from bubblefit.reports import run_pages
@@ -31,7 +30,7 @@ from bubblefit.runs.predictions import Predictions, RunEvent, measured_tests, pr
 from bubblefit.runs.record import versions
 from bubblefit.runs.simulation import simulate, simulate_cards
 from bubblefit.solvers import registry
-from bubblefit.solvers.base import History
+from bubblefit.solvers.base import SNAP, History
 
 from ..bars import BarTest, project_of
 from ..complaints import complaint
@@ -296,7 +295,7 @@ def predictions(folder: Path, soft: float, measured: bool) -> Predictions:
     each = [
         replace(run, record=replace(run.record, seconds=2.0 + i)) for i, run in enumerate(done.each)
     ]
-    each[1] = replace(each[1], notes=("made up", Note(NoteKind.SNAP, "also")))
+    each[1] = replace(each[1], notes=("made up", Note(SNAP, "also")))
     return Predictions(done.project, tuple(each), 30.0)
 
 

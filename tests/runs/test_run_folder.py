@@ -16,13 +16,12 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit import files as writing
-from bubblefit.errors import InputError, OutputError
+from bubblefit.errors import InputError, Note, OutputError
 from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
 from bubblefit.experiments.kinds import RunRecord
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import CylinderModel, curve_reading, inflated_cylinder
-from bubblefit.notes import Note, NoteKind
 from bubblefit.project import project as written
 from bubblefit.project.cards import usual_folder
 from bubblefit.project.project import (
@@ -38,6 +37,7 @@ from bubblefit.runs import starts as running_files
 from bubblefit.runs.folder import RESULT, RUN, RunRecords, Store
 from bubblefit.runs.predictions import mark_of
 from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFiles, StartRecord
+from bubblefit.solvers.base import SNAP
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
 from bubblefit.solvers.run_cache import digest_of
@@ -219,7 +219,7 @@ def test_digests_tell_things_apart_by_what_they_hold():
 def test_of_what_a_remark_is_said_comes_back(tmp_path):
     records = RunRecords(tmp_path)
     records.begin(False, False)
-    said = Note(NoteKind.SNAP, "it snapped", "at 3 kPa")
+    said = Note(SNAP, "it snapped", "at 3 kPa")
     records.write("a" * 64, RunRecord(1.0, strain=np.ones(3), remarks=(said,), from_cache=True))
     found = records.read("a" * 64)
     assert found is not None and found.from_cache

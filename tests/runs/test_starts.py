@@ -22,11 +22,10 @@ from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
 from bubblefit.materials.forms.base import COMPONENTS
-from bubblefit.notes import NoteKind
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs import fit as stages
 from bubblefit.runs import starts as room
-from bubblefit.runs.best import notes_of_mesh, with_certainty
+from bubblefit.runs.best import MESH, TAKEN_OUT, notes_of_mesh, with_certainty
 from bubblefit.runs.fit import distinct, moduli_apart, one_fit
 from bubblefit.runs.setup import coarse_problem
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord, run_start
@@ -480,7 +479,7 @@ def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
         "E1": np.array([0.01, -0.044, 0.031]), "E2": np.full(3, 0.009), "G12": np.full(3, -0.4),
     }  # fmt: skip
     (note,) = notes_of_mesh(sure, mesh)
-    assert note.kind is NoteKind.MESH
+    assert note.kind is MESH
     assert "E1" in note and "-4.4 %" in note and "0.050" in note and "(3 %)" in note
 
 
@@ -515,7 +514,7 @@ def test_where_it_cannot_be_known(monkeypatch):
         monkeypatch.setattr(mesh_error, "residual_of", lambda *_, e=error: (_ for _ in ()).throw(e))
         sure = again()
         assert sure.mesh is None and sure.total == sure.sigma
-        assert sure.undetermined[-1].kind is NoteKind.MESH
+        assert sure.undetermined[-1].kind is MESH
         assert str(sure.undetermined[-1]).startswith("the error of the mesh is not known: ")
 
 
@@ -568,9 +567,9 @@ def test_the_error_is_taken_out_where_the_project_says_so():
             assert (lower <= own).all() and (own <= upper).all()
         wide, narrow = (np.ptp(which.band[name], axis=0) for which in (told, sure))
         assert (narrow <= wide * (1 + 1e-9)).all()
-    (note,) = [n for n in sure.undetermined if n.kind is NoteKind.TAKEN_OUT]
+    (note,) = [n for n in sure.undetermined if n.kind is TAKEN_OUT]
     assert "is taken out of the moduli (E1 " in note
-    assert not [n for n in sure.undetermined if n.kind is NoteKind.MESH]
+    assert not [n for n in sure.undetermined if n.kind is MESH]
     again = replace(fitted, setup=setup, best=best)
     assert again.card.source.endswith(", error of the mesh taken out")
     assert again.law is best.law and again.laws[0] is best.law

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bubblefit.errors import Note
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import Note, NoteKind
-from bubblefit.solvers.base import History
+from bubblefit.solvers.base import SNAP, History
 from bubblefit.solvers.run_cache import (
     LIMIT,
     TITLE,
@@ -39,7 +39,7 @@ def history(number=1.0, frames=3):
         strain_max=random.random(3),
         reactions={"top": random.standard_normal((frames, 3)), "a b/c": np.zeros((frames, 3))},
         cavity_pressure=random.random(frames), iterations=17, unstable=("132 kPa",),
-        remarks=(Note(NoteKind.SNAP, "it snapped — once", "at 3 kPa"),), early="no equilibrium",
+        remarks=(Note(SNAP, "it snapped — once", "at 3 kPa"),), early="no equilibrium",
     )  # fmt: skip
 
 

@@ -11,24 +11,25 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.errors import InputError, Note, OutputError, SolverFailure
 from bubblefit.inference.assessment import uncertainty_from
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
 from bubblefit.inference.noise import Noise
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
-from bubblefit.notes import Note, NoteKind
 from bubblefit.project.project import read_project
 from bubblefit.reports.html import percent
 from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
 from bubblefit.runs import weights as study_of
-from bubblefit.runs.bootstrap import MOST, Bootstrap, bootstrap
+from bubblefit.runs.best import NOT_THE_CARD
+from bubblefit.runs.bootstrap import FEW_UNITS, MOST, Bootstrap, bootstrap
 from bubblefit.runs.plan import NOW, Plan, Present, Prospect, plan
 from bubblefit.runs.poisson import Nu12Study, PartRatios, by_response, ratios, vary_nu12
-from bubblefit.runs.profile import Profile, profile
+from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.result import Fit
+from bubblefit.runs.simulation import FAILED
 from bubblefit.runs.weights import COUNTS, weight_study
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import minimize_scalar
@@ -73,8 +74,8 @@ def test_specimens_drawn_again(tmp_path):
     assert done.analyses == done.before + sum(s.analyses for s in done.samples)
     # Two specimens and eight samples are few.
     assert [(n.kind, n.of) for n in done.notes] == [
-        (NoteKind.FEW_UNITS, "one: warp"), (NoteKind.FEW_UNITS, "one: fill"),
-        (NoteKind.FEW_UNITS, ""),
+        (FEW_UNITS, "one: warp"), (FEW_UNITS, "one: fill"),
+        (FEW_UNITS, ""),
     ]  # fmt: skip
     correlations = done.coefficients()
     assert correlations["unknown"].to_list() == ["beta_3", "beta_7", "beta_11"]
@@ -326,7 +327,7 @@ def test_what_cannot_be_computed_is_left_out_and_named(tmp_path, few, monkeypatc
     found = plan(read_project(constant_strips(tmp_path)), PLANNED, strain=ENDS_PLAN,
                  progress=lambda *event: told.append(event))  # fmt: skip
     assert "fill strip" not in known(found)
-    failed = [note for note in found.notes if note.kind == NoteKind.FAILED]
+    failed = [note for note in found.notes if note.kind == FAILED]
     assert [note.of for note in failed] == ["fill strip"] and "no equilibrium" in failed[0]
     assert [done for done, _, _ in told] == list(range(len(told)))
     assert {total for _, total, _ in told} == {len(told)}
@@ -436,7 +437,7 @@ def test_what_no_test_knows_is_not_closed(tmp_path):
     assert one.allowed == pytest.approx((5.0, 200.0), rel=1e-6)
     assert [one.below.values[-1], one.above.values[-1]] == pytest.approx([5.0, 200.0], rel=1e-6)
     kinds = [note.kind for note in found.notes]
-    assert kinds == [NoteKind.NOT_THE_CARD, NoteKind.NOT_CLOSED, NoteKind.NOT_CLOSED]
+    assert kinds == [NOT_THE_CARD, NOT_CLOSED, NOT_CLOSED]
     assert "moved E1 by -8.3 %" in found.notes[0]
     assert "5 MPa" in found.notes[1]
 
@@ -451,8 +452,8 @@ def test_words_of_what_is_uneven():
     assert one.words.endswith("; asymmetric: 1.96 below, 3.92 above")
     better = replace(one, above=Side((10.0, 12.0), (0.0, -3.0), "bound", 2))
     kinds = {note.kind: str(note) for note in better.notes}
-    assert "another optimum fits the data better" in kinds[NoteKind.NOT_THE_CARD]
-    assert kinds[NoteKind.NOT_CLOSED].startswith("not closed above")
+    assert "another optimum fits the data better" in kinds[NOT_THE_CARD]
+    assert kinds[NOT_CLOSED].startswith("not closed above")
 
 
 def test_the_command_profile(tmp_path):
@@ -552,7 +553,7 @@ def test_all_that_is_told_of_the_responses():
         "a, N": ratios(nu12, [4.4, 3.6], 4.0),
         "long, N": ratios(nu12, [9.0, np.nan], 10.0),
     }
-    note = Note(NoteKind.FAILED, "breaks", "nu12 = 0.45")
+    note = Note(FAILED, "breaks", "nu12 = 0.45")
     part = PartRatios("load", responses, {"0.45": "breaks"}, [note])
     study = Nu12Study(Path("a.toml"), "soft", "bars", 0.24, {"bar": part})
     assert len(study.lines()) == 5 and "0.9000      nan" in study.lines()[3]

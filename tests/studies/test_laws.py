@@ -13,14 +13,14 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import OutputError
+from bubblefit.errors import Note, OutputError, rows
 from bubblefit.materials.forms.polynomial import Polynomial
-from bubblefit.notes import Note, NoteKind, rows
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Report
 from bubblefit.runs import compare
 from bubblefit.runs.compare import (
+    FOLD,
     LOST,
     FoldError,
     FormFit,
@@ -28,6 +28,7 @@ from bubblefit.runs.compare import (
     compare_laws,
 )
 from bubblefit.runs.series import StudyRecord, mark_of
+from bubblefit.solvers.base import SNAP
 
 from ..projects import ELONGATION, MODULI, constant_strips
 
@@ -237,7 +238,7 @@ def form(name: str, coefficients: int, *folds: float | None) -> Form:
         comparisons=[SimpleNamespace(name=part, objective=unit) for part in ("warp", "fill", "b")]
     )
     fit: Any = SimpleNamespace(
-        law=law, problem=problem, objective=9.0, notes=[Note(NoteKind.SNAP, "snaps", "warp")],
+        law=law, problem=problem, objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
         project=SimpleNamespace(title="made"),
         setup=SimpleNamespace(tests=[], objective_is="error"),
         best=SimpleNamespace(ranked=[SimpleNamespace(objective=9.0)]),
@@ -286,6 +287,6 @@ def test_a_fold_that_was_lost_is_told_by_its_number():
     forms = form("constant", 3, 1.0, 2.0), form("cubic", 12, None, 1.0, None)
     said = [(note.kind, note.line) for note in LawComparison(forms, 2).notes]
     assert said == [
-        (NoteKind.SNAP, "constant, warp: snaps"), (NoteKind.SNAP, "cubic, warp: snaps"),
-        (NoteKind.FOLD, f"cubic, fold 1: {LOST}"), (NoteKind.FOLD, f"cubic, fold 3: {LOST}"),
+        (SNAP, "constant, warp: snaps"), (SNAP, "cubic, warp: snaps"),
+        (FOLD, f"cubic, fold 1: {LOST}"), (FOLD, f"cubic, fold 3: {LOST}"),
     ]  # fmt: skip

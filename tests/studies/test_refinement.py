@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import InputError, Note, SolverFailure
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
-from bubblefit.notes import Note, NoteKind
 from bubblefit.reports.study_pages import panels
 from bubblefit.runs.refinement import (
     RMS,
@@ -30,7 +29,8 @@ from bubblefit.runs.refinement import (
     rms_between,
     rms_changes,
 )
-from bubblefit.runs.simulation import Step
+from bubblefit.runs.simulation import FAILED, Step
+from bubblefit.solvers.base import SNAP
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -197,7 +197,7 @@ RUNS = [
 
 
 def study(runs: list[LevelRun], noise: float = 1e-7, what: Any = "elements") -> Refinement:
-    notes = (Note(NoteKind.SNAP, "made up"),)
+    notes = (Note(SNAP, "made up"),)
     return Refinement(Path("a.toml"), "soft", "bars", what, {"bar": runs}, noise, notes)
 
 
@@ -289,7 +289,7 @@ def test_panels():
 )
 def test_notes_name_the_level(what, size):
     failed, own = study(RUNS, what=what).notes
-    assert failed.line == f"bar, {size}: no equilibrium" and failed.kind is NoteKind.FAILED
+    assert failed.line == f"bar, {size}: no equilibrium" and failed.kind is FAILED
     assert own.line == "made up"
 
 

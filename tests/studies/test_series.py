@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.errors import InputError
+from bubblefit.errors import InputError, Note
+from bubblefit.experiments.kinds import BEYOND_CARD, THICKNESS
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import Note, NoteKind
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import read_page_data
@@ -32,6 +32,7 @@ from bubblefit.runs.series import (
     studied_tests,
     thickness_notes,
 )
+from bubblefit.solvers.base import SNAP
 
 from ..bars import BarKind, BarTest, project_of
 from ..commands import in_process, result_in
@@ -87,7 +88,7 @@ def test_the_card_that_is_given(tmp_path):
     assert (card_words(CARD), card_words("own"), card_words(Path("c"))) == ("soft", "own", "c")
     assert thickness_notes(project, CARD) == []
     (note,) = thickness_notes(project, MaterialCard(CARD.law, 0.6))
-    assert note.kind is NoteKind.THICKNESS and "0.6 mm" in note and "0.5 mm" in note
+    assert note.kind is THICKNESS and "0.6 mm" in note and "0.5 mm" in note
 
 
 def test_analyses_are_told_one_after_the_other(bars):
@@ -105,13 +106,13 @@ def test_analyses_are_told_one_after_the_other(bars):
     assert series.notes(history) == []
     short = SimpleNamespace(law=SimpleNamespace(strain_range=[0.09, 1.0, 1.0]))
     series.card = short
-    assert [note.kind for note in series.notes(history)] == [NoteKind.BEYOND_CARD]
+    assert [note.kind for note in series.notes(history)] == [BEYOND_CARD]
 
 
 class Made:
     """The result of a study."""
 
-    notes = (Note(NoteKind.SNAP, "snaps", "one"),)
+    notes = (Note(SNAP, "snaps", "one"),)
     result: ClassVar = {"a": [1]}
 
     def table(self) -> pd.DataFrame:

@@ -11,13 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit import __version__
-from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.errors import InputError, Note, OutputError, SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.notes import Note, NoteKind
 from bubblefit.project.project import read_project
 from bubblefit.runs import verification as subjects
 from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.simulation import FAILED
 from bubblefit.runs.validation import HeldOut, Judged, Validation, held_out, judge_cards, validate
 from bubblefit.runs.verification import (
     SUBJECTS,
@@ -162,15 +162,15 @@ def test_a_law_that_cannot_be_run_is_told(tmp_path, monkeypatch):
     found = held_out(setup.tests[1], law, setup.make_solver)
     assert found.error is None and found.rms == {}
     (note,) = found.notes
-    assert note.kind is NoteKind.FAILED and note.of == "two"
+    assert note.kind is FAILED and note.of == "two"
     assert "too tired" in note
 
 
 UNITS = {"one: warp": "N", "one: fill": "N"}
-FAILED = Note(NoteKind.FAILED, "no analysis: too tired", "two")
+TIRED = Note(FAILED, "no analysis: too tired", "two")
 ONE = HeldOut("one", 0.05, {"one: warp": 12.5, "one: fill": 7.0}, UNITS)
 TWO = HeldOut("two", 0.15, {"two: warp": 30.0}, {"two: warp": "N"})
-LOST = HeldOut("two", None, {}, {"two: warp": "N"}, (FAILED,))
+LOST = HeldOut("two", None, {}, {"two: warp": "N"}, (TIRED,))
 FOUND = Validation(
     "made",
     (

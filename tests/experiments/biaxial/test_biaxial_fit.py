@@ -8,14 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.biaxial.prepared import candidates
-from bubblefit.experiments.kinds import Planning, Precision, Weighting
+from bubblefit.experiments.kinds import UNMATCHED, Planning, Precision, Weighting
 from bubblefit.materials.card import read_card
 from bubblefit.materials.designers import shares
 from bubblefit.materials.forms.ratio import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations
-from bubblefit.notes import NoteKind
 from bubblefit.runs.compare import candidates as candidate_laws
 from bubblefit.runs.fit import check
 from bubblefit.runs.result import Fit
@@ -53,7 +52,7 @@ def test_the_law_behind_the_strains_is_found(fitted):
 
 def test_nothing_is_known_of_the_shear_and_it_is_said(fitted):
     assert fitted.best.certainty.sigma["G12"].min() > 1.0
-    told = [str(note) for note in fitted.notes if note.kind == NoteKind.UNMATCHED]
+    told = [str(note) for note in fitted.notes if note.kind == UNMATCHED]
     assert any("nothing of G12" in words for words in told)
     assert fitted.best.reached[2] < 1e-3 and fitted.best.reached[0] > 0.02
 

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import report as figures
-from bubblefit.experiments.bubble.findings import match_warnings
+from bubblefit.experiments.bubble.findings import INVERSE_CRIME, SURFACES, match_warnings
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.bubble.report import misfit_table, residuals, surface_tables
 from bubblefit.experiments.kinds import FittedTest, Output
-from bubblefit.notes import NoteKind
 from bubblefit.project.project import read_project
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
@@ -142,6 +141,6 @@ def test_what_is_warned_of_before_the_numbers_are_used(by_this_model):
         prepared: Any = SimpleNamespace(test=test, by_this_model=by_this_model)
         return [note.kind for note in match_warnings(prepared)]
 
-    crime = [NoteKind.INVERSE_CRIME] * by_this_model
+    crime = [INVERSE_CRIME] * by_this_model
     assert told("points", 4) == told("points", 6) == told("surfaces", 6) == crime
-    assert told("surfaces", 5) == [*crime, NoteKind.SURFACES]
+    assert told("surfaces", 5) == [*crime, SURFACES]

@@ -14,7 +14,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import findings as sheet_report
 from bubblefit.experiments.bubble import report
-from bubblefit.experiments.bubble.findings import NOT_BELIEVED
+from bubblefit.experiments.bubble.findings import FLAT_SHEET, NOT_BELIEVED
 from bubblefit.experiments.bubble.objective import (
     FieldObjective,
     FieldTarget,
@@ -27,7 +27,6 @@ from bubblefit.experiments.kinds import Output
 from bubblefit.inference.comparison import Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
-from bubblefit.notes import NoteKind
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.fit import fit
@@ -415,7 +414,7 @@ def test_the_line_for_the_terminal(sheet, words):
 def test_a_sheet_of_which_nothing_is_known(sheet, warned):
     test = SimpleNamespace(known=None, test=SimpleNamespace(sheet=sheet))
     assert [(n.kind, str(n)) for n in sheet_report.sheet_warnings(test)] == [
-        (NoteKind.FLAT_SHEET, sheet_report.NOT_BELIEVED)
+        (FLAT_SHEET, sheet_report.NOT_BELIEVED)
     ] * warned
     test.known = "a law"
     assert sheet_report.sheet_warnings(test) == []

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.errors import SOLVER, Note, NoteKind
 from bubblefit.experiments.cylinder import report as figures
 from bubblefit.experiments.cylinder import report as page
 from bubblefit.experiments.cylinder.predicted import (
@@ -19,11 +20,11 @@ from bubblefit.experiments.cylinder.predicted import (
     terminal_table,
 )
 from bubblefit.experiments.kinds import Output
-from bubblefit.notes import Note, NoteKind
 from bubblefit.readers.bending import BendingCurve, BendingError
 from bubblefit.reports.content import Table
 from bubblefit.reports.cylinders import bending_charts
-from bubblefit.solvers.base import BandEnd
+from bubblefit.solvers.base import EARLY, SNAP, BandEnd
+from bubblefit.solvers.calculix.cylinder import GAS
 
 from ...cylinder_cases import ENDS
 from ...drawings import caught
@@ -126,7 +127,7 @@ def test_curves_and_readings():
 
 def test_the_terminals_table():
     runs = [
-        run("150/140", "soft", "", NoteKind.SNAP, NoteKind.GAS),
+        run("150/140", "soft", "", SNAP, GAS),
         run("200", "a stiff card"),
         run("250", "soft", "no equilibrium"),
     ]
@@ -181,7 +182,7 @@ def run_page(
     **record: Any,
 ) -> SimpleNamespace:
     said = SimpleNamespace(**({"failure": "", "early": "", "seconds": seconds} | record))
-    kinds = (NoteKind.EARLY, NoteKind.SNAP) if said.early else (NoteKind.GAS, NoteKind.SOLVER)
+    kinds = (EARLY, SNAP) if said.early else (GAS, SOLVER)
     notes = tuple(Note(kind, "words") for kind in kinds)
     return SimpleNamespace(
         test=test, card=card, notes=notes, record=said, end=end, wall=end.name if end else "",

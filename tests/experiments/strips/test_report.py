@@ -10,16 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.kinds import CardRun, Output
+from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, Output
 from bubblefit.experiments.strips import report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip
 from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective
-from bubblefit.experiments.strips.report import examine, load_table, misfit_table
+from bubblefit.experiments.strips.report import LEFT_OUT, examine, load_table, misfit_table
 from bubblefit.experiments.strips.test import StripsTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
-from bubblefit.notes import NoteKind
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -86,13 +85,13 @@ def test_findings():
     assert found.summary == "RMS errors in N: warp 3.54, bias 7.07, together 10.61"
     left_out = "3 points beyond the final length (or before zero) were left out"
     assert [(n.kind, str(n), n.of) for n in found.warnings] == [
-        (NoteKind.UNMATCHED, "no fill strip of s is matched: E2 rests on the other directions", ""),
-        (NoteKind.READING, "a note", ""),
-        (NoteKind.READING, "another", ""),
-        (NoteKind.LEFT_OUT, left_out, "warp"),
+        (UNMATCHED, "no fill strip of s is matched: E2 rests on the other directions", ""),
+        (READING, "a note", ""),
+        (READING, "another", ""),
+        (LEFT_OUT, left_out, "warp"),
     ]
     test.match_by = "polynomial"
-    assert [n.kind for n in findings(test, [fitted()]).warnings].count(NoteKind.LEFT_OUT) == 0
+    assert [n.kind for n in findings(test, [fitted()]).warnings].count(LEFT_OUT) == 0
 
 
 def test_tables():
