@@ -23,9 +23,9 @@ from ..experiments.strips.gauge import (
 )
 from ..files import replacing
 from ..project.project import read_project
+from ..readers.fields import Sphere, fit_sphere, points_of
 from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
-from ..readers.surfaces import Sphere, fit_sphere, points_of
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .columns import LENGTH_UNITS, LOAD_UNITS
 from .frames import FrameSource
 from .machine_tables import (
     AS_FOUND,
@@ -22,28 +21,24 @@ from .machine_tables import (
     read_machine_table,
     source_of,
 )
+from .tables import LENGTH_UNITS, LOAD_UNITS
 
 Array = NDArray[np.float64]
 Zero = Literal["none", "first", "line"]
-
 #: N per kg of the weights on the strap, and N in one of each unit of load.
 GRAVITY = 9.80665
 FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
-#: Readings that the straight line of zero = "line" goes through.
-FIRST_READINGS = 4
-#: Of the largest load among them: what the line must rise by, to be more than rounding.
-RISES = 1e-6
+#: Readings that the straight line of zero = "line" goes through, and the share of the largest load
+#: among them that it must rise by, to be more than rounding.
+FIRST_READINGS, RISES = 4, 1e-6
 #: Why readings are left out.
 UNLOADING = "after the largest deflection"
 
 
 @dataclass(frozen=True, eq=False)
 class BendingCurve:
-    """One repetition of a bending test, as far as it was loaded.
-
-    deflection, load : (n,) mm and N, by rising deflection. dropped : counts of readings left out.
-    """
+    """One repetition as far as it was loaded: (n,) mm and N, by rising deflection."""
 
     repetition: str
     deflection: Array
@@ -91,36 +86,25 @@ def read_bending_curves(
         if len(rows) < 2:
             raise InputError(path, at, f"repetition {name!r} has one reading; expected two or more")
         full = f"{path.stem} {name}" if which else name
-        own = BendingCurve(full, way[rows], force[rows], path, source=source)
-        curves.append(_zeroed(own, zero, at))
-    return tuple(_loading(curve) for curve in curves)
+        moved = way[rows] - _start(way[rows], force[rows], zero, path, at, full)
+        # Sorted up to the largest deflection: noise is no unloading.
+        order = np.argsort(moved[: int(np.argmax(moved)) + 1], kind="stable")
+        after = len(rows) - len(order)
+        dropped = {UNLOADING: after} if after else {}
+        curves.append(BendingCurve(full, moved[order], force[rows][order], path, dropped, source))
+    return tuple(curves)
 
 
-def _zeroed(curve: BendingCurve, zero: Zero, at: str) -> BendingCurve:
-    if zero == "none":
-        return curve
-    start = float(curve.deflection[0])
-    if zero == "line":
-        x, y = curve.deflection[:FIRST_READINGS], curve.load[:FIRST_READINGS]
-        slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
-        if not slope * np.ptp(x) > RISES * np.abs(y).max():
-            problem = f"the first readings of {curve.repetition!r} do not rise: no zero to be found"
-            raise InputError(curve.path, at, problem)
-        start = float(-intercept / slope)
-    return replace(curve, deflection=curve.deflection - start)
-
-
-def _loading(curve: BendingCurve) -> BendingCurve:
-    """Return the readings up to the largest deflection, sorted (noise is no unloading)."""
-    part = slice(int(np.argmax(curve.deflection)) + 1)
-    order = np.argsort(curve.deflection[part], kind="stable")
-    after = len(curve.load) - len(order)
-    return replace(
-        curve,
-        deflection=curve.deflection[part][order],
-        load=curve.load[part][order],
-        dropped={UNLOADING: after} if after else {},
-    )
+def _start(way: Array, force: Array, zero: Zero, path: Path, at: str, name: str) -> float:
+    """Return the deflection that counts as zero, mm."""
+    if zero != "line":
+        return float(way[0]) if zero == "first" else 0.0
+    x, y = way[:FIRST_READINGS], force[:FIRST_READINGS]
+    slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
+    if not slope * np.ptp(x) > RISES * np.abs(y).max():
+        problem = f"the first readings of {name!r} do not rise: no zero to be found"
+        raise InputError(path, at, problem)
+    return float(-intercept / slope)
 
 
 PLACES = 61  # of the grid
@@ -128,11 +112,7 @@ PLACES = 61  # of the grid
 
 @dataclass(frozen=True, eq=False)
 class BendingScatter:
-    """Repetitions on one grid of deflections (k,) mm.
-
-    mean, deviation : (k,) N over the `count` (k,) repetitions that reach so far; deviation NaN for
-    one.
-    """
+    """Mean and deviation (k,) N of the repetitions (`count`) that reach each deflection, mm."""
 
     deflection: Array
     mean: Array
@@ -142,10 +122,9 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """Errors of a model's curve at the readings that it reaches.
+    """Errors of a model's curve at the readings that it reaches: N, positive where too stiff.
 
-    rms, mean : N; the mean is positive where the model is too stiff. relative : rms over the
-    largest load read. compared, beyond : readings up to the model's last deflection, and after it.
+    relative : rms over the largest load read. beyond : readings after the model's last deflection.
     """
 
     rms: float
@@ -180,10 +159,7 @@ def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScat
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """Return the model's load less that read, over its range; None where it reaches no load.
-
-    deflection, load : (frames,) mm, rising, and N, of the model.
-    """
+    """Return the load of a model (frames,) N less that read; None where it reaches no load."""
     x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
     way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
     read = np.concatenate([c.load for c in curves]) if curves else np.empty(0)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +14,6 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .columns import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
 from .frames import FrameSource
 from .machine_tables import (
     MachineTable,
@@ -25,25 +25,17 @@ from .machine_tables import (
     source_of,
 )
 from .registry import read_file
+from .tables import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
 
+Array = NDArray[np.float64]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
-
 #: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
-
 #: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
 #: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
 DIRECTION_ALIASES: Mapping[str, str] = {
-    "warp": "warp",
-    "fill": "fill",
-    "weft": "fill",
-    "bias": "bias",
-    "bias45": "bias",
-    "45bias": "bias",
-    "45": "bias",
-    "45deg": "bias",
-    "45degree": "bias",
-    "45degreebias": "bias",
+    **{"warp": "warp", "fill": "fill", "weft": "fill"},
+    **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias".split(), "bias"),
 }
 
 
@@ -57,10 +49,10 @@ class LoadCurve:
 
     direction: str
     specimen: str
-    elongation: NDArray[np.float64]
-    load: NDArray[np.float64]
+    elongation: Array
+    load: Array
     path: Path | None
-    time: NDArray[np.float64] | None = None
+    time: Array | None = None
     frame: NDArray[np.intp] | None = None
     notes: tuple[str, ...] = ()
     source: FrameSource | None = None
@@ -136,8 +128,7 @@ def read_load_curves(
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     """Return the specimens of a series that lists them one after the other without names.
 
-    A specimen starts where the elongation falls below half of the largest before; so not for tests
-    that unload. They are called by the series' name and a number from 1.
+    One starts where the elongation falls below half of the largest before: not for cyclic tests.
     """
     u, starts, reached = curve.elongation, [0], 0.0
     for i, value in enumerate(u):
@@ -146,20 +137,13 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
             reached = 0.0
         # Noise about zero, before the load comes on, is no restart.
         reached = max(reached, value if value > 1e-2 * u.max() else 0.0)
-    parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(u)], strict=True)]
     return tuple(
-        LoadCurve(
-            curve.direction,
-            f"{curve.specimen} {number}",
-            u[part],
-            curve.load[part],
-            curve.path,
-            None if curve.time is None else curve.time[part],
-            notes=curve.notes,
-            source=curve.source,
+        replace(
+            curve, specimen=f"{curve.specimen} {number}", elongation=u[a:b], load=curve.load[a:b],
+            time=None if curve.time is None else curve.time[a:b], frame=None,
         )
-        for number, part in enumerate(parts, start=1)
-    )
+        for number, (a, b) in enumerate(pairwise([*starts, len(u)]), start=1)
+    )  # fmt: skip
 
 
 def _labels(
@@ -188,18 +172,14 @@ def _labels(
     return labels
 
 
-Array = NDArray[np.float64]
-
 MAX_ORDER = 12  # beyond, the powers of one elongation tell nothing apart
 
 
 @dataclass(frozen=True, eq=False)
 class LoadPolynomial:
-    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ...
+    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ... in N over mm, up to `end` mm.
 
-    coefficients : (order + 1,) N, N/mm ..., lowest power first. end : mm, the largest elongation
-    fitted. r_squared : about the mean load, as in Table 3.1; rmse : N; both NaN, and points 0,
-    where unknown.
+    r_squared : about the mean load, as in Table 3.1. rmse : N; both NaN, points 0, if unknown.
     """
 
     coefficients: Array
@@ -245,10 +225,9 @@ def fit_load_polynomial(
 
 @dataclass(frozen=True)
 class SpecimenScatter:
-    """Deviations of specimens from one polynomial, in N.
+    """Deviations (N) of specimens from one polynomial: rms and mean of each, rmse over all points.
 
-    rms, mean : of load - P(u), one a specimen. rmse : over all points. deviation : standard
-    deviation over all points about their own mean (n - 1): the published 21.7, 64.1 and 40.3 N.
+    deviation : of all points about their own mean (n - 1): the published 21.7, 64.1 and 40.3 N.
     """
 
     specimens: tuple[str, ...]
@@ -305,11 +284,7 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
 
 @dataclass(frozen=True, eq=False)
 class PublishedPolynomial:
-    """One direction's load over gauge elongation.
-
-    gauge_length, final_length : mm, of the virtual strain gauge. polynomial : without R^2, RMSE and
-    points. scatter : N, standard deviation of the specimens, or NaN.
-    """
+    """One direction's load over elongation of a gauge (mm); scatter of specimens in N, or NaN."""
 
     direction: str
     gauge_length: float

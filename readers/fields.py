@@ -1,4 +1,7 @@
-"""Displacement fields of a bubble, as a stereo image correlation (DIC) exports them."""
+"""Displacement fields of a bubble from image correlation, and surfaces through measured points.
+
+Polynomial surfaces are those of the thesis, section 4.2, Eq. 4.4; spheres those of Eq. A.6.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .frames import LOST, Frame, FrameOptions, FrameSource, read_frames
+from .tables import TextTable, read_table, write_table
 
+Array = NDArray[np.float64]
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
 QUANTITIES = ("x", "y", "dx", "dy", "dz")
-#: How a table of exactly these columns is read.
-PLAIN = FrameOptions(QUANTITIES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +32,11 @@ class DisplacementField:
     """
 
     pressure: float
-    points: NDArray[np.float64]
-    displacement: NDArray[np.float64]
+    points: Array
+    displacement: Array
     dropped: Mapping[str, int] = field(default_factory=dict)
-    z: NDArray[np.float64] | None = None
-    sigma: NDArray[np.float64] | None = None
+    z: Array | None = None
+    sigma: Array | None = None
     path: Path | None = None
     source: FrameSource = field(default_factory=FrameSource)
 
@@ -58,8 +61,7 @@ def read_fields(
     """Read one frame a pressure.
 
     A first frame in which nothing moves is left out where there is one frame too many in one file.
-    pressures : MPa. columns, flag_column, comment, length_scale : see `frames.FrameOptions`;
-    options stands in their place. frames : numbers from 0 of the frames taken; all unless given.
+    pressures : MPa. options : stands in place of columns to length_scale. frames : numbers from 0.
     """
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
@@ -75,43 +77,255 @@ def read_fields(
     if len(read) != len(pressures):
         problem = f"expected one frame for each of {len(pressures)} pressures, found {len(read)}"
         raise InputError(None, "files", problem)
-    return tuple(
-        field_of(frame, float(pressure), options)
-        for frame, pressure in zip(read, pressures, strict=True)
-    )
+    return tuple(_field_of(*one) for one in zip(read, map(float, pressures), strict=True))
 
 
-def read_field(
-    path: Path | str, pressure: float, options: FrameOptions = PLAIN, format: str | None = None
-) -> DisplacementField:
-    """Read the field of one file, at a pressure in MPa."""
-    frames = read_frames([path], options, format)
-    if len(frames) != 1:
-        raise InputError(path, "", f"expected one frame, one a pressure; found {len(frames)}")
-    return field_of(frames[0], pressure, options)
-
-
-def field_of(frame: Frame, pressure: float, options: FrameOptions = PLAIN) -> DisplacementField:
+def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]
     # A height that no row has was not measured; one that some rows lack was lost there.
     measured = bool(np.isfinite(z).any())
     values = np.concatenate([frame.points[:, : 2 + measured], frame.displacement], axis=1)
-    whole = np.isfinite(values).all(axis=1)
-    lost = int((~whole).sum())
-    dropped = {**frame.dropped, **({LOST: frame.dropped.get(LOST, 0) + lost} if lost else {})}
+    whole, dropped = np.isfinite(values).all(axis=1), dict(frame.dropped)
+    if not whole.all():
+        dropped[LOST] = dropped.get(LOST, 0) + int((~whole).sum())
     if not whole.any():
-        why = (
-            ", ".join(f"{count} {reason}" for reason, count in dropped.items()) or "there are none"
-        )
-        raise InputError(frame.path, "", f"no row is left to use: {why}")
+        why = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
+        raise InputError(frame.path, "", f"no row is left to use: {why or 'there are none'}")
     return DisplacementField(
-        pressure,
-        frame.points[whole, :2],
-        frame.displacement[whole],
-        dropped,
-        z[whole] if measured else None,
-        None if frame.sigma is None else frame.sigma[whole],
-        frame.path,
-        frame.source,
-    )
+        pressure, frame.points[whole, :2], frame.displacement[whole], dropped,
+        z[whole] if measured else None, None if frame.sigma is None else frame.sigma[whole],
+        frame.path, frame.source,
+    )  # fmt: skip
+
+
+def powers(points: Array, degree: int) -> Array:
+    """Return terms (n, (degree + 1)^2) of Eq. 4.4 at points (n, 2), highest powers first."""
+    x = np.vander(points[:, 0], degree + 1)
+    y = np.vander(points[:, 1], degree + 1)
+    return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
+
+
+def total_power(degree: int) -> NDArray[np.intp]:
+    """Return i + j of each term x^i y^j, ((degree + 1)^2,)."""
+    falling = np.arange(degree, -1, -1)
+    return (falling[:, None] + falling).ravel()
+
+
+AXES = ("x", "y", "z")
+MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
+LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfaces.csv
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementSurface:
+    """Three polynomials F(x, y), one a direction of displacement, at one pressure (MPa).
+
+    coefficients : (3, (degree + 1)^2) mm, of x / scale and y / scale in the order of Eq. 4.4: x^d
+    y^d first, powers of x falling fastest. scale : mm, the largest coordinate fitted. r_squared :
+    (3,) as in Table 4.1.
+    """
+
+    pressure: float
+    degree: int
+    coefficients: Array
+    scale: float
+    r_squared: Array
+
+    def evaluate(self, points: Array) -> Array:
+        """Return displacement (n, 3) mm at reference points (n, 2) mm."""
+        return powers(np.asarray(points) / self.scale, self.degree) @ self.coefficients.T
+
+    @property
+    def physical(self) -> Array:
+        """Return coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
+        return self.coefficients / self.scale ** total_power(self.degree)
+
+
+def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
+    """Fit Eq. 4.4, of any degree, to a displacement field by least squares."""
+    if not 0 <= degree <= MAX_DEGREE:
+        raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
+    terms, count = (degree + 1) ** 2, len(field.points)
+    at = f"surface of degree {degree} at {field.pressure * 1e3:g} kPa"
+    if count < terms:
+        problem = f"{terms} coefficients need as many points, there are {count}; lower the degree"
+        raise InputError(None, at, problem)
+    scale = float(np.abs(field.points).max()) or 1.0
+    term = powers(field.points / scale, degree)
+    # Columns of length one: x^8 y^8 is at most 1/256 on a disk, and no less a term for that.
+    length = np.linalg.norm(term, axis=0)
+    length[length == 0] = 1.0
+    solution, _, rank, _ = np.linalg.lstsq(term / length, field.displacement, rcond=1e-13)
+    if rank < terms:
+        lie = f"the {count} points lie so that they settle only {rank} of {terms} coefficients"
+        raise InputError(None, at, f"{lie} (on too few lines?); lower the degree")
+    coefficients = (solution / length[:, None]).T
+    value, left = field.displacement, field.displacement - term @ coefficients.T
+    about_mean = ((value - value.mean(axis=0)) ** 2).sum(axis=0)
+    remaining = (left**2).sum(axis=0)
+    # A constant direction (a clamped one, all zeros) has nothing to explain.
+    nothing = about_mean <= 1e-24 * (value**2).sum(axis=0)
+    share = np.divide(remaining, about_mean, out=np.zeros_like(remaining), where=~nothing)
+    return DisplacementSurface(field.pressure, degree, coefficients, scale, 1.0 - share)
+
+
+def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) -> None:
+    """Write surfaces.csv: R^2, degree, scale, C0 ... of Eq. 4.4, with x, y and F in mm."""
+    most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
+    rows: list[list[object]] = []
+    for s in surfaces:
+        for direction, r_squared, c in zip(AXES, s.r_squared, s.physical, strict=True):
+            lead = [float(s.pressure), direction, float(r_squared), s.degree, float(s.scale)]
+            rows.append(lead + c.tolist() + [""] * (most - len(c)))
+    write_table(path, [*LEADING, *(f"C{i}" for i in range(most))], rows)
+
+
+def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
+    """Read what `write_surfaces` wrote, equal to rounding."""
+    table = read_table(path)
+    direction = table.text("direction")
+    count = len(direction) // 3
+    if tuple(direction) != AXES * count:
+        problem = "expected three rows a pressure, in the order x, y, z"
+        raise InputError(table.path, "column 'direction'", problem)
+    which = np.arange(len(direction)) // 3
+    return tuple(_surface_of(table.rows(which == k)) for k in range(count))
+
+
+def _surface_of(table: TextTable) -> DisplacementSurface:
+    names = ("pressure_MPa", "degree", "scale_mm")
+    pressure, degree, scale = (table.constant(name) for name in names)
+    at = f"line {table.lines[0]}"
+    if degree not in range(MAX_DEGREE + 1):
+        raise InputError(table.path, at, f"expected a degree 0 to {MAX_DEGREE}, got {degree:g}")
+    if not scale > 0:
+        raise InputError(table.path, at, f"expected a scale above 0 mm, got {scale:g}")
+    falling = total_power(int(degree))
+    physical = np.stack([table.numbers(f"C{i}") for i in range(len(falling))], axis=1)
+    with np.errstate(over="ignore"):
+        coefficients = physical * scale**falling
+    if not np.isfinite(coefficients).all():
+        raise InputError(table.path, at, f"coefficients too large for a scale of {scale:g} mm")
+    return DisplacementSurface(pressure, int(degree), coefficients, scale, table.numbers("R2"))
+
+
+#: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.
+LEAST_POINTS = 10
+#: Of the points in the plane across their thinnest direction: below, they are flat for any noise. A
+#: radius larger than so many times the points' extent is noise of points in a plane.
+FLAT, LARGEST = 1e-9, 100.0
+#: Points farther off than so many robust standard deviations are left out, at most so many times.
+SIGMAS, ROUNDS = 4.0, 20
+#: So many spheres, through so many points each, are tried for a start, and judged by so many.
+TRIES, FEW, JUDGES = 200, 8, 2000
+#: Median of |normal deviate|.
+MEDIAN = 0.6744897501960817
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """The sphere through the points (n, 3) mm of one frame.
+
+    centre : (3,) mm. centre_error, radius_error : standard errors, as if the errors of the points
+    were independent. deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
+    """
+
+    centre: Array
+    radius: float
+    centre_error: Array
+    radius_error: float
+    deviation: Array
+    kept: NDArray[np.bool_]
+    points: Array
+    path: Path | None = None
+
+    @property
+    def rms(self) -> float:
+        """Return the RMS deviation of the points used, mm."""
+        return float(np.sqrt(np.mean(self.deviation[self.kept] ** 2)))
+
+    @property
+    def left_out(self) -> int:
+        """Return the number of points too far off to be used."""
+        return int((~self.kept).sum())
+
+
+def points_of(frame: Frame) -> Array:
+    """Return the surface (n, 3) mm in this frame: reference places, moved where known."""
+    moved = np.isfinite(frame.displacement).any()
+    places = frame.points + frame.displacement if moved else frame.points
+    return np.asarray(places[np.isfinite(places).all(axis=1)])
+
+
+def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
+    """Fit the sphere with the least sum of squared distances from points (n, 3) in mm.
+
+    Points farther off than four robust standard deviations are left out, until none is.
+    """
+    if len(points) < LEAST_POINTS:
+        raise InputError(path, "", f"expected {LEAST_POINTS} points or more, got {len(points)}")
+    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spans[2] <= FLAT * spans[0]:
+        raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")
+    kept = _inside(points, *_start(points))
+    for _ in range(ROUNDS):
+        centre, radius = _distances_least(points[kept], *_linear(points[kept]), path)
+        inside = _inside(points, centre, radius)
+        if (inside == kept).all():
+            break
+        kept = inside
+    deviation = np.linalg.norm(points - centre, axis=1) - radius
+    slopes = _slopes(points[kept], centre)
+    variance = float(np.sum(deviation[kept] ** 2)) / (int(kept.sum()) - 4)
+    errors = np.sqrt(variance * np.diag(np.linalg.inv(slopes.T @ slopes)))
+    return Sphere(centre, radius, errors[:3], float(errors[3]), deviation, kept, points, path)
+
+
+def _start(points: Array) -> tuple[Array, float]:
+    """Return the best of spheres through a few points each: stray points spoil that of all."""
+    draw = np.random.default_rng(0)
+    some = points[draw.permutation(len(points))[:JUDGES]]
+    found = [_linear(points[draw.choice(len(points), FEW, replace=False)]) for _ in range(TRIES)]
+    found.append(_linear(points))
+    off = [np.median(np.abs(np.linalg.norm(some - c, axis=1) - r)) for c, r in found]
+    return found[int(np.argmin(off))]
+
+
+def _inside(points: Array, centre: Array, radius: float) -> NDArray[np.bool_]:
+    """Return the mask (n,) of points that are not too far off."""
+    off = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
+    # Points without noise are off by rounding: none of them is astray.
+    return np.asarray(off <= max(SIGMAS * float(np.median(off)) / MEDIAN, 1e-9 * radius))
+
+
+def _linear(points: Array) -> tuple[Array, float]:
+    """Solve Eq. A.6, about the mean of the points so that it is well conditioned."""
+    middle = points.mean(axis=0)
+    near = points - middle
+    matrix = np.column_stack([2 * near, np.ones(len(near))])
+    found = np.linalg.lstsq(matrix, np.sum(near**2, axis=1), rcond=None)[0]
+    centre = found[:3]
+    return middle + centre, float(np.sqrt(max(found[3] + centre @ centre, 0.0)))
+
+
+def _slopes(points: Array, centre: Array) -> Array:
+    """Return (n, 4) d distance / d (centre, radius)."""
+    arms = points - centre
+    lengths = np.linalg.norm(arms, axis=1)
+    return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])
+
+
+def _distances_least(
+    points: Array, centre: Array, radius: float, path: Path | None
+) -> tuple[Array, float]:
+    for _ in range(100):
+        off = np.linalg.norm(points - centre, axis=1) - radius
+        step = np.linalg.lstsq(_slopes(points, centre), -off, rcond=None)[0]
+        centre, radius = centre + step[:3], radius + float(step[3])
+        if np.linalg.norm(step) <= 1e-12 * max(abs(radius), 1.0):
+            break
+    if not 0 < radius < LARGEST * float(np.ptp(points, axis=0).max()):
+        problem = "the points are so nearly in a plane that no sphere is told by them"
+        raise InputError(path, "", problem)
+    return centre, radius

@@ -19,31 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind
-from .columns import LONGEST, split_unit
 from .registry import read_file
+from .tables import LONGEST, called, split_unit
 
 #: Kinds of notes that are made here.
 ORDER = NoteKind("order of frames")
 
 
 Array = NDArray[np.float64]
-
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
-
 #: Why rows of a file are not used: what a table of provenance calls it.
-FLAGGED = "flagged as doubtful"
-NEGATIVE_SIGMA = "sigma below zero"
-ALL_ZERO = "all zero"
-LOST = "without a value"
+FLAGGED, NEGATIVE_SIGMA = "flagged as doubtful", "sigma below zero"
+ALL_ZERO, LOST = "all zero", "without a value"
 
 
 @dataclass(frozen=True)
 class FrameSource:
-    """A record of what was read from a file.
-
-    columns, units : by quantity, as the file names them. notes : choices that were made.
-    """
+    """A record of what was read from a file; columns and units by quantity, as it has them."""
 
     format: str = ""
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -56,15 +49,14 @@ class Frame:
     """A surface in one frame.
 
     points, displacement : (m, 3) mm, in the reference state; NaN where correlation was lost.
-    dropped : counts of rows left out, by reason. sigma : (m,) the correlation's own measure of
-    error.
+    dropped : counts of rows left out, by reason. sigma : (m,) the correlation's measure of error.
     """
 
-    points: NDArray[np.float64]
-    displacement: NDArray[np.float64]
+    points: Array
+    displacement: Array
     path: Path | None = None
     dropped: Mapping[str, int] = field(default_factory=dict)
-    sigma: NDArray[np.float64] | None = None
+    sigma: Array | None = None
     source: FrameSource = field(default_factory=FrameSource)
 
     def __post_init__(self) -> None:
@@ -110,11 +102,7 @@ class FrameOptions:
 def read_frames(
     files: Sequence[Path | str], options: FrameOptions = FrameOptions(), format: str | None = None
 ) -> tuple[Frame, ...]:
-    """Read frames in the order of the files; most formats have one a file.
-
-    Exports that write zeros for the displacement only where correlation was lost need a flag
-    column.
-    """
+    """Read frames in the order of the files; most formats have one a file."""
     if not files:
         raise InputError(None, "files", "expected one file a frame, got none")
     found: list[Frame] = []
@@ -136,7 +124,6 @@ LENGTHS = {
     **dict.fromkeys(("in", "inch", "inches", "zoll"), 25.4),
 }
 PIXELS = frozenset({"px", "pix", "pixel", "pixels"})
-
 _AXES = {
     **dict(zip("xyz", "xyz", strict=True)),
     **{name: f"d{axis}" for axis, name in zip("xyz", "uvw", strict=True)},
@@ -158,11 +145,7 @@ _UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGN
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading: name and unit of the file, quantity, and state of a coordinate.
-
-    quantity : one of `QUANTITIES`, sigma, valid, invalid, or "". state : "reference", "deformed" or
-    "".
-    """
+    """A column's heading; quantity : one of `QUANTITIES`, sigma, valid, invalid or ""."""
 
     name: str
     unit: str
@@ -176,12 +159,10 @@ class Heading:
 
 
 def heading_of(name: str, unit: str = "") -> Heading:
-    """Return what a column holds.
+    """Return what a column holds; a unit in its name comes before one from a row of units.
 
     >>> heading_of("disp.Horizontal Displacement U [mm]").quantity
     'dx'
-
-    unit : from a row of units below the names; one in the name itself comes first.
     """
     if len(name) > LONGEST:
         return Heading(name, unit, "")
@@ -196,18 +177,16 @@ def heading_of(name: str, unit: str = "") -> Heading:
         return Heading(name, unit, "sigma")
     if whole in _VALID or whole in _INVALID:
         return Heading(name, unit, "valid" if whole in _VALID else "invalid")
-    axes = _AXES | _VECTOR if unit.casefold() in LENGTHS else _AXES
+    length = unit.casefold() in LENGTHS
+    axes = _AXES | _VECTOR if length else _AXES
     found = [axes[word] for word in words if word in axes]
     others = {word for word in words if word not in axes}
-    if len(found) != 1 or others - _MOVED - _REFERENCE - _DEFORMED - _FILLING:
-        return Heading(name, unit, "")
-    if unit and unit.casefold() not in LENGTHS and unit.casefold() not in PIXELS:
+    strange = others - _MOVED - _REFERENCE - _DEFORMED - _FILLING
+    if len(found) != 1 or strange or not (length or unit.casefold() in PIXELS | {""}):
         return Heading(name, unit, "")
     quantity = found[0]
-    if quantity in "xyz" and others & _MOVED:
-        return Heading(name, unit, f"d{quantity}")
-    if quantity not in "xyz":
-        return Heading(name, unit, quantity)
+    if quantity not in "xyz" or others & _MOVED:
+        return Heading(name, unit, f"d{quantity[-1]}")
     state = "reference" if others & _REFERENCE else "deformed" if others & _DEFORMED else ""
     return Heading(name, unit, quantity, state)
 
@@ -221,17 +200,14 @@ def columns_of(
     all, unless `upper`: then, of two names that differ in case, the large one is the length.
     """
     places: dict[str, list[int]] = {}
+    names = [heading.name for heading in headings]
     taken = [name.strip() for name in named.values()]
     for index, heading in enumerate(headings):
         if heading.quantity and heading.name not in taken:
-            key = heading.quantity
-            key += " deformed" if heading.state == "deformed" else ""
-            places.setdefault(key, []).append(index)
+            deformed = " deformed" if heading.state == "deformed" else ""
+            places.setdefault(heading.quantity + deformed, []).append(index)
     found = {key: _best(headings, where, key, upper) for key, where in places.items()}
-    for quantity, name in named.items():
-        exact = [i for i, one in enumerate(headings) if one.name == name.strip()]
-        plain = [i for i, one in enumerate(headings) if split_unit(one.name)[0] == name.strip()]
-        found[quantity] = exact or plain
+    found |= {quantity: called(names, name.strip()) for quantity, name in named.items()}
     return {key: where for key, where in found.items() if where or key in named}
 
 
@@ -240,13 +216,13 @@ def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) 
     if own and not upper:
         return own
 
-    def rank(index: int) -> tuple[int, int]:
+    def rank(index: int) -> tuple[int, bool]:
         heading = headings[index]
         pixels = heading.unit.casefold() in PIXELS
-        size = int(upper and not heading.name[:1].isupper())
-        return (2 if pixels else int(bool(heading.scale is None)), size)
+        small = upper and not heading.name[:1].isupper()
+        return 2 if pixels else int(not heading.scale), small
 
-    best = min(rank(i) for i in where)
+    best = min(map(rank, where))
     return [i for i in where if rank(i) == best]
 
 
@@ -255,9 +231,8 @@ class FrameRows:
     """One frame as its file has it.
 
     values : (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
-    valid, sigma : (rows,) flags of the file, and its measure of error, below zero where correlation
-    was lost. camera_axes : whether y points down and z away from the camera. dropped : counts of
-    rows that are not in `values`, by reason.
+    valid, sigma : (rows,) flags, and measure of error, below zero where correlation was lost.
+    camera_axes : y points down and z away from the camera. dropped : counts of rows left out.
     """
 
     values: Mapping[str, Array]
@@ -289,13 +264,9 @@ def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) ->
         if set(missing) <= {"z", "dz"}:
             problem = f"planar correlation, without {' and '.join(missing)}; a stereo one is needed"
         raise InputError(path, "", problem)
-    count = int(keep.sum())
-    table = np.full((count, 6), np.nan)
-    for index, quantity in enumerate(QUANTITIES):
-        if quantity in values:
-            table[:, index] = values[quantity]
-    camera_axes = rows.camera_axes if options.camera_axes is None else options.camera_axes
-    if camera_axes:
+    unknown = np.full(int(keep.sum()), np.nan)
+    table = np.column_stack([values.get(quantity, unknown) for quantity in QUANTITIES])
+    if rows.camera_axes if options.camera_axes is None else options.camera_axes:
         table[:, [1, 2, 4, 5]] *= -1.0
         notes.append("y and z are turned over: in the file y points down, z away from the camera")
     named = {name: unit for name, unit in rows.units.items() if unit}
@@ -315,29 +286,26 @@ def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path) -> Arr
 
 def _kept(rows: FrameRows, values: Mapping[str, Array]) -> tuple[NDArray[np.bool_], dict[str, int]]:
     """Return the mask of rows that are points, and counts of the others by reason."""
-    count = len(next(iter(values.values())))
-    keep = np.ones(count, dtype=bool)
-    dropped = {name: number for name, number in rows.dropped.items() if number}
     zero = np.all([value == 0 for value in values.values()], axis=0)
+    keep = np.ones(len(zero), dtype=bool)
+    dropped = {name: number for name, number in rows.dropped.items() if number}
     at_rest = all((np.nan_to_num(v) == 0).all() for name, v in values.items() if name[0] == "d")
     if at_rest and zero.sum() == 1:
         zero[:] = False
-    reasons = [(FLAGGED, None if rows.valid is None else ~rows.valid)]
-    reasons += [(NEGATIVE_SIGMA, None if rows.sigma is None else rows.sigma < 0), (ALL_ZERO, zero)]
+    reasons = [(FLAGGED, ~keep if rows.valid is None else ~rows.valid)]
+    reasons += [(NEGATIVE_SIGMA, ~keep if rows.sigma is None else rows.sigma < 0), (ALL_ZERO, zero)]
     for reason, bad in reasons:
-        more = 0 if bad is None else int((bad & keep).sum())
-        if bad is not None and more:
-            dropped[reason] = dropped.get(reason, 0) + more
+        if (bad & keep).any():
+            dropped[reason] = dropped.get(reason, 0) + int((bad & keep).sum())
             keep &= ~bad
     return keep, dropped
 
 
 def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str]) -> None:
-    """Return reference places and displacements, each computed from the other where missing."""
+    """Add reference places and displacements, each computed from the other where missing."""
     if options.coordinates == "deformed":
-        for axis in "xyz":
-            if axis in values:
-                values[f"{axis} deformed"] = values.pop(axis)
+        for axis in {*"xyz"} & {*values}:
+            values[f"{axis} deformed"] = values.pop(axis)
     after = [axis for axis in "xyz" if f"{axis} deformed" in values]
     back = [axis for axis in after if axis not in values and f"d{axis}" in values]
     forth = [axis for axis in after if axis in values and f"d{axis}" not in values]
@@ -346,9 +314,8 @@ def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str])
     for axis in forth:
         values[f"d{axis}"] = values[f"{axis} deformed"] - values[axis]
     if back:
-        notes.append(
-            f"{', '.join(back)} are places in the deformed state; the displacement is taken off"
-        )
+        state = "are places in the deformed state; the displacement is taken off"
+        notes.append(f"{', '.join(back)} {state}")
     if forth:
         notes.append(f"displacements along {', '.join(forth)} are deformed less reference places")
     if options.planar and not {"z", "dz", "z deformed"} & set(values):
@@ -359,14 +326,10 @@ def _complete(values: dict[str, Array], options: FrameOptions, notes: list[str])
 def frame_files(
     given: Sequence[str], field: str = "files", folder: Path | None = None
 ) -> tuple[list[Path], Note | None]:
-    """Return the files, and a note where their order may be unintended.
-
-    Files of patterns are sorted by the numbers in their names (frame 2 before frame 10). Raises
-    InputError: no match, no such file, a folder, a file given twice.
-    """
+    """Return the files, those of a pattern by the numbers in their names; a note on order."""
     files: list[Path] = []
-    for own in given:
-        name = own if folder is None else str(folder / own)
+    names = [own if folder is None else str(folder / own) for own in given]
+    for own, name in zip(given, names, strict=True):
         if not os.path.exists(name) and glob.has_magic(name):
             # The folder's own name is no pattern.
             wanted = own if folder is None else str(Path(glob.escape(str(folder))) / own)
@@ -382,17 +345,13 @@ def frame_files(
     for i, file in enumerate(files):
         if file in files[:i]:
             raise InputError(file, field, "is given twice")
-    plain = [str(name if folder is None else folder / name) for name in given]
     by_number = sorted(files, key=_numbers)
-    as_shell = list(map(str, files)) == plain and sorted(files, key=str) == files != by_number
+    as_shell = list(map(str, files)) == names and sorted(files, key=str) == files != by_number
     if not as_shell:  # which sorts frame_10 before frame_2
         return files, None
     first, second = next((a, b) for a, b in zip(files, by_number, strict=True) if a != b)
-    words = (
-        f"frames in the order given: {first.name} before {second.name}; quote the pattern to have"
-        " them by number"
-    )
-    return files, Note(ORDER, words)
+    order = f"frames in the order given: {first.name} before {second.name}"
+    return files, Note(ORDER, f"{order}; quote the pattern to have them by number")
 
 
 def _numbers(file: Path) -> list[tuple[bool, int, str]]:

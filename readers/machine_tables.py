@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .columns import LOAD_UNITS, TIME_UNITS, columns_of, nearest_to_strip, scale_of
 from .frames import FrameSource
 from .registry import format_of, read_file
-from .tables import TextTable
+from .tables import LOAD_UNITS, TIME_UNITS, TextTable, columns_of, nearest_to_strip, scale_of
 
 Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
@@ -23,11 +22,7 @@ NEEDED = ("elongation", "load")
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Options of a reader of machine tables.
-
-    columns : the file's names of some quantities. quantities : those that the table must hold.
-    comment : of lines to skip. decimal : the mark; None finds it.
-    """
+    """Names of columns, quantities that a table must hold, comment, decimal mark."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     quantities: Sequence[str] = NEEDED
@@ -37,10 +32,7 @@ class TableOptions:
 
 @dataclass(frozen=True, eq=False)
 class MachineTable:
-    """A table as the file has it.
-
-    units : by column, "" for none. header : line of the names. notes : choices that were made.
-    """
+    """A table as the file has it: units by column, line of the names, notes of choices made."""
 
     table: TextTable
     units: Mapping[str, str]
@@ -59,18 +51,18 @@ def read_machine_table(
 def column_of(
     found: MachineTable, quantity: str, named: Mapping[str, str], needed: Sequence[str] = NEEDED
 ) -> str:
-    """Return the name of the one column that holds a quantity; "" where it may be absent and is.
+    """Return the name of the column that holds a quantity; "" where it may be absent and is.
 
-    Times are looked for only where they are named or needed. Of several elongations, the one that
-    was measured nearest to the strip (`choice_of`).
+    Times are looked for where named or needed; of several elongations the nearest to the strip.
     """
     names = [str(name) for name in found.table.cells.columns]
-    if quantity == "time" and quantity not in (*named, *needed):
+    may_lack = quantity not in (*named, *needed)
+    if quantity == "time" and may_lack:
         return ""
     which = columns_of(names, quantity, named)
     if quantity == "elongation" and quantity not in named:
         which = nearest_to_strip(names, which)
-    if len(which) == 1 or (not which and quantity not in (*named, *needed)):
+    if len(which) == 1 or (not which and may_lack):
         return names[which[0]] if which else ""
     there = ", ".join(name for name in names if name)[:300]
     several = " or ".join(repr(names[i]) for i in which[:6])
@@ -102,11 +94,7 @@ def source_of(
     format: str | None,
     notes: Sequence[str] = (),
 ) -> FrameSource:
-    """Return the record of what was read from a table.
-
-    columns : by quantity, "" for absent ones. asked : units by quantity, for columns that name
-    none.
-    """
+    """Return the record of what was read: columns by quantity, units of those that name none."""
     taken = {quantity: column for quantity, column in columns.items() if column}
     units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
     name = format or format_of("machine table", found.table.path).name
@@ -121,16 +109,16 @@ def measured(
     kind : length or load. units : mm or N per unit. asked : the caller's unit, None to take the
     file's. Raises InputError: no, an unknown or another unit; cells that are not finite numbers.
     """
-    path, at = found.table.path, f"line {found.header}, column {column!r}"
+    path, at, known = found.table.path, f"line {found.header}, column {column!r}", ", ".join(units)
     if asked is not None and asked not in units:
-        raise InputError(None, f"{kind}_unit", f"expected one of {', '.join(units)}, got {asked!r}")
+        raise InputError(None, f"{kind}_unit", f"expected one of {known}, got {asked!r}")
     unit = found.units[column]
     if not unit and asked is None:
-        problem = f"the file does not name the unit; say {kind}_unit, one of {', '.join(units)}"
+        problem = f"the file does not name the unit; say {kind}_unit, one of {known}"
         raise InputError(path, at, problem)
     scale = scale_of(unit or asked or "", units)
     if scale is None:
-        problem = f"unit {unit[:20]!r} is not one of {', '.join(units)}; convert the column"
+        problem = f"unit {unit[:20]!r} is not one of {known}; convert the column"
         raise InputError(path, at, problem)
     if asked is not None and scale != units[asked]:
         problem = f"the file says {unit!r}, {kind}_unit says {asked!r}; correct one of them"
@@ -161,11 +149,7 @@ def read_machine_loads(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> MachineLoads:
-    """Read the loads of an export, whatever else it holds; the table is found as for curves.
-
-    columns : the file's own names of `load` and `time`. timed : read the times too. load_unit :
-    where the file names none.
-    """
+    """Read the loads of an export, with `timed` the times too; its table is found as for curves."""
     path, named = Path(path), dict(columns or {})
     needed = ("load", "time") if timed else ("load",)
     found = read_machine_table(path, TableOptions(named, needed, comment, decimal), format)
@@ -180,10 +164,7 @@ def read_times(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> Array:
-    """Read times (n,) in s, one a row, such as those of pictures in the camera's log.
-
-    column : its name in the file, where finding is ambiguous.
-    """
+    """Read times (n,) in s, one a row, such as those of pictures in the camera's log."""
     named = {} if column is None else {"time": column}
     found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
     return _times(found, named, ("time",))
@@ -192,16 +173,13 @@ def read_times(
 def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
     """Return the column of times in s; where no unit is named, they are seconds."""
     name = column_of(found, "time", named, needed)
-    unit = found.units[name]
     at_the_end = re.search(rf"[_\s]({'|'.join(TIME_UNITS)})$", name)
-    if not unit and at_the_end:
-        unit = at_the_end[1]
-    scale = TIME_UNITS.get(unit or "s")
-    if scale is None:
+    unit = found.units[name] or (at_the_end[1] if at_the_end else "s")
+    if unit not in TIME_UNITS:
         at = f"line {found.header}, column {name!r}"
         problem = f"unit {unit[:20]!r} is not one of {', '.join(TIME_UNITS)}; convert the column"
         raise InputError(found.table.path, at, problem)
-    return found.table.numbers(name) * scale
+    return found.table.numbers(name) * TIME_UNITS[unit]
 
 
 @dataclass(frozen=True)
@@ -233,13 +211,11 @@ def channel_values(
 def in_unit(
     readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
 ) -> Array:
-    """Return readings (rows,), converted by the table `units`.
+    """Return readings (rows,), converted by `units`; `own` is the unit that the file names.
 
-    own : the unit that the file names, "" for none. Raises InputError: no or an unknown unit, two
-    units, a scale for what needs none.
+    Raises InputError: no, an unknown or two units, a scale for what needs none.
     """
-    known = dict(units)
-    said = scale_of(own, known) if own else None
+    known, said = ", ".join(units), scale_of(own, units) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
     if factor != 1.0 and said is not None:
@@ -247,11 +223,11 @@ def in_unit(
     unit = channel.unit or ("" if raw and said is None else own)
     if not unit:
         what = "after scaling" if raw else "of the readings"
-        raise InputError(path, at, f"say the unit {what}, one of {', '.join(known)}")
-    scale = scale_of(unit, known)
+        raise InputError(path, at, f"say the unit {what}, one of {known}")
+    scale = scale_of(unit, units)
     if scale is None:
         advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
-        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {', '.join(known)}; {advice}")
+        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {known}; {advice}")
     if channel.unit and own and (not raw or said is not None) and said != scale:
         problem = f"the file says {own!r}, the project {channel.unit!r}; correct one of them"
         raise InputError(path, at, problem)

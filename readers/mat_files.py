@@ -1,31 +1,35 @@
-"""Variables of MATLAB's files as plain data, from version 5 and from version 7.3 (HDF5).
+"""Variables of MATLAB's files, version 5 and 7.3, and members of HDF5 files, read with suspicion.
 
 A numeric or logical array becomes an array, text a str, a cell array a list, a struct array a list
-of dicts; both lists run along the first index first. Objects of MATLAB's classes become None: they
-cannot be read without MATLAB.
+of dicts; both lists run along the first index first. Objects of MATLAB's classes become None.
 
 Version 5 is parsed here, after MathWorks' "MAT-File Format", and not by scipy.io: on a damaged or
 hostile file scipy 1.17 crashes the process (an unknown type of numbers, deep nesting) or runs for
-minutes (counts of 2^31 cells); tests/readers/test_mat_files.py holds these files.
+minutes (counts of 2^31 cells); tests/readers/test_hostile_frames.py holds these files. HDF5 needs
+h5py, an extra (`pip install "bubblefit[hdf5]"`); nothing outside the file is read.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import content_of
-from .hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
+from ..files import content_of, ends
 
-#: Bytes that one compressed variable may have when it is unpacked: at most, always, and by what it
-#: has packed (numbers do not pack a hundredfold).
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+#: Within which a file of HDF5 must be read once.
+SECONDS = 60.0
+#: Bytes of one array at most, a compressed one's always, and by what it has packed (numbers do
+#: not pack a hundredfold).
 LARGEST, SMALL, RATIO = 2**30, 2**26, 100
 #: Cells and structs within each other; parts of a variable of 7.3, which may refer to each other.
 DEEPEST, MOST_PARTS = 16, 10**5
@@ -63,20 +67,6 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     if head[512:520] == SIGNATURE:
         check_readable(path, partial(_variables_73, path, wanted))
         return _variables_73(path, wanted)
-    return _variables_5(path, wanted)
-
-
-def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
-    """Return an array of numbers among variables or fields."""
-    value = where.get(name)
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
-        there = ", ".join(where)[:200]
-        problem = f"expected an array of numbers; there are: {there}"
-        raise InputError(path, f"variable {name!r}", problem)
-    return value.astype(float)
-
-
-def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     found = {}
     for name, order, body in _parts_5(path, wanted):
         try:
@@ -85,6 +75,15 @@ def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
             problem = f"cannot be read; is the file damaged? ({str(error)[:100]})"
             raise InputError(path, f"variable {name!r}", problem) from None
     return found
+
+
+def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
+    """Return an array of numbers among variables or fields."""
+    value = where.get(name)
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
+        problem = f"expected an array of numbers; there are: {', '.join(where)[:200]}"
+        raise InputError(path, f"variable {name!r}", problem)
+    return value.astype(float)
 
 
 def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tuple[str, str, bytes]]:
@@ -120,10 +119,7 @@ def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tupl
 
 
 class MatrixParts:
-    """Read the parts of one matrix in turn; ValueError or struct.error where it is damaged.
-
-    content : from behind the matrix' own tag. order : of the bytes, "<" or ">".
-    """
+    """Read the parts of one matrix in turn; ValueError or struct.error where it is damaged."""
 
     def __init__(self, content: bytes, order: str) -> None:
         self.content, self.order, self.at = content, order, 0
@@ -168,7 +164,7 @@ class MatrixParts:
             return self.structs(count, depth)
         numbers = self.numbers()
         if kind == _CHARACTERS:
-            return "".join(chr(int(n)) for n in numbers[:4096] if 0 < n < 0x110000)
+            return _text(numbers)
         if not _FIRST_NUMBER <= kind <= _LAST_NUMBER or numbers.size != count:
             raise ValueError(f"{numbers.size} numbers for a shape of {shape[:8]}")
         value = numbers.reshape(shape, order="F")
@@ -198,11 +194,8 @@ class MatrixParts:
         names = [text[i : i + length].split(b"\0")[0].decode("latin-1") for i in starts]
         if not names:
             return []
-        values = self.several(count * len(names), depth)
-        width = len(names)
-        return [
-            dict(zip(names, values[i * width : (i + 1) * width], strict=True)) for i in range(count)
-        ]
+        values = iter(self.several(count * len(names), depth))
+        return [{name: next(values) for name in names} for _ in range(count)]
 
 
 def _names_73(path: Path) -> list[str]:
@@ -214,18 +207,12 @@ def _variables_73(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     with open_hdf5(path) as file:
         parts = iter(range(MOST_PARTS))
         there = {name: member(path, file, name) for name in wanted}
-        return {
-            name: _of_hdf5(path, item, name, 0, parts)
-            for name, item in there.items()
-            if item is not None
-        }
+        found = {name: item for name, item in there.items() if item is not None}
+        return {name: _of_hdf5(path, item, name, 0, parts) for name, item in found.items()}
 
 
 def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
-    """Return the value of a variable of version 7.3.
-
-    parts : runs out when too many have been read.
-    """
+    """Return the value of a variable of version 7.3; `parts` runs out when too many are read."""
     import h5py
 
     if depth > DEEPEST or next(parts, None) is None:
@@ -236,7 +223,15 @@ def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int])
             key: _of_hdf5(path, field, f"{name}.{key}"[-200:], depth + 1, parts)
             for key, field in fields.items()
         }
-        return _structs(values, fields)
+        # The elements of a struct array: each field is a list of references.
+        listed = [
+            isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype
+            and "MATLAB_class" not in field.attrs for field in fields.values()
+        ]  # fmt: skip
+        if not (values and all(listed)):
+            return [values]
+        count = min(len(value) for value in values.values())
+        return [{key: value[i] for key, value in values.items()} for i in range(count)]
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode("latin-1") if isinstance(kind, bytes) else str(kind)
     if item.dtype == h5py.ref_dtype:
@@ -253,21 +248,63 @@ def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int])
         return "" if kind == "char" else np.zeros((0, 0))
     value = array_of(path, item, name).T
     if kind == "char":
-        return "".join(chr(int(n)) for n in value.ravel(order="F")[:4096] if 0 < n < 0x110000)
+        return _text(value.ravel(order="F"))
     return value != 0 if kind == "logical" else value
 
 
-def _structs(values: dict[str, Any], fields: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the elements of a struct array; each field is a list of references."""
+def _text(numbers: np.ndarray) -> str:
+    return "".join(chr(int(n)) for n in numbers[:4096] if 0 < n < 0x110000)
+
+
+def check_readable(path: Path, read: Callable[[], object]) -> None:
+    """Try a reading, picklable, in another process: HDF5 loops or crashes on some damaged files."""
+    if not ends(read, SECONDS):
+        problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
+        raise InputError(path, "", problem)
+
+
+@contextmanager
+def open_hdf5(path: Path) -> Iterator[Any]:
+    """Open a file, as an `h5py.File`."""
+    try:
+        import h5py
+    except ImportError:
+        install = "install it with: pip install 'bubblefit[hdf5]'"
+        raise InputError(path, "", f"is an HDF5 file, which needs h5py; {install}") from None
+    if not path.is_file():
+        raise InputError(path, "", "no such file")
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except InputError:
+        raise
+    except (OSError, RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
+        why = " ".join(str(error).split())[:150]
+        raise InputError(path, "", f"cannot be read as HDF5; is it damaged? ({why})") from None
+
+
+def member(path: Path, group: Any, name: str) -> Any:
+    """Return the object below a group by its path; None where there is none."""
     import h5py
 
-    listed = [
-        isinstance(field, h5py.Dataset)
-        and field.dtype == h5py.ref_dtype
-        and "MATLAB_class" not in field.attrs
-        for field in fields.values()
-    ]
-    if not (values and all(listed)):
-        return [values]
-    count = min(len(value) for value in values.values())
-    return [{key: value[i] for key, value in values.items()} for i in range(count)]
+    here = group
+    for part in name.split("/"):
+        if not isinstance(here, h5py.Group) or part not in here:
+            return None
+        if isinstance(here.get(part, getlink=True), h5py.ExternalLink):
+            raise InputError(path, name, "is a link to another file, which is not followed")
+        here = here[part]
+    return here
+
+
+def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
+    """Read a dataset's numbers, which must lie in this file."""
+    import h5py
+
+    if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiub":
+        raise InputError(path, name, "expected an array of numbers")
+    if dataset.is_virtual or dataset.external:
+        raise InputError(path, name, "its numbers are in another file, which is not read")
+    if dataset.size is None or dataset.size * max(dataset.dtype.itemsize, 8) > LARGEST:
+        raise InputError(path, name, f"says it holds {dataset.shape} numbers; is it damaged?")
+    return np.asarray(dataset[()], dtype=float)

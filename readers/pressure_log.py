@@ -1,23 +1,27 @@
-"""A log of pressures with its own clock, and the pressures of a camera's frames.
+"""Pressures of a camera's frames: in the names of files, in files, by a log with its own clock.
 
 At the right offset of the clocks, heights of the frames and pressures are rising functions of each
 other; at a wrong one they are not, wherever the pressure was held, released, or raised faster or
 slower. Both functions are found by isotonic regression, with the sheet at rest at the least
 pressure of the log: where the pressure was raised in equal steps, a step later would else do as
 well.
+
+Outline: the log, heights, offset of the clocks, choice of frames, numbers in names and in files.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .columns import PRESSURE_UNITS, TIME_UNITS
+from ..files import ends
 from .frames import Frame
 from .machine_tables import (
     AS_FOUND,
@@ -25,11 +29,22 @@ from .machine_tables import (
     TableOptions,
     channel_values,
     column_of,
+    in_unit,
     read_machine_table,
 )
+from .tables import (
+    HOLES,
+    MOST_NAMES,
+    NUMBER,
+    PRESSURE_UNITS,
+    TIME_UNITS,
+    is_number,
+    read_lines,
+    split_unit,
+)
+from .text_frames import SEPARATORS, TOP, Lines, cells_of
 
 Array = NDArray[np.float64]
-
 #: The apex of a frame is what moved most; so large a share of the points moved less, lest a stray
 #: point be it.
 APEX = 0.98
@@ -46,10 +61,7 @@ class PressureLog:
 
 @dataclass(frozen=True)
 class LogOptions:
-    """Options of a log; what is not given is found.
-
-    pressure : volts become a pressure by its scale, offset and unit. time : seconds unless named.
-    """
+    """Options of a log: volts become a pressure by scale, offset, unit; time is in s."""
 
     pressure: Channel = AS_FOUND
     time: Channel = AS_FOUND
@@ -60,16 +72,15 @@ class LogOptions:
 
 def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
     """Read a log as a test machine's table."""
-    channels: Mapping[str, Channel] = {"time": options.time, "pressure": options.pressure}
+    channels = {"time": options.time, "pressure": options.pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
-    needed = ("time", "pressure")
-    asked = TableOptions(named, needed, options.comment, options.decimal)
+    asked = TableOptions(named, ("time", "pressure"), options.comment, options.decimal)
     found = read_machine_table(path, asked, options.format)
-    column = column_of(found, "pressure", named, needed)
-    pressure = channel_values(found, column, options.pressure, PRESSURE_UNITS)
-    column, clock = column_of(found, "time", named, needed), options.time
+    columns = {key: column_of(found, key, named, asked.quantities) for key in channels}
+    pressure = channel_values(found, columns["pressure"], options.pressure, PRESSURE_UNITS)
+    column, clock = columns["time"], options.time
     if not found.units[column] and clock.unit is None:
-        clock = Channel(clock.column, "s", clock.scale, clock.offset)
+        clock = replace(clock, unit="s")
     time = channel_values(found, column, clock, TIME_UNITS)
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
@@ -165,18 +176,18 @@ def offset_misfits(
     t, h = times[order], heights[order]
     h = np.where(h > _rest_height(h), h, 0.0)
     rest = float(np.quantile(pressures, BELOW))
-
-    def misfit(offset: float) -> float:
-        return misfit_of(log_at(offset, t, log_times, pressures), h, rest)
-
     coarse = _offsets(t, log_times)
     h = h ** straightest(h, [log_at(s, t, log_times, pressures) for s in coarse])
-    misfits = np.array([misfit(s) for s in coarse])
+
+    def misfits_at(offsets: Array) -> Array:
+        each = [misfit_of(log_at(s, t, log_times, pressures), h, rest) for s in offsets]
+        return np.array(each)
+
+    misfits = misfits_at(coarse)
     step = coarse[1] - coarse[0]
     fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
     fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
-    offsets = np.concatenate([coarse, fine])
-    misfits = np.append(misfits, [misfit(s) for s in fine])
+    offsets, misfits = np.concatenate([coarse, fine]), np.append(misfits, misfits_at(fine))
     order = np.argsort(offsets, kind="stable")
     return offsets[order], misfits[order]
 
@@ -184,18 +195,13 @@ def offset_misfits(
 def _offsets(t: Array, log_times: Array) -> Array:
     """Return the offsets at which enough frames lie within the log, half a frame apart."""
     enough = int(np.ceil(WITHIN * len(t)))
-    least = log_times[0] - t[len(t) - enough]
-    most = log_times[-1] - t[enough - 1]
+    least, most = log_times[0] - t[len(t) - enough], log_times[-1] - t[enough - 1]
     if least > most:
-        problem = (
-            f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s; are the units of"
-            " time and the rate right?"
-        )
-        raise InputError(None, "", problem)
+        lasts = f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s"
+        raise InputError(None, "", f"{lasts}; are the units of time and the rate right?")
     gaps = np.diff(t)
     step = float(np.median(gaps[gaps > 0])) / 2 if (gaps > 0).any() else most - least
-    count = 2 + int(min((most - least) / step if step else 0, MOST))
-    return np.linspace(least, most, count)
+    return np.linspace(least, most, 2 + int(min((most - least) / step if step else 0, MOST)))
 
 
 def _rest_height(h: Array) -> float:
@@ -204,10 +210,9 @@ def _rest_height(h: Array) -> float:
     return min(float(h.min()) + SIGMAS * noise, AT_REST * float(h.max()))
 
 
-#: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude.
-FLOOR = 1e-6
-#: Offsets of a misfit up to so many times the smallest may be the right one.
-AS_GOOD = 2.0
+#: Noise that no measurement is without, as a share of the variance: 0.1 % of the amplitude. Offsets
+#: of a misfit up to so many times the smallest may be the right one.
+FLOOR, AS_GOOD = 1e-6, 2.0
 #: Misfit above which the heights do not follow the pressures; mean doubt of the frames' pressures,
 #: as a share of their range, above which the offset is not known.
 WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
@@ -278,11 +283,11 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     most, least = np.where(inside, each, -np.inf), np.where(inside, each, np.inf)
     some, doubt = inside.any(axis=0), np.full(each.shape[1], np.nan)
     doubt[some] = (most.max(axis=0) - least.min(axis=0))[some] / 2
-    span = float(np.ptp(there[np.isfinite(there)]))
-    if float(np.nanmean(doubt)) > MOST_DOUBT * span:
+    mean = float(np.nanmean(doubt))
+    if mean > MOST_DOUBT * float(np.ptp(there[np.isfinite(there)])):
         problem = (
             f"cannot be found: offsets from {may_be[0]:.2f} to {may_be[-1]:.2f} s do as well, and"
-            f" leave the frames' pressures uncertain by {1e3 * np.nanmean(doubt):.3g} kPa on"
+            f" leave the frames' pressures uncertain by {1e3 * mean:.3g} kPa on"
             " average; give it in s. Where the pressure was held, released or began to rise while"
             " frames were taken, it can be found"
         )
@@ -292,14 +297,11 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
 
 
 #: Why frames are not looked at.
-BEYOND = "without a pressure: beyond the log"
-AT_REST_FRAME_CHOICE = "at no pressure"
-RELEASED = "after the largest pressure"
-REPEATED = "at a pressure that another frame has"
-#: Pressures that differ by less than this share of the largest are one.
-SAME = 1e-6
-#: How far from an asked pressure a frame may be, as a share of the largest asked one.
-TOLERANCE = 0.02
+BEYOND, AT_REST_FRAME_CHOICE = "without a pressure: beyond the log", "at no pressure"
+RELEASED, REPEATED = "after the largest pressure", "at a pressure that another frame has"
+#: Pressures that differ by less than this share of the largest are one; how far from an asked
+#: pressure a frame may be, as a share of the largest asked one.
+SAME, TOLERANCE = 1e-6, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,8 +322,7 @@ def choose_frames(
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
     pressures : (frames,) MPa, NaN where unknown. asked : MPa, rising. tolerance : MPa; 2 % of the
-    largest asked one unless given. in_time : leave out frames after the largest pressure, those of
-    the release.
+    largest asked one unless given. in_time : leave out the release.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)
@@ -383,3 +384,154 @@ def _spread(pressures: Array, able: NDArray[np.intp], count: int) -> list[int]:
         free = able[first : len(able) - (count - 1 - number)]
         taken.append(int(free[np.argmin(np.abs(pressures[free] - level))]))
     return taken
+
+
+#: One repeat in a pattern ends soon on any name; of several it is seen whether they do (s).
+SEARCH_SECONDS = 5.0
+_REPEATS = re.compile(r"[*+?{]")
+#: Without a sign: in a name it is a dash.
+_UNSIGNED = r"\d+(?:[.,]\d+)?"
+
+
+def _searched(pattern: str, path: Path) -> re.Match[str] | None:
+    return re.search(pattern, path.name)
+
+
+def number_in_name(
+    path: Path,
+    units: Mapping[str, float],
+    pattern: str | None = None,
+    unit: str | None = None,
+    field: str = "",
+) -> float:
+    """Return the number in a file's name, times what its unit is in `units`.
+
+    pattern : with one group; None takes the one number before a unit (`step_012_35.5kPa.csv`).
+    unit : of the number of the pattern; none is 1. field : the pattern's name in errors.
+    """
+    if pattern is not None:
+        hard = len(_REPEATS.findall(pattern)) > 1
+        if hard and not ends(partial(_searched, pattern, path), SEARCH_SECONDS):
+            problem = f"the pattern {pattern!r} takes too long; repeat (+, *) less in it"
+            raise InputError(path, field, problem)
+        found = _searched(pattern, path)
+        if found is None:
+            raise InputError(path, field, f"the file's name does not fit the pattern {pattern!r}")
+        try:
+            return _float(found[1] or "") * (1.0 if unit is None else units[unit])
+        except ValueError:
+            problem = f"expected a number in the group of {pattern!r}, found {found[1]!r}"
+            raise InputError(path, field, problem) from None
+    known = "|".join(sorted(units, key=len, reverse=True))
+    # A letter after the unit makes it a word: "12max" is not 12 m.
+    every = re.findall(rf"({_UNSIGNED})[ _]?({known})(?![^\W\d_])", path.stem)
+    if len(every) != 1:
+        seen = " and ".join(f"{number} {name}" for number, name in every) or "none"
+        problem = (
+            f"expected one number with its unit ({', '.join(units)}) in the file's name, found "
+            f"{seen}; a pattern with one group says where it is"
+        )
+        raise InputError(path, field, problem)
+    number, name = every[0]
+    return _float(number) * units[name]
+
+
+def _float(cell: str) -> float:
+    return float(cell.replace(",", "."))
+
+
+def check_pattern(pattern: str) -> str | None:
+    """Return the fault of a pattern, None where there is none."""
+    try:
+        groups = re.compile(pattern).groups
+    except re.error as error:
+        return f"is no regular expression ({error}): {pattern!r}"
+    if groups != 1:
+        return f"expected one group, in brackets, around the number; {pattern!r} has {groups}"
+    return None
+
+
+#: Units of readings that a scale makes something of; letters of a line that are looked at.
+VOLTS, LONGEST = ("V", "mV"), 1000
+
+
+def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> float:
+    """Return the value that `channel.column` names: of a column, or of a line above the numbers.
+
+    Such as `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
+    """
+    name = channel.column or ""
+    lines = read_lines(path, "", any_encoding=True)  # with comments: a value may stand in one
+    found = _in_column(path, lines, name) or _above(path, lines, name, (*units, *VOLTS))
+    if found is None:
+        says = f"neither a column {name!r} nor a line above the numbers that says {name!r}"
+        raise InputError(path, "", f"{says} and a value")
+    value, unit, at = found
+    return float(in_unit(np.array([value]), unit, channel, units, path, at)[0])
+
+
+def _in_column(path: Path, lines: Lines, name: str) -> tuple[float, str, str] | None:
+    for separator in SEPARATORS:
+        for index, (number, text) in enumerate(lines[:TOP]):
+            if name not in text:
+                continue
+            names = [cell.lstrip("# ") for cell in cells_of(text, separator) or []]
+            where = [i for i, cell in enumerate(names) if name in (cell, split_unit(cell)[0])]
+            below = [cells_of(text, separator) or [] for _, text in lines[index + 1 : index + 3]]
+            header = 2 <= len(names) <= MOST_NAMES and not any(map(is_number, names))
+            if not header or not any(
+                len(row) >= len(names) - 1 and 2 * sum(map(is_number, row)) >= len(names)
+                for row in below
+            ):
+                continue
+            if len(where) > 1:
+                problem = f"{len(where)} columns are called {name!r}"
+                raise InputError(path, f"line {number}", problem)
+            if where:
+                return _constant(path, lines[index:], separator, names[where[0]], where[0])
+    return None
+
+
+def _constant(
+    path: Path, lines: Lines, separator: str | None, name: str, column: int
+) -> tuple[float, str, str]:
+    """Return the one value of a column, its unit and place; `lines` begin with the names."""
+    unit, first, head = split_unit(name)[1], None, lines[0][0]
+    for number, text in lines[1:]:
+        row = cells_of(text, separator) or []
+        cell, at = row[column] if column < len(row) else "", f"line {number}, column {name!r}"
+        if not is_number(cell):
+            # The row of units stands right below the names.
+            if first is None and number <= head + 2 and cell:
+                unit = cell.strip("()[]<>{} ")
+            elif cell.casefold() not in HOLES:
+                raise InputError(path, at, f"expected a number, found {cell[:40]!r}")
+        elif first is None:
+            first = _float(cell), number
+        elif _float(cell) != first[0]:
+            problem = f"expected the same number as in line {first[1]}, one a file"
+            raise InputError(path, at, problem)
+    if first is None:
+        raise InputError(path, f"line {head}, column {name!r}", "holds no number")
+    return first[0], unit, f"line {head}, column {name!r}"
+
+
+def _above(
+    path: Path, lines: Lines, name: str, units: Sequence[str]
+) -> tuple[float, str, str] | None:
+    """Find a line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
+    known = "|".join(sorted(units, key=len, reverse=True))
+    says = re.compile(
+        rf"(?<!\w){re.escape(name)}(?:_({known}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
+        rf"[\s:=;,]*({NUMBER})(?:[\s;,]*({known})(?!\w))?"
+    )
+    every = [(found, line) for line, text in lines[:TOP] if (found := says.search(text[:LONGEST]))]
+    if not every:
+        return None
+    values = {_float(found[3]) for found, _ in every}
+    if len(values) > 1:
+        first, second = every[0][1], every[1][1]
+        raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
+    found, line = every[0]
+    own = found[1] or found[2] or found[4] or split_unit(name)[1]
+    return values.pop(), own.strip(), f"line {line}"

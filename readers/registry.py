@@ -25,10 +25,8 @@ from ..files import PlugIn, check_regular, names_with, plug_in_named, plug_ins
 #:     which load curves, loads and bending curves are taken alike;
 #: load polynomials : `read(path)`, `curves.PublishedPolynomial` by direction.
 Content = Literal["frame", "machine table", "load polynomials"]
-
 #: How much of a file a format may look at to recognise it, bytes.
 HEAD = 65536
-
 log = logging.getLogger(__name__)
 
 
@@ -36,8 +34,7 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of data files.
 
-    name : of `format =` in a project. read : see `Content`. recognises : tests a file by its path
-    and first `HEAD` bytes; None for the format that takes what no other recognises.
+    read : see `Content`. recognises : by path and first `HEAD` bytes; None takes all others.
     """
 
     name: str
@@ -68,11 +65,7 @@ def format_names(content: Content) -> tuple[str, ...]:
 
 
 def format_named(content: Content, name: str) -> Format:
-    """Return the format of this name, ours or that of a plug-in.
-
-    Raises InputError: there is none of that name, or it is of another content. PlugInFailure: a
-    plug-in that does not work.
-    """
+    """Return the format of this name, ours or that of a plug-in."""
     for one in formats(content):
         if one.name == name:
             return one
@@ -87,13 +80,10 @@ def format_named(content: Content, name: str) -> Format:
 
 
 def format_of(content: Content, path: Path | str) -> Format:
-    """Return the format of a file by its content: ours first, then those of plug-ins.
-
-    Plug-ins that do not work are logged and passed over.
-    """
-    path = Path(path)
-    head = _head(path)
-    ours = formats(content)
+    """Return the format of a file by its content: ours first, then those of plug-ins that work."""
+    path, head, ours = Path(path), b"", formats(content)
+    with suppress(OSError), path.open("rb") as file:
+        head = file.read(HEAD)
     for group in (ours, _working(content)):
         able = [one for one in group if one.recognises is not None and one.recognises(path, head)]
         if len(able) > 1:
@@ -119,15 +109,6 @@ def _import_formats() -> None:
 
     for module in iter_modules(folder.__path__):
         import_module(f"{folder.__name__}.{module.name}")
-
-
-def _head(path: Path) -> bytes:
-    """Return the first bytes; none of a file that cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return file.read(HEAD)
-    except OSError:
-        return b""
 
 
 def _working(content: Content) -> Iterator[Format]:

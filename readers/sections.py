@@ -17,17 +17,14 @@ PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
 LengthUnit = Literal["mm", "m"]
 LoadUnit = Literal["N", "kN"]
 Name = Annotated[str, Field(min_length=1, max_length=300)]
-
 #: MPa per unit.
 MODULUS_UNITS: dict[str, float] = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
 #: MPa per unit.
 PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
 #: mm per unit.
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0}
-
 #: Beyond, products of a few numbers overflow.
 HUGE = 1e18
-
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
 Positive = Annotated[float, Field(gt=0, le=HUGE)]
 #: Logarithmic, so 2 is 640 %: who writes 13 means percent.
@@ -60,10 +57,9 @@ def dotted(location: Sequence[str | int]) -> str:
 def first_error(
     path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
 ) -> InputError:
-    """Return the first finding as an InputError; unknown keys first, as they explain missing ones.
+    """Return the first finding; unknown keys first, as they explain missing ones.
 
-    file : the sections and keys there are. at : dotted key of the table that was checked, "" for
-    the whole file.
+    at : dotted key of the table that was checked, "" for the whole file.
     """
     errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
     problem = _problem(errors[0], file)

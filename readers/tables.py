@@ -1,12 +1,16 @@
-"""Comma-separated tables; errors name the file, the column and the line."""
+"""Tables in text files: their cells and lines, what columns are called, and the units they name.
+
+Errors name the file, the column and the line.
+"""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,11 +29,7 @@ HOLES = ("", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind", "n. def.", "n/a",
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """Cells as text, with the line of each row from 1, and the decimal mark.
-
-    path : the file. cells : one column a name of the header. lines : (rows,) line numbers in the
-    file, from 1. decimal : the decimal mark, a point or a comma.
-    """
+    """Cells as text, a column a name of the header, with the line of each row from 1."""
 
     path: Path
     cells: pd.DataFrame
@@ -40,8 +40,7 @@ class TextTable:
         """Return one column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN."""
         import pandas as pd
 
-        text = self.text(column)
-        plain = text
+        text = plain = self.text(column)
         if self.decimal != ".":
             # A point beside decimal commas marks thousands, or a mistake: no number either way.
             plain = text.str.replace(".", "?", regex=False)
@@ -50,12 +49,10 @@ class TextTable:
         bad = ~np.isfinite(value)
         if holes and bad.any():
             # Only of the rows in question: text costs more than numbers.
-            lost = text[bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
-            bad[bad] = ~lost
+            bad[bad] = ~text[bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
         if bad.any():
-            first = int(np.argmax(bad))
+            first, more = int(np.argmax(bad)), int(bad.sum()) - 1
             cell = text.iloc[first].strip()
-            more = int(bad.sum()) - 1
             problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
             if more:
                 problem += f"; so in {more} more row{'s' * (more > 1)}"
@@ -74,15 +71,20 @@ class TextTable:
     def text(self, column: str) -> pd.Series:
         """Return one column as it stands in the file."""
         names = [str(name) for name in self.cells.columns]
-        if names.count(column) != 1:
-            what = "appears twice" if column in names else "is missing"
-            problem = f"this column {what}; the file has: {', '.join(names)[:300]}"
-            raise InputError(self.path, f"column {column!r}", problem)
+        check_one(self.path, names, column)
         return self.cells[column]
 
     def rows(self, keep: NDArray[np.bool_]) -> TextTable:
         """Return the table with only the rows where `keep` (rows,) is true."""
         return TextTable(self.path, self.cells[keep], self.lines[keep], self.decimal)
+
+
+def check_one(path: Path, names: Sequence[str], column: str) -> None:
+    """Refuse a name that is not in the header, or twice."""
+    if names.count(column) != 1:
+        what = "appears twice" if column in names else "is missing"
+        problem = f"this column {what}; the file has: {', '.join(names)[:300]}"
+        raise InputError(path, f"column {column!r}", problem)
 
 
 #: Cells that may be missing from the ends of rows, beyond as many as a file has letters.
@@ -93,6 +95,18 @@ def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> N
     """Refuse a table that is mostly holes: a long row of names, far shorter rows."""
     if width * rows > letters + MOST_MISSING:
         problem = f"{width} names, and {rows} rows that are far shorter; is it a table?"
+        raise InputError(path, f"line {line}", problem)
+
+
+def check_row(
+    path: Path, line: int, row: Sequence[str], width: int, separator: str | None, names: str,
+    short: bool = False,
+) -> None:  # fmt: skip
+    """Refuse a row with more cells than names; with `short`, one of blanks that has fewer."""
+    if any(row[width:]) or (short and separator is None and len(row) < width):
+        problem = f"expected {width} cells as in {names}, found {len(row)}"
+        if separator == ",":
+            problem += "; decimal commas need another separator, or quotation marks"
         raise InputError(path, f"line {line}", problem)
 
 
@@ -130,30 +144,26 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
 
     any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit.
     """
+    save = "save it as a comma-separated table"
     try:
         content = content_of(path)
-        text = _decoded(content) if any_encoding else content.decode("utf-8-sig")
+        marked = any_encoding and content.startswith((b"\xff\xfe", b"\xfe\xff"))
+        try:
+            text = content.decode("utf-16" if marked else "utf-8-sig")
+        except UnicodeDecodeError:
+            if marked or not any_encoding:
+                raise
+            text = content.decode("latin-1")
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise InputError(
-            path, "", "is not text in UTF-8; save it as a comma-separated table"
-        ) from None
+        raise InputError(path, "", f"is not text in UTF-8; {save}") from None
     if "\0" in text:
-        raise InputError(path, "", "is not a text file; save it as a comma-separated table")
+        raise InputError(path, "", f"is not a text file; {save}")
     kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
-
-
-def _decoded(content: bytes) -> str:
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")
 
 
 def _complaint(error: Exception, lines: NDArray[np.intp]) -> tuple[str, str]:
@@ -170,21 +180,19 @@ def _complaint(error: Exception, lines: NDArray[np.intp]) -> tuple[str, str]:
 
 
 def write_table(
-    path: Path | str,
-    header: Sequence[str],
-    rows: Sequence[Sequence[object]],
-    comment: str | None = None,
+    path: Path | str, header: Sequence[str], rows: Sequence[Sequence[object]], comment: str = ""
 ) -> None:
     """Write a comma-separated table; floats so that they read back exactly."""
     with open(path, "w", encoding="utf-8", newline="") as stream:
-        if comment is not None:
+        if comment:
             stream.write(f"# {comment}\n")
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([repr(c) if isinstance(c, float) else c for c in row] for row in rows)
 
 
-_NUMBER = re.compile(r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?")
+NUMBER = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
+_NUMBER = re.compile(NUMBER)
 _COMMA = re.compile(r"[+-]?\d*+,\d++([eE][+-]?\d++)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
@@ -205,3 +213,126 @@ def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
         problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
         raise InputError(path, f"line {number}, column {name!r}", problem)
     return ","
+
+
+#: Words that make a column one of these quantities, in English and German exports.
+WORDS = {
+    quantity: frozenset(words.split())
+    for quantity, words in {
+        "elongation": "elongation extension displacement disp crosshead stroke travel position"
+        " weg standardweg traversenweg verfahrweg kolbenweg längenänderung",
+        "load": "load force kraft standardkraft prüfkraft", "time": "time zeit prüfzeit",
+        "pressure": "pressure druck überdruck innendruck p",
+        "deflection": "deflection displacement durchbiegung weg",
+    }.items()
+}  # fmt: skip
+#: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
+LOADS = frozenset("n f force load kraft stress spannung tension".split())
+STRAINS = frozenset("eps epsilon strain dehnung".split())
+WARP = frozenset("w warp kette x".split())
+FILL = frozenset("f fill weft schuss y".split())
+#: Quantities that need a word of each of two sets.
+PAIRS = {
+    f"{yarn} {what}": (words, along)
+    for what, words in (("load", LOADS), ("strain", STRAINS))
+    for yarn, along in (("warp", WARP), ("fill", FILL))
+}
+#: Words of columns of elongation: those measured on the strip, then those of the machine's travel,
+#: which holds the slip in the grips and the machine's own give too.
+ON_THE_STRIP = frozenset(
+    "extensometer gauge gage video längenänderung feindehnung wegaufnehmer".split()
+)
+OF_THE_MACHINE = frozenset(
+    "crosshead stroke position travel traversenweg traverse verfahrweg kolbenweg".split()
+)
+#: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
+OTHERS = frozenset(
+    "strain stress rate speed velocity time cell cycle"
+    " dehnung spannung zeit geschwindigkeit".split()
+)
+#: Whole names of the columns that say which specimen and which direction a row belongs to.
+LABELS = {
+    "specimen": {"specimen", "specimen id", "specimen label", "sample id", "specimen name"}
+    | {"specimen number", "specimen no", "sample name", "probe"},
+    "ratio": {"ratio", "load ratio", "stress ratio", "lastverhältnis", "verhältnis"},
+    "repetition": {"repetition", "repeat", "run", "trial", "wiederholung"},
+    "direction": {"direction", "series", "test direction", "orientation", "richtung"},
+}
+#: mm in one of each unit of length, N in one of each unit of load.
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
+LOAD_UNITS = {"N": 1.0, "kN": 1e3}
+#: N/mm in one of each unit of load per width of the strip.
+WIDTH_LOAD_UNITS = {"kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02}
+#: One in each unit of strain.
+STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "-": 1.0, "1": 1.0}
+#: MPa in one of each unit of pressure.
+PRESSURE_UNITS = {
+    "Pa": 1e-6, "hPa": 1e-4, "mbar": 1e-4, "kPa": 1e-3, "psi": 6.894757293168e-3, "bar": 0.1,
+    "MPa": 1.0,
+}  # fmt: skip
+#: Seconds in one of each unit of time.
+TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+#: Letters of a name, and names of a table: what is longer is none, and would take its time.
+LONGEST, MOST_NAMES = 300, 2000
+_KNOWN = r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
+# "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
+_UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,5}"
+_IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
+_AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Return a column's name without its unit, and the unit, "" when it names none.
+
+    >>> split_unit("Load (kN)"), split_unit("Weg in mm"), split_unit("load_N"), split_unit("Time")
+    (('Load', 'kN'), ('Weg', 'mm'), ('load', 'N'), ('Time', ''))
+    """
+    if len(name) > LONGEST:
+        return name, ""
+    found = _IN_BRACKETS.match(name) or _AT_THE_END.match(name)
+    return (found[1].strip(), found[2].strip()) if found else (name, "")
+
+
+def means(name: str, quantity: str) -> bool:
+    """Return whether a column holds `quantity`, one of those in `WORDS`, `PAIRS` and `LABELS`."""
+    if len(name) > LONGEST:
+        return False
+    plain = split_unit(name)[0].casefold()
+    if quantity in LABELS:
+        return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
+    listed = re.split(r"[\W\d_]+", plain)
+    if quantity not in PAIRS:
+        return not (ours := WORDS[quantity]).isdisjoint(listed) and not (OTHERS - ours) & {*listed}
+    what, along = PAIRS[quantity]
+    # One word is not both: F is a force before the yarn, and the fill after another word.
+    both = any(a in what and b in along for a, b in permutations(listed, 2))
+    return both and not (OTHERS - what) & {*listed}
+
+
+def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
+    """Return the columns that hold a quantity, by the name given for it, else by meaning."""
+    if quantity not in named:
+        return [i for i, name in enumerate(names) if name and means(name, quantity)]
+    return called(names, named[quantity].strip())
+
+
+def called(names: Sequence[str], asked: str) -> list[int]:
+    """Return the columns of this name, else those that have it without their unit."""
+    exact = [i for i, name in enumerate(names) if name == asked]
+    return exact or [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
+
+
+def nearest_to_strip(names: list[str], which: list[int]) -> list[int]:
+    """Return those columns of elongation that were measured nearest to the strip."""
+
+    def rank(index: int) -> int:
+        words = set(re.split(r"[\W\d_]+", split_unit(names[index])[0].casefold()))
+        return 0 if words & ON_THE_STRIP else 2 if words & OF_THE_MACHINE else 1
+
+    best = min((rank(i) for i in which), default=0)
+    return [i for i in which if rank(i) == best]
+
+
+def scale_of(unit: str, units: Mapping[str, float]) -> float | None:
+    """Return what one `unit` is in mm or N; None for a unit that is not in `units`."""
+    return units.get({"n": "N", "kn": "kN", "KN": "kN"}.get(unit, unit))

@@ -8,7 +8,7 @@ line.
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .columns import MOST_NAMES
 from .frames import (
     FLAGGED,
     LENGTHS,
@@ -31,27 +30,30 @@ from .frames import (
     frame_of,
     heading_of,
 )
-from .tables import HOLES, TextTable, check_width, decimal_mark, is_number, read_lines
+from .tables import (
+    HOLES,
+    MOST_NAMES,
+    TextTable,
+    check_one,
+    check_row,
+    check_width,
+    decimal_mark,
+    is_number,
+    read_lines,
+)
 
 Array = NDArray[np.float64]
 #: Line number from 1 and text.
 Lines = list[tuple[int, str]]
-
 #: None is any number of blanks.
 SEPARATORS = ("\t", ";", ",", None)
-#: The row of names stands within so many lines.
-TOP = 300
-#: So many rows are looked at for the decimal mark.
-SAMPLE = 500
+#: The row of names stands within so many lines; rows looked at for the decimal mark.
+TOP, SAMPLE = 300, 500
 
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Layout of the numbers in a file.
-
-    separator : None for blanks. columns : by quantity. header : line of the names. decimal : the
-    mark.
-    """
+    """Layout of the numbers in a file; separator None for blanks, header the line of the names."""
 
     separator: str | None
     headings: Sequence[Heading]
@@ -84,10 +86,7 @@ def find_layout(
     decimal: str | None = None,
     upper: bool = False,
 ) -> TextLayout:
-    """Find the layout of a file; a row of names may be a comment.
-
-    named : the file's own names of some quantities. upper : see `frames.columns_of`.
-    """
+    """Find the layout of a file, by its own names of some quantities; names may be a comment."""
     lines = read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
     if found is None and comment:
@@ -102,17 +101,21 @@ def find_layout(
     index, separator, names = found
     header, body = lines[index][0], lines[index + 1 :]
     units = [""] * len(names)
-    below = cells_of(body[0][1], separator) if body else None
-    if below is not None and _is_units(below):
-        units = [cell.strip("()[]<>{} ") for cell in below] + units
-        body = body[1:]
+    below = (cells_of(body[0][1], separator) if body else None) or []
+    plain = [cell.strip("()[]<>{} ") for cell in below]
+    # A row of units: some are lengths, none a number.
+    if {*LENGTHS, *PIXELS} & {cell.casefold() for cell in plain} and not any(map(is_number, plain)):
+        units, body = plain + units, body[1:]
     headings = [heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
     columns = columns_of(headings, named, upper)
     if not body:
         problem = "expected a header line and rows of numbers, found only a header line"
         raise InputError(path, f"line {header}", problem)
     check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
-    mark = decimal or _decimal(path, body, separator, headings, columns)
+    wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
+    sample = [(number, cells_of(text, separator) or []) for number, text in body[:SAMPLE]]
+    cells = [(number, names[i], row[i]) for number, row in sample for i in wanted if i < len(row)]
+    mark = decimal or decimal_mark(path, cells)
     return TextLayout(separator, headings, columns, header, body, mark)
 
 
@@ -132,8 +135,7 @@ def _best_header(
             rows = [cells_of(text, separator) for _, text in lines[index + 1 : index + 3]]
             numbers = [row for row in rows if row is not None and _is_numbers(row)]
             # A heading with a blank in it makes more names than there are numbers.
-            fits = any(len(names) == len(row) - (not row[-1]) for row in numbers)
-            fits = fits or any(len(names) == len(row) for row in numbers)
+            fits = any(len(names) in (len(row), len(row) - (not row[-1])) for row in numbers)
             score = (hits, bool(numbers), fits, separator is not None, len(names))
             if hits >= 2 and (best is None or score > best[0]):
                 best = score, index, separator, names
@@ -145,39 +147,13 @@ def _is_numbers(row: Sequence[str]) -> bool:
     return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
 
 
-def _is_units(row: Sequence[str]) -> bool:
-    """Return whether a row is one of units: some are lengths, none a number."""
-    plain = [cell.strip("()[]<>{} ").casefold() for cell in row]
-    known = any(cell in LENGTHS or cell in PIXELS for cell in plain)
-    return known and not any(is_number(cell) for cell in plain)
-
-
-def _decimal(
-    path: Path,
-    body: Lines,
-    separator: str | None,
-    headings: Sequence[Heading],
-    columns: Mapping[str, Sequence[int]],
-) -> str:
-    wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
-    cells = [
-        (number, headings[i].name, row[i])
-        for number, text in body[:SAMPLE]
-        for row in [cells_of(text, separator) or []]
-        for i in wanted
-        if i < len(row)
-    ]
-    return decimal_mark(path, cells)
-
-
 def _nothing_found(lines: Lines) -> str:
     if len(lines) < 2:
         found = "only a header line" if lines else "nothing"
         return f"expected a header line and rows of numbers, found {found}"
-    head = " ".join(lines[0][1].split())[:100]
     return (
         "no row of names with places and displacements (x, y, dx, dy, dz and the like) was found;"
-        f" name them with columns. Line {lines[0][0]} is: {head}"
+        f" name them with columns. Line {lines[0][0]} is: {' '.join(lines[0][1].split())[:100]}"
     )
 
 
@@ -192,22 +168,19 @@ def flag_columns(
     options: FrameOptions,
     status: tuple[str, Sequence[int]] | None,
 ) -> list[Flag]:
-    """Return the flags that are named, else those that the headings show.
-
-    status : a column of states, and the values of good rows.
-    """
+    """Return the flags that are named, else those of `status` and the headings."""
     names = [heading.name for heading in layout.headings]
+    asked: list[tuple[str | None, Sequence[int] | None]]
     asked = [(options.flag_column, (0,)), (options.valid_column, None)]
-    found: list[Flag] = []
-    for name, good in asked:
-        if name is not None:
-            found.append((_named(path, names, name.strip(' "')), good))
+    found = [
+        (_named(path, names, name.strip(' "')), good) for name, good in asked if name is not None
+    ]
     if found:
         return found
     if status is not None and status[0] in names:
         return [(names.index(status[0]), status[1])]
-    found += [(columns["valid"], None)] if "valid" in columns else []
-    return found + ([(columns["invalid"], (0,))] if "invalid" in columns else [])
+    shown: list[tuple[str, Sequence[int] | None]] = [("valid", None), ("invalid", (0,))]
+    return [(columns[key], good) for key, good in shown if key in columns]
 
 
 def _one(
@@ -217,22 +190,17 @@ def _one(
     if len(where) == 1:
         return where[0]
     names = [heading.name for heading in layout.headings]
-    if key in named:
-        return _named(path, names, named[key])
     may = [names[i] for i in where]
-    if len({*may}) == 1:
-        return _named(path, names, may[0])
+    if key in named or len({*may}) == 1:
+        return _named(path, names, named.get(key) or may[0])
     several = " or ".join(repr(name) for name in may[:6])
     problem = f"the column of {key} may be {several}; name one with columns"
     raise InputError(path, f"line {layout.header}", problem)
 
 
 def _named(path: Path, names: Sequence[str], name: str) -> int:
-    if names.count(name) == 1:
-        return names.index(name)
-    what = "appears twice" if name in names else "is missing"
-    problem = f"this column {what}; the file has: {', '.join(names)[:300]}"
-    raise InputError(path, f"column {name!r}", problem)
+    check_one(path, names, name)
+    return names.index(name)
 
 
 def quantity_columns(
@@ -240,17 +208,15 @@ def quantity_columns(
 ) -> dict[str, int]:
     """Return the one column of each quantity and flag; `named` gives the file's own names."""
     columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
-    spare = {"z", "dz"} if options.planar else set()
+    planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
     for quantity in options.quantities:
         axis = quantity[-1]
         both = {axis, f"d{axis}"} - {quantity}
-        if quantity in columns or (f"{axis} deformed" in columns and both <= {*columns}):
-            continue
-        if quantity in spare and not {"z", "dz", "z deformed"} & {*columns}:
-            continue
-        there = ", ".join(heading.name for heading in layout.headings)[:300]
-        problem = f"this column is missing; the file has: {there}"
-        raise InputError(path, f"column {quantity!r}", problem)
+        computed = f"{axis} deformed" in columns and both <= {*columns}
+        if quantity not in columns and not computed and not (planar and axis == "z"):
+            there = ", ".join(heading.name for heading in layout.headings)[:300]
+            problem = f"this column is missing; the file has: {there}"
+            raise InputError(path, f"column {quantity!r}", problem)
     return columns
 
 
@@ -287,27 +253,27 @@ def _quick(
     holes = [word for hole in HOLES for word in {hole, hole.upper(), hole.replace("nan", "NaN")}]
     try:
         table = pd.read_csv(
-            StringIO("\n".join(texts)),
-            header=None,
-            sep=r"\s+" if separator is None else separator,
-            decimal=layout.decimal,
-            usecols=None if separator is None else wanted,
-            dtype=dict.fromkeys(wanted, float),
-            na_values=holes,
-            keep_default_na=False,
+            StringIO("\n".join(texts)), header=None, sep=separator or r"\s+",
+            decimal=layout.decimal, usecols=None if separator is None else wanted,
+            dtype=dict.fromkeys(wanted, float), na_values=holes, keep_default_na=False,
             skipinitialspace=True,
-        )
+        )  # fmt: skip
     except (ValueError, OverflowError, KeyError):
         return None
     if len(table) != len(texts) or (separator is None and table.shape[1] != width):
         return None
     if np.isinf(table[wanted].to_numpy()).any() or any(table[i].isna().any() for i, _ in flags):
         return None
-    good = np.ones(len(table), dtype=bool)
-    for i, values in flags:
-        flag = table[i].to_numpy()
-        good &= (flag != 0) if values is None else np.isin(flag, values)
+    good = _passed(((table[i].to_numpy(), values) for i, values in flags), len(table))
     return {key: table[i].to_numpy(dtype=float)[good] for key, i in columns.items()}, good
+
+
+def _passed(flags: Iterable[tuple[Array, Sequence[int] | None]], count: int) -> NDArray[np.bool_]:
+    """Return the mask of rows whose flags are among the good values; None: all but zero."""
+    good = np.ones(count, dtype=bool)
+    for flag, values in flags:
+        good &= (flag != 0) if values is None else np.isin(flag, values)
+    return good
 
 
 def _slow(
@@ -323,28 +289,25 @@ def _slow(
             problem = "a quotation mark that is opened and not closed"
             raise InputError(path, f"line {number}", problem)
         # Blanks leave no empty cells: a short row has lost its place.
-        if any(row[width:]) or (layout.separator is None and len(row) < width):
-            problem = f"expected {width} cells as in the header, found {len(row)}"
-            if layout.separator == ",":
-                problem += "; decimal commas need another separator, or quotation marks"
-            raise InputError(path, f"line {number}", problem)
+        check_row(path, number, row, width, layout.separator, "the header", short=True)
         rows.append((row + [""] * width)[:width])
-    names = [heading.name for heading in layout.headings]
     lines = np.array([number for number, _ in layout.body])
     # By position: names may appear twice where they are not asked for.
     cells = pd.DataFrame(rows, dtype=str)
-    good = np.ones(len(rows), dtype=bool)
-    for i, values in flags:
-        flag = cells[i].str.casefold().map(WORDS).to_numpy(dtype=float)
-        if np.isnan(flag).any():
-            one = TextTable(path, cells[[i]].set_axis([names[i]], axis=1), lines, layout.decimal)
-            flag = one.numbers(names[i])
-        good &= (flag != 0) if values is None else np.isin(flag, values)
-    read = {}
-    for key, i in columns.items():
-        kept = cells[[i]][good].set_axis([names[i]], axis=1)
-        read[key] = TextTable(path, kept, lines[good], layout.decimal).numbers(names[i], holes=True)
-    return read, good
+
+    def table(i: int, keep: NDArray[np.bool_]) -> tuple[TextTable, str]:
+        name = layout.headings[i].name
+        one = cells[[i]][keep].set_axis([name], axis=1)
+        return TextTable(path, one, lines[keep], layout.decimal), name
+
+    def flag_of(i: int) -> Array:
+        flag = np.asarray(cells[i].str.casefold().map(WORDS), dtype=float)
+        one, name = table(i, np.ones(len(rows), dtype=bool))
+        return one.numbers(name) if np.isnan(flag).any() else flag
+
+    good = _passed(((flag_of(i), values) for i, values in flags), len(rows))
+    kept = {key: table(i, good) for key, i in columns.items()}
+    return {key: one.numbers(name, holes=True) for key, (one, name) in kept.items()}, good
 
 
 #: Names of columns that say whether a row is good, but not in which way.
@@ -372,33 +335,26 @@ def read_text_rows(
 ) -> FrameRows:
     """Read the rows of the one frame in a text file.
 
-    comment : that of the format. upper : see `frames.columns_of`. names : the format's names of
-    some quantities; the user's come first. status : a column of states, and the values of good
-    rows.
+    names : the format's names of some quantities; the user's come first. status : a column of
+    states, and the values of good rows. upper : see `frames.columns_of`.
     """
     own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **own}
     mark = options.comment if comment is None else comment
-    wanted = [*options.quantities]
-    layout = find_layout(path, wanted, named, mark, options.decimal, upper)
+    layout = find_layout(path, options.quantities, named, mark, options.decimal, upper)
     columns = quantity_columns(path, layout, named, options)
     flags = flag_columns(path, layout, columns, options, status)
     numbers = {key: i for key, i in columns.items() if key not in ("valid", "invalid")}
     values, good = read_numbers(path, layout, numbers, flags)
     sigma = values.pop("sigma", None)
     headings = {key: layout.headings[i] for key, i in numbers.items() if key != "sigma"}
-    unclear = [h.name for h in layout.headings if h.name.casefold() in UNCLEAR]
-    notes = [
-        f"column {name!r} is not used; flag_column or valid_column says what it means"
-        for name in unclear
-        if name not in (options.flag_column, options.valid_column)
-    ]
-    return FrameRows(
-        values,
-        {key: heading.name for key, heading in headings.items()},
-        {key: heading.unit for key, heading in headings.items() if heading.unit},
-        sigma=sigma,
-        camera_axes=camera_axes,
-        dropped={FLAGGED: int((~good).sum())},
-        notes=tuple(notes),
+    notes = tuple(
+        f"column {heading.name!r} is not used; flag_column or valid_column says what it means"
+        for heading in layout.headings
+        if heading.name.casefold() in UNCLEAR
+        and heading.name not in (options.flag_column, options.valid_column)
     )
+    named = {key: heading.name for key, heading in headings.items()}
+    units = {key: heading.unit for key, heading in headings.items() if heading.unit}
+    lost = {FLAGGED: int((~good).sum())}
+    return FrameRows(values, named, units, None, sigma, camera_axes, lost, notes)

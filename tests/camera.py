@@ -1,7 +1,5 @@
 """A computed bubble as a camera would see it, for tests of measured data."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -4,84 +4,81 @@ Layouts are those that the readers in `readers/formats` name their sources of. F
 (points (n, 3), displacement (n, 3)) in mm; every writer gives the files, in order.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 Frames = Sequence[tuple[np.ndarray, np.ndarray]]
+#: Of axes whose y points down and z away from the camera.
+TURNED = np.array([1.0, -1.0, -1.0])
 
 
-def _lines(path: Path, lines: Sequence[str], encoding: str = "utf-8") -> Path:
-    path.write_bytes("\r\n".join([*lines, ""]).encode(encoding))
-    return path
-
-
-def _row(values: Sequence[float], separator: str = ",", decimal: str = ".") -> str:
+def _row(values, separator: str = ",", decimal: str = ".") -> str:
     return separator.join(repr(float(v)).replace(".", decimal) for v in values)
 
 
-def plain(folder: Path, frames: Frames) -> list[Path]:
-    files = []
-    for k, (x, u) in enumerate(frames):
-        rows = [_row(row) for row in np.hstack([x, u])]
-        files.append(_lines(folder / f"plain_{k}.csv", ["x,y,z,dx,dy,dz", *rows]))
+def _write(folder: Path, name: str, frames: Frames, lines, encoding: str = "utf-8") -> list[Path]:
+    """Write a file a frame: its name by number, its lines by number, places and displacements."""
+    files = [folder / name.format(k) for k in range(len(frames))]
+    for k, (file, frame) in enumerate(zip(files, frames, strict=True)):
+        file.write_bytes("\r\n".join([*lines(k, *frame), ""]).encode(encoding))
     return files
+
+
+def plain(folder: Path, frames: Frames) -> list[Path]:
+    def lines(k, x, u):
+        return ["x,y,z,dx,dy,dz", *map(_row, np.hstack([x, u]))]
+
+    return _write(folder, "plain_{}.csv", frames, lines)
 
 
 def german(folder: Path, frames: Frames) -> list[Path]:
     """Metres for the places, micrometres for the displacements, units in a row of their own."""
-    files = []
-    for k, (x, u) in enumerate(frames):
+
+    def lines(k, x, u):
+        names = "Punkt\tX\tY\tZ\tVerschiebung X\tVerschiebung Y\tVerschiebung Z"
         rows = [_row(row, "\t", ",") for row in np.hstack([x * 1e-3, u * 1e3])]
-        names = ["Punkt\tX\tY\tZ\tVerschiebung X\tVerschiebung Y\tVerschiebung Z"]
-        units = ["\tm\tm\tm\tµm\tµm\tµm"]
-        body = [f"{i}\t{row}" for i, row in enumerate(rows)]
-        head = ["Prüfung 12", "Folie; 0,81 mm", ""]
-        files.append(_lines(folder / f"de_{k}.txt", head + names + units + body, "utf-16"))
-    return files
+        head = ["Prüfung 12", "Folie; 0,81 mm", "", names, "\tm\tm\tm\tµm\tµm\tµm"]
+        return head + [f"{i}\t{row}" for i, row in enumerate(rows)]
+
+    return _write(folder, "de_{}.txt", frames, lines, "utf-16")
 
 
 def davis(folder: Path, frames: Frames) -> list[Path]:
-    names = [f"{a}[mm]" for a in "xyz"] + [f"{a}-displacement[mm]" for a in "xyz"]
-    files = []
-    for k, (x, u) in enumerate(frames):
+    def lines(k, x, u):
+        names = [f"{a}[mm]" for a in "xyz"] + [f"{a}-displacement[mm]" for a in "xyz"]
         rows = [_row([*row, 0.5], ";") for row in np.hstack([x, u])]
         rows.insert(3, _row([0.0] * 7, ";"))
-        head = ";".join([*names, "Maximum normal strain[µm/m]"])
-        files.append(_lines(folder / f"B{k:05d}.csv", [head, *rows], "latin-1"))
-    return files
+        return [";".join([*names, "Maximum normal strain[µm/m]"]), *rows]
+
+    return _write(folder, "B{:05d}.csv", frames, lines, "latin-1")
 
 
 def tecplot(folder: Path, frames: Frames) -> list[Path]:
-    names = [f"{a}[mm]" for a in "xyz"] + [f"V{a}[mm]" for a in "xyz"] + ["isValid"]
-    files = []
-    for k, (x, u) in enumerate(frames):
+    def lines(k, x, u):
+        names = [f"{a}[mm]" for a in "xyz"] + [f"V{a}[mm]" for a in "xyz"] + ["isValid"]
         rows = [_row([*row, 1.0], " ") for row in np.hstack([x, u])]
         rows.append("1.0 2.0 3.0 4.0 5.0 6.0 0")
-        head = [
+        return [
             f'TITLE = "B{k:05d}"', "VARIABLES = " + " ".join(f'"{name}"' for name in names),
             f'ZONE T="Snapshot {k:04d}"', f"STRANDID=1, SOLUTIONTIME={k}",
-            f"I={len(rows)}, J=1, K=1, ZONETYPE = Ordered", "DATAPACKING = POINT",
+            f"I={len(rows)}, J=1, K=1, ZONETYPE = Ordered", "DATAPACKING = POINT", *rows,
         ]  # fmt: skip
-        files.append(_lines(folder / f"B{k:05d}.dat", head + rows, "latin-1"))
-    return files
+
+    return _write(folder, "B{:05d}.dat", frames, lines, "latin-1")
 
 
 def vic3d(folder: Path, frames: Frames) -> list[Path]:
-    names = [f"{a} [mm]" for a in "XYZUVW"] + [
-        "exx [1]", "Sigma_X [mm]", "sigma [pixel]", "x [pixel]",
-    ]  # fmt: skip
-    files = []
-    for k, (x, u) in enumerate(frames):
+    def lines(k, x, u):
+        names = [f"{a} [mm]" for a in "XYZUVW"]
+        names += ["exx [1]", "Sigma_X [mm]", "sigma [pixel]", "x [pixel]"]
         rows = [_row([*row, 0.01, 0.002, 0.02, 512.0]) for row in np.hstack([x, u])]
         rows.insert(2, ",,,,,,,,-1,7")
         rows.append("9.5,0.0,0.0,0.0,0.0,0.0,0.0,0.0,-1.0,8")
-        head = ", ".join(f'"{name}"' for name in names)
-        files.append(_lines(folder / f"vic_{k}.csv", [head, *rows]))
-    return files
+        return [", ".join(f'"{name}"' for name in names), *rows]
+
+    return _write(folder, "vic_{}.csv", frames, lines)
 
 
 def vic3d_mat(folder: Path, frames: Frames) -> list[Path]:
@@ -100,77 +97,64 @@ def vic3d_mat(folder: Path, frames: Frames) -> list[Path]:
 
 
 def aramis(folder: Path, frames: Frames) -> list[Path]:
-    names = [f"{a} unverformt" for a in "XYZ"] + [f"Verschiebung {a}" for a in "XYZ"]
-    files = []
-    for k, (x, u) in enumerate(frames):
+    def lines(k, x, u):
+        names = [f"{a} unverformt" for a in "XYZ"] + [f"Verschiebung {a}" for a in "XYZ"]
         rows = [f"{i};{_row(row, ';', ',')}" for i, row in enumerate(np.hstack([x, u]))]
         rows.insert(1, "9999;1,5;2,5;0,5;;;")
-        head = [
-            "ZEISS Correlate 2023", f"Stufe {k}; Flächenkomponente 1", "", ";".join(["ID", *names]),
-        ]  # fmt: skip
-        files.append(
-            _lines(folder / f"stage_{k}.csv", [*head, ";mm;mm;mm;mm;mm;mm", *rows], "cp1252")
-        )
-    return files
+        title = ["ZEISS Correlate 2023", f"Stufe {k}; Flächenkomponente 1", ""]
+        return [*title, ";".join(["ID", *names]), ";mm;mm;mm;mm;mm;mm", *rows]
 
-
-def _turned(values: np.ndarray) -> np.ndarray:
-    return values * (1.0, -1.0, -1.0)
+    return _write(folder, "stage_{}.csv", frames, lines, "cp1252")
 
 
 def matchid_2024(folder: Path, frames: Frames) -> list[Path]:
     names = [f"Coordinates.Image {a} [Pixel]" for a in "XY"] + [f"coor.{a} [mm]" for a in "XYZ"]
     names += ["disp.Horizontal Displacement U [mm]", "disp.Vertical Displacement V [mm]"]
     names += ["disp.Out-Of-Plane: W [mm]", "strain.Strain-global frame: Exx [ ]"]
-    files = []
-    for k, (x, u) in enumerate(frames):
-        table = np.hstack([np.ones((len(x), 2)), _turned(x), _turned(u), np.zeros((len(x), 1))])
-        rows = [_row(row) for row in table]
-        rows.append("1,1,2.0,3.0,NaN,NaN,NaN,NaN,NaN")
-        files.append(_lines(folder / f"image_{k}.csv", [",".join(names), *rows]))
-    return files
+
+    def lines(k, x, u):
+        table = np.hstack([np.ones((len(x), 2)), TURNED * x, TURNED * u, np.zeros((len(x), 1))])
+        return [",".join(names), *map(_row, table), "1,1,2.0,3.0,NaN,NaN,NaN,NaN,NaN"]
+
+    return _write(folder, "image_{}.csv", frames, lines)
 
 
 def matchid_2023(folder: Path, frames: Frames) -> list[Path]:
-    files = []
-    for k, (x, u) in enumerate(frames):
-        table = np.hstack([np.ones((len(x), 2)), _turned(x), _turned(u), np.zeros((len(x), 3))])
+    def lines(k, x, u):
+        table = np.hstack([np.ones((len(x), 2)), TURNED * x, TURNED * u, np.zeros((len(x), 3))])
         rows = [_row(row, ";", ",") for row in table]
         rows.append("1;1;2,0;3,0;n. def.;n. def.;n. def.;n. def.;0,0;0,0;0,0")
-        head = "x_pic;y_pic;x;y;z;u;v;w;exx;eyy;exy"
-        files.append(_lines(folder / f"image_{k}.csv", [head, *rows]))
-    return files
+        return ["x_pic;y_pic;x;y;z;u;v;w;exx;eyy;exy", *rows]
+
+    return _write(folder, "image_{}.csv", frames, lines)
 
 
 def dice(folder: Path, frames: Frames) -> list[Path]:
-    names = ["SUBSET_ID", "COORDINATE_X", "COORDINATE_Y", "DISPLACEMENT_X", "DISPLACEMENT_Y"]
-    names += ["SIGMA", "STATUS_FLAG"]
+    names = "SUBSET_ID COORDINATE_X COORDINATE_Y DISPLACEMENT_X DISPLACEMENT_Y SIGMA STATUS_FLAG"
+    names = names.split()
     names += [f"MODEL_{kind}_{a}" for kind in ("COORDINATES", "DISPLACEMENT") for a in "XYZ"]
     head = ["***", "*** Digital Image Correlation Engine (DICe), Copyright 2014 Sandia Corporation"]
     head += ["***", "*** Reference image: ./ref.tif ", "***", ",".join(names)]
-    files = []
-    for k, (x, u) in enumerate(frames):
-        table = np.hstack([_turned(x), _turned(u)])
+
+    def lines(k, x, u):
+        table = np.hstack([TURNED * x, TURNED * u])
         rows = [f"{i},10,20,0.5,0.5,0.004,4,{_row(row)}" for i, row in enumerate(table)]
         rows.insert(4, "7,10,20,0.5,0.5,-1.0,8," + _row([1.0] * 6))
-        rows.append("8,10,20,0.5,0.5,0.1,11," + _row([1.0] * 6))
-        files.append(_lines(folder / f"DICe_solution_{k}.txt", head + rows))
-    return files
+        return [*head, *rows, "8,10,20,0.5,0.5,0.1,11," + _row([1.0] * 6)]
+
+    return _write(folder, "DICe_solution_{}.txt", frames, lines)
 
 
 def istra4d(folder: Path, frames: Frames) -> list[Path]:
     import h5py
 
-    files = []
-    for k, (x, u) in enumerate(frames):
-        files.append(folder / f"series_step_{k}.hdf5")
-        with h5py.File(files[-1], "w") as file:
-            mask = np.append(np.ones(len(x), dtype=bool), False)
-            file["coordinates/mask"] = mask.reshape(1, -1)
+    files = [folder / f"series_step_{k}.hdf5" for k in range(len(frames))]
+    for path, (x, u) in zip(files, frames, strict=True):
+        with h5py.File(path, "w") as file:
+            file["coordinates/mask"] = np.append(np.ones(len(x), dtype=bool), False)[None]
             for i, axis in enumerate("xyz"):
-                place = np.append(x[:, i] + u[:, i], 0.0).reshape(1, -1)
-                file[f"coordinates/coordinate_{axis}"] = place
-                file[f"displacements/displacement_{axis}"] = np.append(u[:, i], 0.0).reshape(1, -1)
+                file[f"coordinates/coordinate_{axis}"] = np.append(x[:, i] + u[:, i], 0.0)[None]
+                file[f"displacements/displacement_{axis}"] = np.append(u[:, i], 0.0)[None]
             file["add_data/analog_channels"] = np.zeros((1, 8))
     return files
 
@@ -191,23 +175,20 @@ def multidic(folder: Path, frames: Frames) -> list[Path]:
 def pyaldic(folder: Path, frames: Frames) -> list[Path]:
     rest = [(frames[0][0], np.zeros_like(frames[0][1])), *frames]
     lost = np.full((1, 3), np.nan)
-    points = np.array([np.vstack([_turned(x + u), lost]) for x, u in rest])
-    moved = np.array([np.vstack([_turned(u), lost]) for _, u in rest])
-    path = folder / "run.npz"
+    points = np.array([np.vstack([TURNED * (x + u), lost]) for x, u in rest])
+    moved = np.array([np.vstack([TURNED * u, lost]) for _, u in rest])
     fields = {name: moved[:, :, i] for i, name in enumerate("UVW")}
+    path = folder / "run.npz"
     np.savez_compressed(path, strategy=np.asarray("hybrid"), points3D=points, **fields)
     return [path]
 
 
 def pyaldic_csv(folder: Path, frames: Frames) -> list[Path]:
-    files = []
-    for k, (x, u) in enumerate(frames):
-        table = np.hstack([np.ones((len(x), 2)), _turned(x + u), _turned(u)])
-        table = np.vstack([table, [3.0, 4.0, *[np.nan] * 6]])
-        files.append(folder / f"run_frame{k:03d}.csv")
-        head = "x_px,y_px,X_mm,Y_mm,Z_mm,U,V,W"
-        np.savetxt(files[-1], table, delimiter=",", header=head, comments="")
-    return files
+    def lines(k, x, u):
+        table = np.hstack([np.ones((len(x), 2)), TURNED * (x + u), TURNED * u])
+        return ["x_px,y_px,X_mm,Y_mm,Z_mm,U,V,W", *map(_row, table), "3,4" + 6 * ",nan"]
+
+    return _write(folder, "run_frame{:03d}.csv", frames, lines)
 
 
 def ncorr(folder: Path, frames: Frames) -> list[Path]:
@@ -223,13 +204,12 @@ def ncorr(folder: Path, frames: Frames) -> list[Path]:
         for name, grid in zip(fields, grids, strict=True):
             saved[name][0, k] = grid
     about = {"spacing": 4.0, "pixtounits": 0.1, "units": "mm"}
-    content = {"data_dic_save": {"displacements": saved, "dispinfo": about}}
-    savemat(folder / "ncorr.mat", content)
+    savemat(folder / "ncorr.mat", {"data_dic_save": {"displacements": saved, "dispinfo": about}})
     return [folder / "ncorr.mat"]
 
 
 #: Writers by the name of the format that is to be found, and of the case.
-EXPORTS: dict[str, tuple[str, Callable[[Path, Frames], list[Path]]]] = {
+EXPORTS = {
     "plain": ("csv", plain), "german": ("csv", german), "davis": ("davis", davis),
     "tecplot": ("tecplot", tecplot), "vic3d": ("vic3d", vic3d),
     "vic3d-mat": ("vic3d-mat", vic3d_mat), "aramis": ("aramis", aramis),

@@ -1,18 +1,15 @@
-"""Units of a project file."""
-
-from __future__ import annotations
+"""Sections of a project file: units, numbers, errors in one line; files that are not read."""
 
 import os
 import pickle
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import pytest
 from bubblefit.errors import InputError, one_line
 from bubblefit.files import check_regular, content_of
 from bubblefit.materials.card import read_card
 from bubblefit.project.project import read_project
-from bubblefit.readers.columns import LOAD_UNITS
 from bubblefit.readers.frames import read_frames
 from bubblefit.readers.sections import (
     HUGE,
@@ -30,10 +27,9 @@ from bubblefit.readers.sections import (
     Strain,
     StrainTriple,
     beside,
-    dotted,
     first_error,
 )
-from bubblefit.readers.tables import read_lines
+from bubblefit.readers.tables import LOAD_UNITS, read_lines
 from bubblefit.solvers.marc.settings import site_settings
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -41,18 +37,13 @@ from .complaints import complaint
 
 #: Of one of each, in SI.
 PASCAL = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5}
-METRE = {"m": 1.0, "mm": 1e-3}
 
 
 def test_units_are_those_of_si():
     for table in (MODULUS_UNITS, PRESSURE_UNITS):
-        assert {name: 1e6 * mpa for name, mpa in table.items()} == pytest.approx(
-            {name: PASCAL[name] for name in table}
-        )
-    assert {name: 1e-3 * mm for name, mm in LENGTH_UNITS.items()} == pytest.approx(METRE)
-
-
-def test_units_that_a_project_may_say_are_those_that_are_known():
+        pascal = {name: 1e6 * mpa for name, mpa in table.items()}
+        assert pascal == pytest.approx({name: PASCAL[name] for name in table})
+    assert LENGTH_UNITS == {"m": 1000.0, "mm": 1.0}
     assert set(get_args(ModulusUnit)) == {"GPa", "MPa", "Pa"} == set(MODULUS_UNITS)
     assert set(get_args(PressureUnit)) == {"kPa", "MPa", "bar", "Pa"} == set(PRESSURE_UNITS)
     assert set(get_args(LengthUnit)) == {"mm", "m"} == set(LENGTH_UNITS)
@@ -99,44 +90,10 @@ class Outer(Section):
 RIGHT = {"length": 1.0}
 
 
-def said(content: dict[str, Any], at: str = "") -> str:
+def said(content: dict, at: str = "") -> str:
     with pytest.raises(ValidationError) as found:
         Outer.model_validate(content)
     return str(first_error(Path("p.toml"), found.value, Outer, at))
-
-
-def test_keys_of_tables_and_lists():
-    assert dotted(("law", "bounds", "lower", 3)) == "law.bounds.lower[3]"
-    assert dotted(("many", 1, "length")) == "many[1].length"
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ({"needed": {**RIGHT, "zzz": 1}}, "needed.zzz: unknown key; allowed here: length, pair"),
-        ({"needed": RIGHT, "many": [RIGHT, {"lenght": 1}]}, "many[1].lenght: unknown key; did"),
-        ({"needed": {"length": float("inf")}}, "expected a finite number, got inf"),
-        ({"needed": {**RIGHT, "pair": [1, 2, 3]}}, "needed.pair: expected at most 2 items, got 3"),
-        ({"needed": RIGHT, "name": 3}, "name: expected a valid string, got 3"),
-    ],
-)
-def test_what_is_said(content, words):
-    text = said(content)
-    assert text.startswith("p.toml") and words in text and "\n" not in text
-
-
-def test_only_the_first_is_told_and_the_rest_counted():
-    one = said({"needed": {"length": "x"}})
-    assert "more)" not in one
-    three = said({"needed": {"length": "x"}, "name": 3, "nam": 1})
-    assert "nam: unknown key" in three and three.endswith("(2 more)")
-
-
-def test_long_values_are_cut_and_the_table_named():
-    text = said({"needed": {"length": "y" * 100}}, "strips")
-    assert "strips.needed.length" in text
-    assert text.endswith("got '" + "y" * 56 + "...")
-    assert said({"needed": {"length": "y" * 58}}).endswith("got '" + "y" * 58 + "'")
 
 
 @pytest.mark.parametrize(
@@ -144,22 +101,27 @@ def test_long_values_are_cut_and_the_table_named():
     [
         ({}, "needed: this section is missing; add it"),
         ({"needed": {}}, "needed.length: this key is missing; add it"),
+        ({"needed": {**RIGHT, "zzz": 1}}, "needed.zzz: unknown key; allowed here: length, pair"),
         ({"needed": RIGHT, "nam": "x"}, "nam: unknown key; did you mean 'name'? allowed here: "
          "name, inner, many, needed"),
-        ({"needed": RIGHT, "inner": {"lngth": 1.0, "length": 1.0}}, "inner.lngth: unknown key; did "
-         "you mean 'length'? allowed here: length, pair"),
-        ({"needed": RIGHT, "many": [RIGHT, {"length": 1.0, "pairs": 1}]}, "many[1].pairs: unknown "
+        ({"needed": RIGHT, "many": [RIGHT, {**RIGHT, "pairs": 1}]}, "many[1].pairs: unknown "
          "key; did you mean 'pair'? allowed here: length, pair"),
         # Half of the letters in their order are near, fewer are not.
         ({"needed": {**RIGHT, "pxyz": 1}}, "needed.pxyz: unknown key; allowed here: length, pair"),
         ({"needed": {**RIGHT, "paxy": 1}}, "needed.paxy: unknown key; did you mean 'pair'? allowed "
          "here: length, pair"),
+        ({"needed": {"length": float("inf")}}, "needed.length: expected a finite number, got inf"),
         ({"needed": {**RIGHT, "pair": []}}, "needed.pair: expected at least 2 items, got 0"),
+        ({"needed": {**RIGHT, "pair": [1, 2, 3]}}, "needed.pair: expected at most 2 items, got 3"),
         ({"needed": {**RIGHT, "pair": "x" * 58}}, "needed.pair: expected a valid list, got '"
          + "x" * 58 + "'"),
         ({"needed": {**RIGHT, "pair": "x" * 59}}, "needed.pair: expected a valid list, got '"
          + "x" * 56 + "..."),
+        ({"needed": RIGHT, "name": 3}, "name: expected a valid string, got 3"),
+        # The first is told, unknown keys before all, and the rest counted.
         ({"needed": {"length": "x"}, "name": 3}, "name: expected a valid string, got 3 (1 more)"),
+        ({"needed": {"length": "x"}, "name": 3, "nam": 1}, "nam: unknown key; did you mean 'name'? "
+         "allowed here: name, inner, many, needed (2 more)"),
     ],
 )  # fmt: skip
 def test_the_whole_line(content, words):
@@ -172,41 +134,29 @@ READERS = [read_project, read_card, site_settings, read_lines, lambda path: read
 
 
 def test_a_file_whole_and_no_more_of_it_than_is_meant(tmp_path):
-    path = tmp_path / "a"
+    path, link = tmp_path / "a", tmp_path / "link"
     path.write_bytes(b"x" * 2**20)
-    assert content_of(path) == content_of(path, 2**20) == b"x" * 2**20
-    said = complaint(content_of, path, 2**20 - 1)
-    assert said == f"{path}: has more than 0 MiB; is it the right file?"
+    link.symlink_to(path)
+    assert content_of(path) == content_of(path, 2**20) == content_of(link) == b"x" * 2**20
+    # A file of /proc says nothing of its size.
+    assert content_of("/proc/self/status").startswith(b"Name:")
+    for large, most in ((path, 2**20 - 1), ("/proc/self/status", 10)):
+        assert f"{large}: has more than 0 MiB" in complaint(content_of, large, most)
     with pytest.raises(FileNotFoundError):
         content_of(tmp_path / "b")
-    link = tmp_path / "link"
-    link.symlink_to(path)
-    assert len(content_of(link)) == 2**20
-
-
-def test_a_file_that_says_nothing_of_its_size():
-    assert content_of("/proc/self/status").startswith(b"Name:")
-    assert "has more than" in complaint(content_of, "/proc/self/status", 10)
 
 
 @pytest.mark.parametrize("read", READERS)
 def test_what_may_never_end_is_not_read(tmp_path, read):
-    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    pipe, link, large = tmp_path / "pipe", tmp_path / "link", tmp_path / "large"
     os.mkfifo(pipe)
     link.symlink_to("/dev/zero")
     for path in (pipe, link, Path("/dev/zero")):
-        said = complaint(read, path)
-        assert said == f"{path}: is no regular file but a device or a pipe; copy it into a file"
-    said = complaint(read, tmp_path / "a\0b")
-    assert said == f"{tmp_path}/a\\0b: no file can have such a name"
-
-
-@pytest.mark.parametrize("read", READERS)
-def test_a_file_larger_than_any_is_refused_before_it_is_read(tmp_path, read):
-    path = tmp_path / "large"
-    with path.open("wb") as file:
+        assert complaint(read, path).startswith(f"{path}: is no regular file")
+    assert complaint(read, tmp_path / "a\0b").startswith(f"{tmp_path}/a\\0b: no file can have such")
+    with large.open("wb") as file:
         file.truncate(2**40)
-    assert "is it the right file?" in complaint(read, path)
+    assert "is it the right file?" in complaint(read, large)
 
 
 def test_a_folder_is_left_to_its_reader(tmp_path):

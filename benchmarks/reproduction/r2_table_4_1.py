@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.readers.surfaces import powers
+from bubblefit.readers.fields import powers
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from dead_pressure import LOADS, Array, cut, known_bubble

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...materials.designers import RATIOS, shares
-from ...readers.columns import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 from ...readers.frames import FrameSource
 from ...readers.machine_tables import (
     TableOptions,
@@ -27,6 +26,7 @@ from ...readers.machine_tables import (
     read_machine_table,
     source_of,
 )
+from ...readers.tables import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 
 Array = NDArray[np.float64]
 #: Ratios that a pair of loads may be taken for.

@@ -22,8 +22,7 @@ from ...errors import InputError
 from ...inference.comparison import NoiseIs
 from ...meshes.mesh import Mesh
 from ...meshes.reading import FacetReading, SmoothReading
-from ...readers.fields import DisplacementField
-from ...readers.surfaces import DisplacementSurface
+from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import History
 from .test import BubbleTest
 

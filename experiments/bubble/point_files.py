@@ -14,21 +14,23 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import is_file
-from ...readers.columns import PRESSURE_UNITS, TIME_UNITS
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
 from ...readers.machine_tables import Channel, read_times
-from ...readers.names import check_pattern, number_in_name, value_in_file
 from ...readers.pressure_log import (
     ClockOffset,
     LogOptions,
     apex_heights,
+    check_pattern,
     choose_frames,
     find_offset,
     given_offset,
+    number_in_name,
     read_pressure_log,
+    value_in_file,
 )
 from ...readers.sections import LENGTH_UNITS
+from ...readers.tables import PRESSURE_UNITS, TIME_UNITS
 from ..keys import channel_of, named_format
 from ..kinds import Place
 from .registration import RegistrationOptions

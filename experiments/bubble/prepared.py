@@ -18,9 +18,8 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.reading import FacetReading, SmoothReading
-from ...readers.fields import DisplacementField, read_fields
+from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface, read_fields
 from ...readers.frames import FrameSource
-from ...readers.surfaces import DisplacementSurface, fit_surface
 from ..kinds import DataFile, Doubt, Expected, MakeSolver, Masks, Reach, Weighting, joined
 from .doubts import View, doubts_of
 from .objective import (

@@ -23,8 +23,7 @@ from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
-from ...readers.fields import DisplacementField
-from ...readers.surfaces import write_surfaces
+from ...readers.fields import DisplacementField, write_surfaces
 from ...reports.bubbles import (
     chosen,
     clock_charts,

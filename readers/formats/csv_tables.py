@@ -15,10 +15,8 @@ import numpy as np
 from ...errors import InputError
 from ..curves import LoadPolynomial, PublishedPolynomial, direction_named
 from ..registry import Format, register_format
-from ..tables import TextTable, read_table
+from ..tables import read_table
 from ..text_frames import text_reader
-
-register_format(Format("csv", "frame", "columns of text in any dialect", text_reader("csv")))
 
 
 def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
@@ -30,30 +28,25 @@ def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
     coefficients = np.zeros((len(table.lines), len(powers) + 1))
     for power in [0] * (0 in found) + list(powers):
         coefficients[:, power] = table.numbers(f"c{power}")
-    lengths = np.stack([table.numbers(f"{name}_length_mm") for name in ("gauge", "final")], axis=1)
+    gauges, finals = (table.numbers(f"{name}_length_mm").tolist() for name in ("gauge", "final"))
     scatter = np.full(len(table.lines), np.nan)
     if "data_scatter_N" in names:
         scatter = table.numbers("data_scatter_N")
     read: dict[str, PublishedPolynomial] = {}
-    for row, line in enumerate(table.lines):
-        gauge, final = (float(length) for length in lengths[row])
-        direction = _direction(table, row, read)
+    for row, (line, gauge, final) in enumerate(zip(table.lines, gauges, finals, strict=True)):
+        at = f"line {line}, column 'direction'"
+        direction = direction_named(str(table.text("direction").iloc[row]), path, at)
+        if direction in read:
+            raise InputError(path, at, f"{direction} is given twice; expected once")
         if not 0 < gauge < final:
             problem = f"expected 0 < gauge length < final length, got {gauge:g} and {final:g}"
-            raise InputError(table.path, f"line {line}", problem)
+            raise InputError(path, f"line {line}", problem)
         fitted = LoadPolynomial(coefficients[row], final - gauge, np.nan, np.nan, 0)
         read[direction] = PublishedPolynomial(direction, gauge, final, fitted, float(scatter[row]))
     return read
 
 
-def _direction(table: TextTable, row: int, before: dict[str, PublishedPolynomial]) -> str:
-    at = f"line {table.lines[row]}, column 'direction'"
-    direction = direction_named(str(table.text("direction").iloc[row]), table.path, at)
-    if direction in before:
-        raise InputError(table.path, at, f"{direction} is given twice; expected once")
-    return direction
-
-
+register_format(Format("csv", "frame", "columns of text in any dialect", text_reader("csv")))
 register_format(
     Format("csv", "load polynomials", "columns direction, lengths, c1, c2 ...", read_polynomials)
 )

@@ -1,8 +1,6 @@
 """Solution files of DICe: lines of `***`, a row of names, SIGMA and STATUS_FLAG.
 
-    ***
     *** Digital Image Correlation Engine (DICe), Copyright 2014 Sandia Corporation
-    ***
     SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA,STATUS_FLAG,
         MODEL_COORDINATES_X,MODEL_COORDINATES_Y,MODEL_COORDINATES_Z,
         MODEL_DISPLACEMENT_X,MODEL_DISPLACEMENT_Y,MODEL_DISPLACEMENT_Z
@@ -45,12 +43,10 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     if NAMES["x"] not in top and not options.columns:
         problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
         raise InputError(path, "", problem)
-    status = ("STATUS_FLAG", SUCCESSFUL)
+    good = "STATUS_FLAG", SUCCESSFUL
     # Without a stereo model, of columns that the user names, the model's are not asked for.
     names = {key: name for key, name in NAMES.items() if name in top}
-    rows = read_text_rows(
-        path, options, comment="***", names=names, status=status, camera_axes=True
-    )
+    rows = read_text_rows(path, options, comment="***", names=names, status=good, camera_axes=True)
     return [frame_of(rows, options, path, "dice")]
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
-from ..hdf5_files import SIGNATURE, array_of, check_readable, member, open_hdf5
+from ..mat_files import SIGNATURE, array_of, check_readable, member, open_hdf5
 from ..registry import Format, register_format
 
 NAMES = {

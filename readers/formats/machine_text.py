@@ -19,14 +19,25 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ..columns import LENGTH_UNITS, LOAD_UNITS, MOST_NAMES, TIME_UNITS, columns_of, split_unit
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
-from ..tables import TextTable, check_width, decimal_mark, is_number, read_lines
+from ..tables import (
+    LENGTH_UNITS,
+    LOAD_UNITS,
+    MOST_NAMES,
+    TIME_UNITS,
+    TextTable,
+    check_row,
+    check_width,
+    columns_of,
+    decimal_mark,
+    is_number,
+    read_lines,
+    split_unit,
+)
 
 #: Line number from 1 and cells.
 Rows = list[tuple[int, list[str]]]
-
 SEPARATORS = ("\t", ";", ",")
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
 _LETTERS = re.compile(r"[^\W\d_]")
@@ -47,10 +58,10 @@ def cells_of(text: str, separator: str) -> list[str]:
 def find_header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str]) -> int | None:
     """Return the first row of names with numbers below it, else the first row of names."""
     first = None
-    for index in range(len(rows)):
+    for index, (_, row) in enumerate(rows):
         if _is_header(rows, index, named, quantities):
             return index
-        if first is None and _names_all(rows[index][1], named, quantities):
+        if first is None and _names_all(row, named, quantities):
             first = index
     return first
 
@@ -91,31 +102,28 @@ class Block:
 def find_blocks(
     path: Path, rows: Rows, first: int, named: Mapping[str, str], quantities: Sequence[str]
 ) -> dict[tuple[str, ...], list[Block]]:
-    """Return the tables from the row `first` on, by their names.
-
-    Raises InputError: a unit row says another unit than the name above it.
-    """
-    heads = [
-        first,
-        *(i for i in range(first + 1, len(rows)) if _is_header(rows, i, named, quantities)),
-    ]
+    """Return the tables from the row `first` on, by names; units must not contradict these."""
+    later = range(first + 1, len(rows))
+    heads = [first, *(i for i in later if _is_header(rows, i, named, quantities)), len(rows)]
     blocks: dict[tuple[str, ...], list[Block]] = {}
-    for head, end in zip(heads, [*heads[1:], len(rows)], strict=True):
+    for head, end in pairwise(heads):
         line, names = rows[head]
         needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
         units, body = {name: split_unit(name)[1] for name in names}, head + 1
         below = rows[body][1] if body < end else []
         letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
         if letters and not any(_is_number(below, i) for i in needed):
-            units |= _unit_row(path, rows[body], names, units)
+            for name, cell in zip(names, below, strict=False):
+                unit = cell.strip("()[]<>{} ")
+                if unit and units[name] not in ("", unit):
+                    problem = f"unit {unit!r} here, but {units[name]!r} in the column's name"
+                    at = f"line {rows[body][0]}, column {name!r}"
+                    raise InputError(path, at, f"{problem}; correct one")
+                units[name] = unit or units[name]
             body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
         # What stands between two tables begins with a word: the title of the second.
-        while (
-            end < len(rows)
-            and inside
-            and not is_number(next((cell for cell in inside[-1][1] if cell), ""))
-        ):
+        while end < len(rows) and inside and not is_number(next(filter(None, inside[-1][1]), "")):
             inside.pop()
         blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
     return blocks
@@ -125,34 +133,16 @@ def _is_number(row: list[str], column: int) -> bool:
     return column < len(row) and is_number(row[column])
 
 
-def _unit_row(
-    path: Path, row: tuple[int, list[str]], names: list[str], units: Mapping[str, str]
-) -> dict[str, str]:
-    number, cells = row
-    found = {}
-    for name, cell in zip(names, cells, strict=False):
-        unit = cell.strip("()[]<>{} ")
-        if unit and units[name] and unit != units[name]:
-            problem = f"unit {unit!r} here, but {units[name]!r} in the column's name; correct one"
-            raise InputError(path, f"line {number}, column {name!r}", problem)
-        if unit:
-            found[name] = unit
-    return found
-
-
 def nothing_found(
     lines: list[tuple[int, str]], named: Mapping[str, str], quantities: Sequence[str]
 ) -> str:
     """Describe the row that might have been the row of names."""
-    what = " and ".join(
-        repr(named[quantity]) if quantity in named else f"one of {quantity}"
-        for quantity in quantities
-    )
+    what = " and ".join(repr(named[q]) if q in named else f"one of {q}" for q in quantities)
     problem = f"no header row with the columns {what}; name them with columns"
     for index, ((number, text), (_, below)) in enumerate(pairwise(lines)):
         for separator in SEPARATORS:
             names, row = cells_of(text, separator), cells_of(below, separator)
-            if sum(_is_number(row, i) for i in range(len(row))) >= 2:
+            if sum(map(is_number, row)) >= 2:
                 higher = cells_of(lines[index - 1][1], separator) if index else []
                 # Names stand above their units.
                 if len(higher) == len(names) and any(c.strip("()[]<> ") in UNITS for c in names):
@@ -184,27 +174,25 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     _, rows, index, separator = max(found, key=lambda one: one[0])
     blocks = find_blocks(path, rows, index, named, quantities)
     chosen = max(blocks, key=lambda names: sum(len(one.rows) for one in blocks[names]))
-    names, several = list(chosen), blocks[chosen]
-    header_line, units = several[0].line, _units(path, several)
+    names, several = list(chosen), blocks.pop(chosen)
+    width, header, units = len(names), several[0].line, _units(path, several)
     rest = [row for one in several for row in one.rows]
     if not rest:
-        raise InputError(path, f"line {header_line}", "no rows of numbers below these names")
+        raise InputError(path, f"line {header}", "no rows of numbers below these names")
     for number, row in rest:
-        if any(row[len(names) :]):
-            count = len(row)
-            problem = f"expected {len(names)} cells as in line {header_line}, found {count}"
-            if separator == ",":
-                problem += "; decimal commas need another separator, or quotation marks"
-            raise InputError(path, f"line {number}", problem)
-    width = len(names)
-    check_width(path, header_line, width, len(rest), sum(len(row) for _, row in rest))
+        check_row(path, number, row, width, separator, f"line {header}")
+    check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
     cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
-    line_numbers = np.array([number for number, _ in rest])
     needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
     numbers = [(n, names[i], row[i]) for n, row in rest for i in needed if i < len(row)]
     decimal = options.decimal or decimal_mark(path, numbers)
-    table = TextTable(path, cells, line_numbers, decimal)
-    return MachineTable(table, units, header_line, _notes(path, blocks, chosen))
+    table = TextTable(path, cells, np.array([number for number, _ in rest]), decimal)
+    others = [str(one.line) for several in blocks.values() for one in several]
+    note = (
+        f"{path.name}: the table with its names in line {header}, which has most rows, is read; not"
+        f" that of line {' and '.join(others)}"
+    )
+    return MachineTable(table, units, header, (note,) if others else ())
 
 
 def _units(path: Path, several: Sequence[Block]) -> dict[str, str]:
@@ -214,27 +202,10 @@ def _units(path: Path, several: Sequence[Block]) -> dict[str, str]:
         for name, unit in one.units.items():
             if unit and unit != first.units[name]:
                 before = repr(first.units[name]) if first.units[name] else "none"
-                problem = (
-                    f"unit {unit!r} here, but {before} in the table of the same names in line "
-                    f"{first.line}; correct one"
-                )
+                where = f"{before} in the table of the same names in line {first.line}"
+                problem = f"unit {unit!r} here, but {where}; correct one"
                 raise InputError(path, f"line {one.line}, column {name!r}", problem)
     return first.units
-
-
-def _notes(
-    path: Path, blocks: Mapping[tuple[str, ...], list[Block]], chosen: tuple[str, ...]
-) -> tuple[str, ...]:
-    others = [
-        str(one.line) for names, several in blocks.items() if names != chosen for one in several
-    ]
-    if not others:
-        return ()
-    line = blocks[chosen][0].line
-    return (
-        f"{path.name}: the table with its names in line {line}, which has most rows, is read; not"
-        f" that of line {' and '.join(others)}",
-    )
 
 
 register_format(Format("text", "machine table", "columns of text, as test machines export", read))

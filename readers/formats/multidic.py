@@ -31,32 +31,26 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read a frame for each cell."""
     there = read_variables(path, RESULTS)
-    results = next((_struct(there.get(name)) for name in RESULTS if name in there), None)
-    points = (results or {}).get("Points3D")
-    moved = (_struct((results or {}).get("Disp")) or {}).get("DispVec")
+    results = next((_struct(there[name]) for name in RESULTS if name in there), {})
+    points, moved = results.get("Points3D"), _struct(results.get("Disp")).get("DispVec")
     if not isinstance(points, list) or not isinstance(moved, list) or len(points) != len(moved):
         raise InputError(path, "", "expected cells of Points3D and Disp.DispVec, one a frame")
-    return [
-        frame_of(_rows(path, place, move), options, path, "multidic")
-        for place, move in zip(points, moved, strict=True)
-    ]
+    frames = []
+    for place, move in zip(points, moved, strict=True):
+        if not isinstance(place, np.ndarray) or not isinstance(move, np.ndarray):
+            raise InputError(path, "", "expected arrays in Points3D and DispVec")
+        if place.shape != move.shape or place.ndim != 2 or place.shape[1] != 3:
+            raise InputError(path, "", f"Points3D and DispVec are {place.shape} and {move.shape}")
+        values = {f"{axis} deformed": place[:, i].astype(float) for i, axis in enumerate("xyz")}
+        values |= {f"d{axis}": move[:, i].astype(float) for i, axis in enumerate("xyz")}
+        names = {name: "DispVec" if name[0] == "d" else "Points3D" for name in values}
+        frames.append(frame_of(FrameRows(values, names), options, path, "multidic"))
+    return frames
 
 
-def _struct(value: Any) -> Mapping[str, Any] | None:
+def _struct(value: Any) -> Mapping[str, Any]:
     one = value[0] if isinstance(value, list) and len(value) == 1 else None
-    return one if isinstance(one, dict) else None
-
-
-def _rows(path: Path, place: Any, move: Any) -> FrameRows:
-    if not isinstance(place, np.ndarray) or not isinstance(move, np.ndarray):
-        raise InputError(path, "", "expected arrays in Points3D and DispVec")
-    if place.shape != move.shape or place.ndim != 2 or place.shape[1] != 3:
-        raise InputError(path, "", f"Points3D and DispVec are {place.shape} and {move.shape}")
-    place, move = place.astype(float), move.astype(float)
-    values = {f"{axis} deformed": place[:, i] for i, axis in enumerate("xyz")}
-    values |= {f"d{axis}": move[:, i] for i, axis in enumerate("xyz")}
-    names = {name: "DispVec" if name[0] == "d" else "Points3D" for name in values}
-    return FrameRows(values, names)
+    return one if isinstance(one, dict) else {}
 
 
 register_format(Format("multidic", "frame", "MAT-files of MultiDIC, DuoDIC", read, recognises))

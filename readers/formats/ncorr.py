@@ -37,13 +37,10 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     frames = saved.get("displacements")
     if not isinstance(frames, list) or not frames or not isinstance(frames[0], dict):
         raise InputError(path, SAVED, "expected displacements of frames")
-    step, scale = (_number(path, about, name) for name in ("spacing", "pixtounits"))
-    unit = about.get("units")
-    unit = unit if isinstance(unit, str) else ""
-    return [
-        frame_of(_rows(path, one, (step + 1) * scale, unit), options, path, "ncorr")
-        for one in frames
-    ]
+    spacing, scale = (_number(path, about, name) for name in ("spacing", "pixtounits"))
+    unit, step = about.get("units"), (spacing + 1) * scale
+    rows = (_rows(path, one, step, unit if isinstance(unit, str) else "") for one in frames)
+    return [frame_of(one, options, path, "ncorr") for one in rows]
 
 
 def _rows(path: Path, one: Mapping[str, Any], step: float, unit: str) -> FrameRows:

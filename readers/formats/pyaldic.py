@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import zipfile
 import zlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,14 +48,11 @@ def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
     Raises InputError: no such file, no archive, objects instead of numbers, a header that says more
     than the file holds.
     """
-    found = {}
     try:
         with zipfile.ZipFile(path) as archive:
             there = {one.filename: one for one in archive.infolist()}
-            for name in wanted:
-                one = there.get(f"{name}.npy")
-                if one is not None:
-                    found[name] = _array(path, archive, one, name)
+            members = {name: there[f"{name}.npy"] for name in wanted if f"{name}.npy" in there}
+            return {name: _array(path, archive, one, name) for name, one in members.items()}
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except (OSError, zipfile.BadZipFile, zlib.error, EOFError) as error:
@@ -63,7 +60,6 @@ def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
     except (ValueError, NotImplementedError, RuntimeError, TypeError, MemoryError) as error:
         why = " ".join(str(error).split())[:100]
         raise InputError(path, "", f"cannot be read; is it damaged? ({why})") from None
-    return found
 
 
 def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str) -> np.ndarray:
@@ -83,9 +79,6 @@ def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str
     if len(content) < size:
         raise InputError(path, f"array {name!r}", "ends early; is the file damaged?")
     return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran else "C")
-
-
-NAMES = ("points3D", "U", "V", "W")
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -108,11 +101,7 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
         rows = read_text_rows(path, deformed, camera_axes=True)
         return [frame_of(rows, deformed, path, "pyaldic")]
-    there = (read_variables if is_mat(head) else read_arrays)(path, NAMES)
-    return [frame_of(rows, options, path, "pyaldic") for rows in _rows(path, there)]
-
-
-def _rows(path: Path, there: Mapping[str, np.ndarray]) -> list[FrameRows]:
+    there = (read_variables if is_mat(head) else read_arrays)(path, ("points3D", *"UVW"))
     points = there.get("points3D")
     if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:
         raise InputError(path, "points3D", "expected places (frames, points, 3)")
@@ -129,11 +118,11 @@ def _rows(path: Path, there: Mapping[str, np.ndarray]) -> list[FrameRows]:
             moved[:, :, i] = given.astype(float)
     names = {f"{axis} deformed": "points3D" for axis in "xyz"}
     names |= {f"d{axis}": name for axis, name in zip("xyz", "UVW", strict=True)}
+    units = dict.fromkeys(names, "mm")
     frames = []
-    for place, move in zip(points, moved, strict=True):
-        columns = np.concatenate([place, move], axis=1).T
-        values = dict(zip(names, columns, strict=True))
-        frames.append(FrameRows(values, names, dict.fromkeys(values, "mm"), camera_axes=True))
+    for columns in np.concatenate([points, moved], axis=2):
+        rows = FrameRows(dict(zip(names, columns.T, strict=True)), names, units, camera_axes=True)
+        frames.append(frame_of(rows, options, path, "pyaldic"))
     return frames
 
 

@@ -1,6 +1,5 @@
 """Tecplot's text files (.dat), as LaVision DaVis and others export them: a frame a zone.
 
-    TITLE = "B00001"
     VARIABLES = "x[mm]" "y[mm]" "z[mm]" "Vx[mm]" "Vy[mm]" "Vz[mm]" "isValid"
     ZONE T="Frame 0" I=2, J=1, K=1, F=POINT
 
@@ -31,6 +30,7 @@ _VARIABLES = re.compile(rb"^[ \t]*+VARIABLES[ \t]*+=", re.IGNORECASE | re.MULTIL
 _WORD = re.compile(r"^\s*(TITLE|VARIABLES|ZONE|DATASETAUXDATA|TEXT|GEOMETRY)\b", re.IGNORECASE)
 _KEY = re.compile(r'\b([A-Z]+)\s*=\s*("[^"]*"|\([^)]*\)|[^\s,"(]+)', re.IGNORECASE)
 _NUMBERS = re.compile(r"^(?:[\s\d+\-.,e]|nan)*$", re.IGNORECASE)
+FLAGS = ("valid", "invalid", "sigma")
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -43,10 +43,18 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     names, zones = _zones(path)
     headings = [heading_of(name) for name in names]
     columns = _columns(path, headings, options)
+    found = {key: headings[i] for key, i in columns.items() if key not in FLAGS}
+    named = {key: heading.name for key, heading in found.items()}
+    units = {key: heading.unit for key, heading in found.items()}
     frames = []
     for line, keys, numbered in zones:
         table = _numbers(path, line, keys, numbered, len(names))
-        frames.append(frame_of(_rows(table, headings, columns, options), options, path, "tecplot"))
+        values = {key: table[:, i] for key, i in columns.items()}
+        valid, invalid, sigma = (values.pop(key, None) for key in FLAGS)
+        good = np.ones(len(table), dtype=bool) if valid is None else valid != 0
+        good &= True if invalid is None else invalid == 0
+        rows = FrameRows(values, named, units, valid=good, sigma=sigma)
+        frames.append(frame_of(rows, options, path, "tecplot"))
     return frames
 
 
@@ -142,21 +150,6 @@ def _columns(path: Path, headings: Sequence[Heading], options: FrameOptions) -> 
     if not {"x", "y", "x deformed"} & {*found}:
         raise InputError(path, "VARIABLES", f"no places are among them; the file has: {there}")
     return found
-
-
-def _rows(
-    table: NDArray[np.float64],
-    headings: Sequence[Heading],
-    columns: Mapping[str, int],
-    options: FrameOptions,
-) -> FrameRows:
-    values = {key: table[:, i] for key, i in columns.items()}
-    valid, invalid, sigma = (values.pop(key, None) for key in ("valid", "invalid", "sigma"))
-    good = np.ones(len(table), dtype=bool) if valid is None else valid != 0
-    good &= True if invalid is None else invalid == 0
-    names = {key: headings[columns[key]].name for key in values}
-    units = {key: headings[columns[key]].unit for key in values}
-    return FrameRows(values, names, units, valid=good, sigma=sigma)
 
 
 register_format(Format("tecplot", "frame", "text of Tecplot, as DaVis exports", read, recognises))

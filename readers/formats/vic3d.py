@@ -35,11 +35,6 @@ def recognises(path: Path, head: bytes) -> bool:
     return bool(_PLACE.search(top) and _MOVED.search(top))
 
 
-register_format(
-    Format("vic3d", "frame", "CSV of VIC-3D", text_reader("vic3d", upper=True), recognises)
-)
-
-
 NAMES = {"x": "X", "y": "Y", "z": "Z", "dx": "U", "dy": "V", "dz": "W", "sigma": "sigma"}
 
 
@@ -65,6 +60,8 @@ def read_vic3d_mat(path: Path, options: FrameOptions) -> Sequence[Frame]:
     return [frame_of(FrameRows(values, names, sigma=sigma), options, path, "vic3d-mat")]
 
 
-register_format(
-    Format("vic3d-mat", "frame", "MAT-files of VIC-3D", read_vic3d_mat, recognises_vic3d_mat)
-)
+for one in (
+    Format("vic3d", "frame", "CSV of VIC-3D", text_reader("vic3d", upper=True), recognises),
+    Format("vic3d-mat", "frame", "MAT-files of VIC-3D", read_vic3d_mat, recognises_vic3d_mat),
+):
+    register_format(one)

@@ -11,29 +11,64 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from table import Fault, faults
-
-ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 #: What the copy does not need, or must not share.
 LEFT_OUT = (".git", ".venv", "out", "build", "dist", "__pycache__", ".*_cache", "*.egg-info")
+#: Folders whose modules are no part of the product.
+APART = {"tests", "benchmarks", "docs", "examples", "out", "build", "dist", "__pycache__"}
 
 
-@contextmanager
-def copy() -> Iterator[Path]:
-    """A copy of the repository named bubblefit, beside the same measured data, for a while."""
-    with tempfile.TemporaryDirectory(prefix="faults-") as name:
-        root = Path(name) / "bubblefit"
-        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
-        shared = ROOT.parent / "shared"
-        if shared.is_dir():
-            (Path(name) / "shared").symlink_to(shared)
-        yield root
+@dataclass(frozen=True)
+class Fault:
+    """One fault: the text `before` of `file`, there once, becomes `after`; `tests` then fail.
+
+    file : below the repository. Where the text is no longer in it, the module may have moved: the
+        only module of the product that has the text, once, takes its place; of several the only
+        one of the same file name.
+    """
+
+    name: str
+    file: str
+    before: str
+    after: str
+    tests: Sequence[str]
+
+    def found(self, root: Path) -> Path:
+        """Return the module below `root` that has the text; ValueError unless it is there once."""
+
+        def having(paths):
+            times = {path: path.read_text("utf-8").count(self.before) for path in paths}
+            return {path: count for path, count in times.items() if count}
+
+        path = root / self.file
+        found = having([path] if path.exists() else [])
+        if not found:
+            every = ((path, path.relative_to(root).parts) for path in sorted(root.rglob("*.py")))
+            ours = (p for p, parts in every if not ({*parts} & APART or parts[0][0] == "."))
+            found = having(ours)
+        if len(found) > 1:
+            found = {p: n for p, n in found.items() if p.name == path.name} or found
+        if list(found.values()) != [1]:
+            where = {path.relative_to(root).as_posix(): count for path, count in found.items()}
+            raise ValueError(f"{self.name}: {self.before!r} is there {where or 'nowhere'}")
+        return next(iter(found))
+
+    def put_in(self, root: Path) -> None:
+        path = self.found(root)
+        text = path.read_text(encoding="utf-8")
+        path.write_text(text.replace(self.before, self.after), encoding="utf-8")
+
+
+def faults() -> list[Fault]:
+    """Return all, in the order of the file."""
+    content = tomllib.loads((HERE / "escaped.toml").read_text(encoding="utf-8"))
+    return [Fault(**entry) for entry in content["fault"]]
 
 
 def run(root: Path, tests: Sequence[str], keep: str = "1") -> tuple[int, dict[str, str], str]:
@@ -71,13 +106,15 @@ def main(names: Sequence[str]) -> int:
     if not chosen:
         print(f"no fault is named {' or '.join(names)}", file=sys.stderr)
         return 2
-    with copy() as root:
+    with tempfile.TemporaryDirectory(prefix="faults-") as folder:
+        root, shared = Path(folder) / "bubblefit", ROOT.parent / "shared"
+        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(*LEFT_OUT))
+        if shared.is_dir():
+            (root.parent / "shared").symlink_to(shared)
         tests = sorted({test for fault in chosen for test in fault.tests})
         code, ended, output = run(root, tests, "")
-        bad = [name for name, word in ended.items() if word != "PASSED"]
-        if code or bad or "skipped" in output.splitlines()[-1]:
-            print(output, file=sys.stderr)
-            print("without any fault, not every test passes", file=sys.stderr)
+        if code or {*ended.values()} != {"PASSED"} or "skipped" in output.splitlines()[-1]:
+            print(f"{output}\nwithout any fault, not every test passes", file=sys.stderr)
             return 1
         escaped = 0
         for fault in chosen:

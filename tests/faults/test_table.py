@@ -1,27 +1,17 @@
 """The list of faults stays true: each can still be put in, and names tests that are there."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-from ..places import ROOT
-from .table import Fault, faults
-
-every = pytest.mark.parametrize("fault", faults(), ids=lambda fault: fault.name)
+from .__main__ import ROOT, Fault, faults
 
 
-@every
-def test_a_fault_can_be_put_in(fault: Fault) -> None:
-    """Its text stands exactly once in its module, and Python reads what becomes of it."""
+@pytest.mark.parametrize("fault", faults(), ids=lambda fault: fault.name)
+def test_a_fault_can_be_put_in(fault):
     text = fault.found(ROOT).read_text(encoding="utf-8")
-    assert text.count(fault.before) == 1
-    assert fault.before != fault.after
+    assert text.count(fault.before) == 1 and fault.before != fault.after
     ast.parse(text.replace(fault.before, fault.after))
-
-
-@every
-def test_its_tests_are_there(fault: Fault) -> None:
     assert fault.tests
     for test in fault.tests:
         file, _, name = test.partition("::")
@@ -29,13 +19,10 @@ def test_its_tests_are_there(fault: Fault) -> None:
         assert f"def {name.partition('[')[0]}(" in text, test
 
 
-def test_names_are_each_one_s_own() -> None:
+def test_a_fault_follows_its_module_and_no_other(tmp_path):
+    """A module that moved is found by the text; two with the text, or none, are refused."""
     names = [fault.name for fault in faults()]
     assert len(set(names)) == len(names) > 20
-
-
-def test_a_fault_follows_its_module_and_no_other(tmp_path: Path) -> None:
-    """A module that moved is found by the text; two with the text, or none, are refused."""
     fault = Fault("one", "old/a.py", "x = 1\n", "x = 2\n", ("tests/test_a.py::test_a",))
     for folder in ("new", "tests", ".venv"):
         (tmp_path / folder).mkdir()

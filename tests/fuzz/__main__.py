@@ -7,13 +7,10 @@ Every fault is printed once a place in the code, and its file written to --out, 
 into tests/corpus/ when it is mended. Exit code 1 where there was one.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,8 +20,11 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from .judging import fault
-from .mutations import CHANGES, Change, mutated
-from .targets import Target, targets
+from .mutations import CHANGES, mutated
+from .targets import targets
+
+#: Examples of one reader before the next has its turn.
+SHARE = 200
 
 
 class Over(Exception):
@@ -37,67 +37,49 @@ class Over(Exception):
 @click.option("--only", multiple=True, help="a reader; several  [all]")
 @click.option("--seed", "number", type=int, default=0, show_default=True, help="of what is drawn")
 @click.option("--out", type=Path, default=Path("out/fuzz"), show_default=True)
-def main(examples: int, minutes: float | None, only: Sequence[str], number: int, out: Path) -> None:
+def main(examples, minutes, only, number, out) -> None:
     """Read hostile files and say which were not refused in one line."""
     end = time.monotonic() + 60 * minutes if minutes else float("inf")
     chosen = {name: one for name, one in targets().items() if not only or name in only}
     each = -(-examples // len(chosen))
-    search = Search(end, out)
-    warnings.simplefilter("ignore")
-    # A share at a time, so that every reader has its turn within the time.
-    for turn in range(-(-each // SHARE)):
-        for place, (name, target) in enumerate(chosen.items()):
-            count = min(SHARE, each - turn * SHARE)
-            search.look(name, target, count, 10**6 * number + 100 * turn + place)
-    for name, tried in search.tried.items():
-        click.echo(f"{tried:8d} {name}")
-    click.echo(f"{search.tried.total():8d} files in all, {len(search.faults)} faults")
-    sys.exit(bool(search.faults))
+    tried, faults = Counter(), set()
 
-
-class Search:
-    """What was tried, and the faults, each once a place in the code; no more after `end`."""
-
-    def __init__(self, end: float, out: Path) -> None:
-        self.end, self.out = end, out
-        self.tried: Counter[str] = Counter()
-        self.faults: set[str] = set()
-
-    def look(self, name: str, target: Target, count: int, number: int) -> None:
-        """Try so many files of a reader, drawn by `number`."""
-
+    def look(name, target, count, number) -> None:
         @seed(number)
         @settings(
-            max_examples=count,
-            deadline=None,
-            database=None,
-            phases=[Phase.generate],
+            max_examples=count, deadline=None, database=None, phases=[Phase.generate],
             suppress_health_check=list(HealthCheck),
-        )
+        )  # fmt: skip
         @given(st.sampled_from(target.seeds), CHANGES)
-        def read(content: bytes, changes: Sequence[Change]) -> None:
-            if time.monotonic() > self.end:
+        def read(content, changes) -> None:
+            if time.monotonic() > end:
                 raise Over
-            self.tried[name] += 1
-            hostile = mutated(content, changes)
-            path.write_bytes(hostile)
+            tried[name] += 1
+            path.write_bytes(hostile := mutated(content, changes))
             wrong = fault(target.read, path)
             key = f"{name}: {wrong.split(' at ')[-1]}"
-            if wrong and key not in self.faults:
-                self.out.mkdir(parents=True, exist_ok=True)
-                number = len(self.faults)
-                kept = self.out / f"{name.replace(' ', '-')}-{number}{target.suffix}"
+            if wrong and key not in faults:
+                out.mkdir(parents=True, exist_ok=True)
+                kept = out / f"{name.replace(' ', '-')}-{len(faults)}{target.suffix}"
                 kept.write_bytes(hostile)
-                self.faults.add(key)
+                faults.add(key)
                 click.echo(f"{name}: {wrong} ({kept})")
 
         with TemporaryDirectory(prefix="fuzz-") as folder, suppress(Over):
             path = Path(folder) / f"hostile{target.suffix}"
             read()
 
+    warnings.simplefilter("ignore")
+    # A share at a time, so that every reader has its turn within the time.
+    for turn in range(-(-each // SHARE)):
+        for place, (name, target) in enumerate(chosen.items()):
+            count = min(SHARE, each - turn * SHARE)
+            look(name, target, count, 10**6 * number + 100 * turn + place)
+    for name, count in tried.items():
+        click.echo(f"{count:8d} {name}")
+    click.echo(f"{tried.total():8d} files in all, {len(faults)} faults")
+    sys.exit(bool(faults))
 
-#: Examples of one reader before the next has its turn.
-SHARE = 200
 
 if __name__ == "__main__":
     main()

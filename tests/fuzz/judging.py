@@ -1,12 +1,10 @@
 """A reading of a hostile file, and what is a fault of the reader: anything but the project's own
 one line, more memory than the file can ask for, more time than anybody waits."""
 
-from __future__ import annotations
-
 import resource
 import signal
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,7 +21,7 @@ class Endless(BaseException):
 
 
 @contextmanager
-def limits(memory: int = MEMORY, seconds: int = SECONDS) -> Iterator[None]:
+def limits(memory: int = MEMORY, seconds: int = SECONDS):
     """No more memory, and no more time, for what is done in the block."""
 
     def stop(*_: object) -> None:

@@ -1,7 +1,5 @@
 """`make mutants`: run cosmic-ray over a copy of the code, and list the faults no test notices."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -67,8 +65,7 @@ def tests_near(file: str) -> list[str]:
     package, _, name = module.removesuffix(".__init__").rpartition(".")
     imports = re.compile(rf"{re.escape(package)}(\.| import .*\b){name}\b")
     folder = ROOT / "tests" / (Path(file).parent if "/" in file else "none")
-    every = sorted((ROOT / "tests").rglob("test_*.py"))
-    every.sort(key=lambda at: at.stem != f"test_{name}")
+    every = sorted((ROOT / "tests").rglob("test_*.py"), key=lambda at: (at.stem[5:] != name, at))
     near = [at for at in every if at.parent == folder or imports.search(at.read_text())]
     return [str(at.relative_to(ROOT)) for at in near]
 

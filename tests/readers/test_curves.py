@@ -4,19 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
 from bubblefit.experiments.bubble.placement import axes_angle, in_all_quarters, line_angle
-from bubblefit.readers.columns import means, split_unit
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
 from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header, nothing_found
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..complaints import complaint, complaint_with
 
 
-# --- curves ---
 @pytest.fixture(scope="module")
 def scratch(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("exports") / "strip 3.csv"
@@ -28,10 +25,10 @@ def read(path: Path, text: str, encoding: str = "utf-8", **options) -> tuple[Loa
 
 
 #: Instron Bluehill: properties, then names and bracketed units; with a German setting every
-#: number is a quoted decimal comma, though the separator is a comma.
+#: number is a quoted decimal comma, though the separator is a comma; with several specimens, the
+#: specimen's number stands before the names.
 BLUEHILL = """\
 Specimen properties : Width,25.0,mm
-Specimen properties : Thickness,0.81,mm
 Specimen properties : Specimen label,""
 
 Time,Extension,Load,Tensile strain (Extension),Tensile stress,Cycle count
@@ -43,16 +40,11 @@ BLUEHILL_COMMAS = """\
 Results Table 1
 
 
-Results Table 2
-
-
-
 Time,Displacement,Force
 (s),(mm),(kN)
 "0,0000","-0,0100","-0,00002"
 "0,1000","0,2500","0,1005"
 """
-#: Bluehill with several specimens: the specimen's number stands before the names.
 BLUEHILL_BLOCK = """\
 Results Table 1
 ,Width,Thickness
@@ -64,11 +56,10 @@ Results Table 1
 ,"0.0","-0.01","-0.00002"
 ,"0.1","0.25","0.1005"
 """
-#: MTS TestSuite: four lines about the test, two blank ones, names, units without brackets.
+#: MTS TestSuite: lines about the test, blank ones, names, units without brackets.
 TESTSUITE = """\
 C:\\MTS\\Strip tests\\DAQ- Crosshead, Load.csv
 Test: cut strip, ASTM D751
-Test Run: 3
 Date: 1/2/2014 10:11:12 AM
 
 
@@ -80,8 +71,6 @@ mm,kN,sec
 #: MTS TestWorks and Elite: quoted names, rates among the properties.
 TESTWORKS = """\
 "Test Method","Strip test, extension control"
-"Sample ID","warp 3"
-"Test Date","1/2/2014"
 "Load Cell","30","kN"
 "Test speed","300","mm/min"
 "Crosshead [mm]"\t"Load [N]"\t"Time [s]"
@@ -103,19 +92,16 @@ SEMICOLONS = "Weg in mm; Kraft in kN;\n-0,01;-0,00002;\n0,25;0,1005;\n;;\n"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_what_machines_export(scratch, encoding):
+    for text in (
         BLUEHILL, BLUEHILL_COMMAS, BLUEHILL_BLOCK, TESTSUITE, TESTWORKS.replace("\t", ","),
         TESTWORKS, TESTXPERT, SEMICOLONS,
-    ],
-)  # fmt: skip
-def test_what_machines_export(scratch, text, encoding):
-    (curve,) = read(scratch, text, encoding)
-    np.testing.assert_allclose(curve.elongation, [-0.01, 0.25], rtol=1e-14)
-    np.testing.assert_allclose(curve.load, [-0.02, 100.5], rtol=1e-14)
-    assert (curve.direction, curve.specimen, curve.path) == ("warp", "strip 3", scratch)
-    assert curve.time is None
+    ):  # fmt: skip
+        (curve,) = read(scratch, text, encoding)
+        np.testing.assert_allclose(curve.elongation, [-0.01, 0.25], rtol=1e-14)
+        np.testing.assert_allclose(curve.load, [-0.02, 100.5], rtol=1e-14)
+        assert (curve.direction, curve.specimen, curve.path) == ("warp", "strip 3", scratch)
+        assert curve.time is None
 
 
 def test_the_measured_points_need_no_options(shared_data):
@@ -149,32 +135,25 @@ def test_specimens_and_directions_have_columns(scratch):
     assert "no fill; it has: warp, bias" in complaint(read, scratch, text, direction="fill")
     columns = {"specimen": "Test direction", "direction": "Specimen No."}
     message = complaint(read, scratch, text, direction=None, columns=columns)
-    assert "line 2, column 'Specimen No.': unknown direction 'A'; use one of warp" in message
+    assert "line 2, column 'Specimen No.': unknown direction 'A'" in message
 
 
 def test_names_given_settle_what_is_ambiguous(scratch):
     text = TESTXPERT.replace("Dehnung", "Weg absolut").replace('"%"', '"mm"')
     message = complaint(read, scratch, text)
     assert "line 5: the column of elongation may be 'Standardweg' or 'Weg absolut'" in message
-    assert "the file has: Prüfzeit, Standardkraft, Standardweg" in message
     (curve,) = read(scratch, text, columns={"elongation": "Weg absolut"})
     assert curve.notes == ()
     np.testing.assert_allclose(curve.elongation, [0, 0.3])
     # Names the reader does not know, with and without their unit; a column of time.
-    text = "t,Kanal 1 [mm],Kanal 2 [kN]\n0,1,2\n5,3,4\n"
     columns = {"elongation": "Kanal 1", "load": "Kanal 2 [kN]", "time": "t"}
-    (curve,) = read(scratch, text, columns=columns)
+    (curve,) = read(scratch, "t,Kanal 1 [mm],Kanal 2 [kN]\n0,1,2\n5,3,4\n", columns=columns)
     np.testing.assert_allclose(curve.load, [2000, 4000])
     np.testing.assert_allclose(curve.time, [0, 5])
-
-
-def test_of_two_elongations_the_one_on_the_strip_is_taken_and_said(scratch):
-    text = TESTXPERT.replace("Dehnung", "Traversenweg absolut").replace('"%"', '"mm"')
-    (curve,) = read(scratch, text)
+    (curve,) = read(scratch, TESTXPERT.replace("Dehnung", "Traversenweg").replace('"%"', '"mm"'))
     np.testing.assert_allclose(curve.elongation, [-0.01, 0.25])
     (note,) = curve.notes
-    assert "the elongation is column 'Standardweg', not 'Traversenweg absolut'" in note
-    assert "columns = { elongation = ... }" in note
+    assert "the elongation is column 'Standardweg', not 'Traversenweg'" in note
     text = "Crosshead [mm],Extensometer displacement [mm],Load [N]\n5,1,0\n6,2,10\n"
     (curve,) = read(scratch, text)
     np.testing.assert_allclose(curve.elongation, [1, 2])
@@ -192,40 +171,37 @@ def test_loads_per_width_are_those_of_the_whole_strip(scratch, unit, newton):
         text = f"Weg [mm];{name}\n0,5;2\n1,5;4,0\n"
         (curve,) = read(scratch, text, width=25.0)
         np.testing.assert_allclose(curve.load, [2 * newton, 4 * newton], rtol=1e-14)
-    assert f"{unit} is a load per width; say the strip's width" in complaint(read, scratch, text)
+    assert f"{unit} is a load per width" in complaint(read, scratch, text)
     (curve,) = read(scratch, "Load,disp_mm\n2,1\n", load_unit="kN/m", width=50.0)
     assert curve.load == [100.0]
 
 
-def test_results_above_the_readings_are_not_the_readings(scratch):
-    results = (
-        "Results\nSpecimen,Maximum load [N],Extension at break [mm]\n1,2000,14.5\n2,2010,14.1\n\n"
-    )
+def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
+    results = "Results\nSpecimen,Maximum load [N],Extension at break [mm]\n1,20,14.5\n2,21,14.1\n\n"
     (curve,) = read(scratch, results + "Extension [mm],Load [N]\n0,0\n1,100\n2,180\n")
     np.testing.assert_allclose(curve.load, [0, 100, 180])
     (note,) = curve.notes
     assert "names in line 6, which has most rows, is read; not that of line 2" in note
-
-
-def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
     block = "Time,Extension,Load\n(s),(mm),(N)\n0,0,0\n1,1,100\n2,2,{}\n"
     text = "Specimen 1\n" + block.format(180) + "\nSpecimen 2\nWidth,25,mm\n" + block.format(190)
     (curve,) = read(scratch, text)
     np.testing.assert_allclose(curve.load, [0, 100, 180, 0, 100, 190])
-    assert [len(part.load) for part in split_at_restarts(curve)] == [3, 3]
-    assert curve.notes == ()
+    assert [len(part.load) for part in split_at_restarts(curve)] == [3, 3] and curve.notes == ()
     message = complaint(read, scratch, text.replace("1,1,100", "1,x,100"))
     assert "line 5, column 'Extension': expected a number, found 'x'" in message
     # A specimen that begins below zero is one.
-    text = "Weg [mm];Kraft [N]\n-0,2;0\n0,1;1\n0,3;2\n0,1;0\n0,3;2\n"
-    (curve,) = read(scratch, text, direction="warp")
+    (curve,) = read(scratch, "Weg [mm];Kraft [N]\n-0,2;0\n0,1;1\n0,3;2\n0,1;0\n0,3;2\n")
     assert [len(part.load) for part in split_at_restarts(curve)] == [3, 2]
+    # One number that can only be a decimal settles it for the file: 1,234 is no thousand.
+    for text, options in (("1,234;2\n", {"decimal": ","}), ("1,234;2\n0,5;3\n", {})):
+        assert read(scratch, "Load (N);disp_mm\n" + text, **options)[0].load[0] == 1.234
 
 
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
         ("", {}, "no header row"),
+        ("Load\0(N),disp_mm\n1,2\n", {}, "not a text file"),
         ("a,b\n1,2\n", {}, "line 1, above the first numbers, has: a, b"),
         ("Load (N),Extension (mm)\n", {}, "line 1: no rows of numbers"),
         ("Load,Extension\n1,2\n", {}, "column 'Extension': the file does not name the unit"),
@@ -248,55 +224,17 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
         ("Load (kN),disp_mm\n1e307,2\n", {}, "numbers too large; is the unit 'kN' right?"),
         ("Load (N),disp_mm\n1,2\n", {"decimal": ";"}, "decimal: expected a point or a comma"),
         ("Specimen,Load (N),disp_mm\n,1,2\n", {}, "column 'Specimen': expected the specimen's"),
-        ("Load\0(N),disp_mm\n1,2\n", {}, "not a text file"),
     ],
 )
 def test_the_refusal_says_what_is_wrong(scratch, text, options, words):
     assert words in complaint(read, scratch, text, **options)
 
 
-def test_a_file_that_is_not_there(tmp_path):
-    assert "no such file" in complaint(read_load_curves, tmp_path / "x.csv")
-    assert "cannot be read" in complaint(read_load_curves, tmp_path)
-
-
-def test_one_thousand_and_little_more_than_one(scratch):
-    text = "Load (N);disp_mm\n1,234;2\n"
-    (curve,) = read(scratch, text, decimal=",")
-    assert curve.load == [1.234]
-    # One number that can only be a decimal settles it for the file.
-    (curve,) = read(scratch, text + "0,5;3\n")
-    np.testing.assert_allclose(curve.load, [1.234, 0.5])
-
-
-@pytest.mark.parametrize(
-    ("name", "plain", "unit"),
-    [
-        ("Load (kN)", "Load", "kN"), ("Crosshead [mm]", "Crosshead", "mm"),
-        ("gauge_disp_mm", "gauge_disp", "mm"), ("load_N", "load", "N"), ("Kraft / N", "Kraft", "N"),
-        ("Weg in mm", "Weg", "mm"), ("PROBENBREITE <mm>", "PROBENBREITE", "mm"),
-        ("Tensile strain (Extension)", "Tensile strain (Extension)", ""),
-        ("Load (Channel 1)", "Load (Channel 1)", ""), ("Strain (mm/mm)", "Strain", "mm/mm"),
-        ("Extension", "Extension", ""), ("m", "m", ""),
-    ],
-)  # fmt: skip
-def test_units_in_names(name, plain, unit):
-    assert split_unit(name) == (plain, unit)
-
-
-def test_what_is_neither_load_nor_elongation():
-    for name in ("Tensile strain (Extension)", "Load rate (N/s)", "Load Cell", "Preload (N)"):
-        assert not means(name, "elongation") and not means(name, "load")
-
-
-measured = st.lists(
-    st.tuples(*[st.floats(-1e6, 1e6, allow_subnormal=False)] * 2), min_size=1, max_size=20
-)
-
-
 @settings(deadline=None, max_examples=200)
 @given(
-    rows=measured,
+    rows=st.lists(
+        st.tuples(*[st.floats(-1e6, 1e6, allow_subnormal=False)] * 2), min_size=1, max_size=20
+    ),
     separator=st.sampled_from([",", ";", "\t"]),
     comma=st.booleans(),
     quoted=st.booleans(),
@@ -319,8 +257,7 @@ def test_good_exports_come_back(
     quoted = quoted or (comma and separator == ",")
     load, length = (f" ({load_unit})", f" ({length_unit})") if units == "names" else ("", "")
     table = [[f"Extension{length}", f"Load{load}", "Größe"]]
-    if units == "row":
-        table.append([f"({length_unit})", load_unit, ""])
+    table += [[f"({length_unit})", load_unit, ""]] * (units == "row")
     for u, f in rows:
         # One decimal sixteen places long: no thousand.
         cells = [f"{u:.16e}", f"{f:.16e}", "a b"]
@@ -328,45 +265,10 @@ def test_good_exports_come_back(
     if quoted:
         table = [[f'"{cell}"' for cell in row] for row in table]
     lines = noise + [separator.join(row[i] for i in order) for row in table]
-    options = {}
-    if units == "options":
-        options = {"load_unit": load_unit, "length_unit": length_unit}
-    (curve,) = read(scratch, breaks.join(lines) + breaks, encoding, **options)
+    asked = {"load_unit": load_unit, "length_unit": length_unit} if units == "options" else {}
+    (curve,) = read(scratch, breaks.join(lines) + breaks, encoding, **asked)
     expected = np.array(rows) * [{"mm": 1, "m": 1e3}[length_unit], {"N": 1, "kN": 1e3}[load_unit]]
     np.testing.assert_allclose(np.stack([curve.elongation, curve.load], 1), expected, rtol=1e-14)
-
-
-@settings(deadline=None, max_examples=400)
-@given(
-    whole=st.sampled_from([BLUEHILL, BLUEHILL_COMMAS, TESTSUITE, TESTXPERT, SEMICOLONS]),
-    start=st.floats(0, 1),
-    length=st.integers(0, 60),
-    garbage=st.one_of(
-        st.binary(max_size=30),
-        st.text('",;\n#.e-+0129 \t\r()mkN', max_size=30).map(str.encode),
-        st.sampled_from([b"Load (N)", b"Extension", b"nan", b"1e999", b"_", b"\xff\xfe"]),
-    ),
-)
-def test_a_damaged_export_is_curves_or_refused(scratch, whole, start, length, garbage):
-    content = whole.encode()
-    at = int(start * len(content))
-    scratch.write_bytes(content[:at] + garbage + content[at + length :])
-    try:
-        curves = read_load_curves(scratch, direction="fill")
-    except InputError as error:
-        assert "\n" not in str(error)
-        assert str(scratch) in str(error)
-    else:
-        for curve in curves:
-            assert len(curve.load) == len(curve.elongation) > 0
-            assert np.isfinite(curve.load).all() and np.isfinite(curve.elongation).all()
-
-
-@settings(deadline=None, max_examples=200)
-@given(garbage=st.one_of(st.binary(max_size=80), st.text(max_size=80).map(str.encode)))
-def test_garbage_is_refused(scratch, garbage):
-    scratch.write_bytes(garbage)
-    assert str(scratch) in complaint(read_load_curves, scratch, direction="fill")
 
 
 @pytest.mark.parametrize(
@@ -375,24 +277,19 @@ def test_garbage_is_refused(scratch, garbage):
         ("mm,kN\n", "mm,N\n", "column 'Load': unit 'N' here, but 'kN' in the table"),
         ("mm,kN\n", "cm,kN\n", "column 'Extension': unit 'cm' here, but 'mm' in the table"),
         ("", "mm,kN\n", "column 'Extension': unit 'mm' here, but none in the table"),
-        ("mm,kN\n", "mm,kN\n", ""),
-        ("mm,kN\n", "", ""),
+        ("mm,kN\n", "mm,kN\n", ""), ("mm,kN\n", "", ""),
     ],
-)
-def test_tables_of_the_same_names_have_the_same_units(tmp_path, first, second, words):
-    path, rows = tmp_path / "a.csv", "0,0\n1,0.1\n2,0.2\n"
-    head = "Extension,Load\n"
-    path.write_text(f"{head}{first}{rows}\n{head}{second}{rows}")
+)  # fmt: skip
+def test_tables_of_the_same_names_have_the_same_units(scratch, first, second, words):
+    rows = "0,0\n1,0.1\n2,0.2\n"
+    text = f"Extension,Load\n{first}{rows}\nExtension,Load\n{second}{rows}"
     if words:
-        said = complaint(read_load_curves, path, direction="warp")
-        line = 6 + bool(first)
-        assert said == f"{path}: line {line}, {words} of the same names in line 1; correct one"
+        assert f"line {6 + bool(first)}, {words}" in complaint(read, scratch, text)
     else:
-        loads = [curve.load for curve in read_load_curves(path, direction="warp")]
+        loads = [curve.load for curve in read(scratch, text)]
         assert np.concatenate(loads) == pytest.approx([0.0, 100.0, 200.0] * 2)
 
 
-# --- machine headers ---
 NEEDED = ("elongation", "load")
 
 
@@ -418,12 +315,6 @@ def test_the_row_of_names(texts, index):
     assert find_header(rows(*texts), {}, NEEDED) == index
 
 
-def test_names_that_are_given_and_cells_of_a_line():
-    named = {"load": "F", "elongation": "u"}
-    assert find_header(rows("Load,Extension", "1,2", "F,u", "3,4"), named, NEEDED) == 2
-    assert cells_of('"a,b", c', ",") == ["a,b", "c"] and cells_of(" a ;b", ";") == ["a", "b"]
-
-
 def blocks(*texts: str):
     found = find_blocks(Path("a.csv"), rows(*texts), 0, {}, NEEDED)
     return {
@@ -434,29 +325,25 @@ def blocks(*texts: str):
 
 def test_tables_one_after_the_other():
     """What stands between two tables is the title of the second; blank rows are none."""
-    names = ("Load (N)", "Extension")
     found = blocks(
         "Load (N),Extension", ",mm", "0,0", ",", "1,2", "Specimen 2,x", "Width,25",
         "Load (N),Extension", "3,4", "5,6", "end,",
     )  # fmt: skip
-    assert found == {
-        names: [
-            (11, {"Load (N)": "N", "Extension": "mm"}, [13, 15]),
-            (18, {"Load (N)": "N", "Extension": ""}, [19, 20, 21]),
-        ]
-    }
+    assert found[("Load (N)", "Extension")] == [
+        (11, {"Load (N)": "N", "Extension": "mm"}, [13, 15]),
+        (18, {"Load (N)": "N", "Extension": ""}, [19, 20, 21]),
+    ]
     other = blocks("Load,Extension", "1,2", "Extension,Load", "(mm),[N]", "3,4")
     assert other == {
         ("Load", "Extension"): [(11, {"Load": "", "Extension": ""}, [12])],
         ("Extension", "Load"): [(13, {"Extension": "mm", "Load": "N"}, [15])],
     }
-
-
-def test_a_row_of_units_that_contradicts_the_names():
-    assert "line 12, column 'Load (N)':" in complaint(blocks, "Load (N),Extension", "kN,mm", "1,2")
     # A row with a number in a column that is needed is none of units; signs alone are none.
     assert blocks("Load,Extension", "N,3", "1,2")[("Load", "Extension")][0][1]["Load"] == ""
     assert blocks("Load,Extension", "-,-", "1,2")[("Load", "Extension")][0][2] == [12, 13]
+    named = {"load": "F", "elongation": "u"}
+    assert find_header(rows("Load,Extension", "1,2", "F,u", "3,4"), named, NEEDED) == 2
+    assert cells_of('"a,b", c', ",") == ["a,b", "c"] and cells_of(" a ;b", ";") == ["a", "b"]
 
 
 @pytest.mark.parametrize(
@@ -472,56 +359,40 @@ def test_a_row_of_units_that_contradicts_the_names():
 )
 def test_which_row_it_might_have_been(lines, words):
     said = nothing_found(list(enumerate(lines, start=11)), {"load": "F"}, NEEDED)
-    assert said == (
-        "no header row with the columns one of elongation and 'F'; name them with columns; " + words
-    )
+    assert said.startswith("no header row with the columns one of elongation and 'F'; name them")
+    assert said.endswith(words)
 
 
-# --- machine loads ---
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("t_sek;Prüfzeit\n;s\n0;1,5\n0;2\n", [1.5, 2.0]),
-        ("Time (min)\n1\n2\n", [60.0, 120.0]),
+        ("t_sek;Prüfzeit\n;s\n0;1,5\n0;2\n", [1.5, 2.0]), ("Time (min)\n1\n2\n", [60.0, 120.0]),
         ("frame,time_ms\n0,1500\n1,1600.5\n", [1.5, 1.6005]),
         ("Running Time,Cycle time\n3,4\n", [3.0]),
-    ],
-)
-def test_units_of_time(tmp_path, text, expected):
-    path = tmp_path / "t.csv"
-    path.write_text(text)
-    np.testing.assert_allclose(read_times(path), expected, rtol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
         ("Time (d)\n1\n", "line 1, column 'Time (d)': unit 'd' is not one of s, sec, ms, min, h"),
         ("Time,Running time\n1,2\n", "the column of time may be 'Time' or 'Running time'"),
         ("frame\n1\n", "no header row with the columns one of time"),
         ("time\n1\nx\n", "line 3, column 'time': expected a number, found 'x'"),
     ],
-)
-def test_times_that_cannot_be_read(tmp_path, text, words):
-    path = tmp_path / "t.csv"
-    path.write_text(text)
-    said = complaint(read_times, path)
-    assert words in said and str(path) in said
+)  # fmt: skip
+def test_units_of_time(scratch, text, expected):
+    scratch.write_text(text)
+    if isinstance(expected, list):
+        np.testing.assert_allclose(read_times(scratch), expected, rtol=1e-14)
+    else:
+        complaint_with([expected, str(scratch)], read_times, scratch)
 
 
-def test_loads_need_no_elongation(tmp_path):
-    path = tmp_path / "l.csv"
-    path.write_text("Time (min),Load (kN),Load rate (kN/s)\n0,1,7\n0.5,2,7\n")
-    plain, timed = read_machine_loads(path), read_machine_loads(path, timed=True)
-    np.testing.assert_array_equal(plain.load, [1000, 2000])
-    assert plain.time is None and timed.time is not None
-    np.testing.assert_array_equal(timed.time, [0, 30])
-    path.write_text("Load (kN)\n1\n")
-    said = complaint(read_machine_loads, path, timed=True)
+def test_loads_need_no_elongation(scratch):
+    scratch.write_text("Time (min),Load (kN),Load rate (kN/s)\n0,1,7\n0.5,2,7\n")
+    plain, timed = read_machine_loads(scratch), read_machine_loads(scratch, timed=True)
+    assert plain.load.tolist() == [1000, 2000] and timed.time.tolist() == [0, 30]
+    assert plain.time is None
+    scratch.write_text("Load (kN)\n1\n")
+    said = complaint(read_machine_loads, scratch, timed=True)
     assert "no header row with the columns one of load and one of t" in said
 
 
-# --- directions ---
 @given(st.integers(-720, 720))
 def test_a_line_and_two_axes_are_told_by_one_angle_each(degrees):
     line, axes = line_angle(degrees), axes_angle(degrees)

@@ -4,10 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
 from bubblefit.experiments.strips.gauge import virtual_strain_gauge
-from bubblefit.readers.columns import PRESSURE_UNITS
-from bubblefit.readers.curves import direction_named, read_load_curves
 from bubblefit.readers.fields import QUANTITIES, read_fields
 from bubblefit.readers.frames import (
     Frame,
@@ -17,13 +14,10 @@ from bubblefit.readers.frames import (
     frame_of,
     read_frames,
 )
-from bubblefit.readers.machine_tables import Channel, in_unit, read_machine_loads
-from bubblefit.readers.names import value_in_file
 from bubblefit.readers.pressure_log import AT_REST_FRAME_CHOICE as AT_REST
 from bubblefit.readers.pressure_log import BEYOND, RELEASED, REPEATED, choose_frames
-from bubblefit.readers.registry import format_named, format_of
-from bubblefit.readers.tables import read_table
-from hypothesis import given, settings
+from bubblefit.readers.registry import format_of
+from hypothesis import given
 from hypothesis import strategies as st
 
 from .. import dic_exports
@@ -31,34 +25,23 @@ from ..complaints import complaint, complaint_with
 from ..dic_exports import EXPORTS
 
 
-# --- frames ---
-@pytest.fixture(scope="module")
-def scratch(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("frames") / "frame.csv"
-
-
-def options(columns=None, **others) -> FrameOptions:
-    return FrameOptions(columns=columns, **others)
-
-
 def test_frames_are_read_with_holes(tmp_path):
     path = tmp_path / "B00001.csv"
     path.write_text("# m\nX,Y,Z,U,V,W,mask\n1,2,3,4,5,6,0\n1,2,3,,NaN,,0\n1,x,3,4,5,6,1\n")
     names = dict(zip(("x", "y", "z", "dx", "dy", "dz"), "XYZUVW", strict=True))
-    (frame,) = read_frames([path], options(names, flag_column="mask", length_scale=10.0))
-    np.testing.assert_array_equal(frame.points, [[10, 20, 30], [10, 20, 30]])
-    np.testing.assert_array_equal(frame.displacement, [[40, 50, 60], [np.nan] * 3])
-    assert frame.path == path
-    message = complaint(read_frames, [path], options(names))
+    for columns in (names, None):  # the names are found without being told
+        options = FrameOptions(columns=columns, flag_column="mask", length_scale=10.0)
+        (frame,) = read_frames([path], options)
+        np.testing.assert_array_equal(frame.points, [[10, 20, 30], [10, 20, 30]])
+        np.testing.assert_array_equal(frame.displacement, [[40, 50, 60], [np.nan] * 3])
+        assert frame.path == path
+    message = complaint(read_frames, [path], FrameOptions(columns=names))
     assert "B00001.csv: line 5, column 'Y': expected a number, found 'x'" in message
-    # The names are found without being told.
-    (found,) = read_frames([path], options(flag_column="mask", length_scale=10.0))
-    np.testing.assert_array_equal(found.points, frame.points)
     assert complaint(read_frames, []).startswith("files")
-    assert complaint(options, {"w": "W"}).startswith("columns: unknown quantity 'w'")
-    assert complaint(options, length_scale=0.0).startswith("length_scale")
-    huge = options(names, flag_column="mask", length_scale=1e308)
-    assert "length unit" in complaint(read_frames, [path], huge)
+    assert complaint(FrameOptions, columns={"w": "W"}).startswith("columns: unknown quantity 'w'")
+    for scale in (0.0, np.inf):
+        assert complaint(FrameOptions, length_scale=scale).startswith("length_scale: ")
+    assert FrameOptions(length_scale=1e-300).length_scale == 1e-300
 
 
 @pytest.mark.parametrize(
@@ -76,21 +59,7 @@ def test_arrays_that_make_no_frame(points, displacement, sigma, shapes):
     assert len(Frame(np.zeros((2, 3)), np.zeros((2, 3)), sigma=np.zeros(2)).points) == 2
 
 
-@settings(deadline=None, max_examples=200)
-@given(start=st.integers(0, 60), length=st.integers(0, 30), garbage=st.binary(max_size=20))
-def test_a_damaged_frame_is_a_frame_or_refused(scratch, start, length, garbage):
-    content = b"x,y,z,dx,dy,dz\n1,2,3,4,5,6\n1,2,3,,nan,\n7,8,9,10,11,12\n"
-    scratch.write_bytes(content[:start] + garbage + content[start + length :])
-    try:
-        (frame,) = read_frames([scratch])
-    except InputError as error:
-        assert str(scratch) in str(error) and "\n" not in str(error)
-    else:
-        assert not np.isinf(frame.points).any() and not np.isinf(frame.displacement).any()
-
-
-# --- frame rows ---
-PATH = Path("a.csv")
+PATH, PLAIN = Path("a.csv"), FrameOptions()
 #: Of three rows; the last one is zero throughout.
 VALUES = {
     "x": np.array([1.0, 2.0, 0.0]), "y": np.array([3.0, 4.0, 0.0]), "z": np.array([5.0, 6.0, 0.0]),
@@ -100,11 +69,9 @@ VALUES = {
 NAMES = {name: name.upper() for name in VALUES}
 
 
-def frame(values=VALUES, units=None, options=None, **rows):
+def frame(values=VALUES, units=None, options=PLAIN, **rows):
     names = {name: name.upper() for name in values}
-    return frame_of(
-        FrameRows(values, names, units or {}, **rows), options or FrameOptions(), PATH, "f"
-    )
+    return frame_of(FrameRows(values, names, units or {}, **rows), options, PATH, "f")
 
 
 def test_lengths_become_mm_each_by_its_own_unit():
@@ -115,9 +82,8 @@ def test_lengths_become_mm_each_by_its_own_unit():
     assert found.path == PATH and found.sigma is None
     source = found.source
     assert (source.format, source.columns, source.notes) == ("f", NAMES, ())
-    assert source.units == {"x": "cm", "y": "M", "z": "in", "dx": "µm", "dz": "?"}
-    said = complaint(frame, units={"x": "mm", "dy": "Pixel"})
-    assert "column 'DY': is in pixels; export lengths, or name a column of dy in mm with" in said
+    assert source.units == {name: unit for name, unit in units.items() if unit}
+    assert "column 'DY': is in pixels" in complaint(frame, units={"x": "mm", "dy": "Pixel"})
 
 
 def test_rows_left_out_are_counted_once_by_the_first_reason():
@@ -131,9 +97,6 @@ def test_rows_left_out_are_counted_once_by_the_first_reason():
     expected = {"without a value": 3, "flagged as doubtful": 3, "sigma below zero": 2}
     assert found.dropped == expected
     assert frame().dropped == {"all zero": 1}
-
-
-def test_one_row_of_zeros_is_a_point_where_nothing_moves():
     still = {name: value * (name[0] != "d") for name, value in VALUES.items()}
     assert len(frame(still).points) == 3 and frame(still).dropped == {}
     twice = {name: np.append(value, 0.0) for name, value in still.items()}
@@ -146,12 +109,11 @@ def test_axes_of_a_camera_are_turned_over_unless_the_user_says_no():
     found = frame(camera_axes=True, notes=("read",))
     np.testing.assert_array_equal(found.points[0], [1, -3, -5])
     np.testing.assert_array_equal(found.displacement[0], [0.1, -0.3, -0.5])
-    turned = "y and z are turned over: in the file y points down, z away from the camera"
-    assert found.source.notes == ("read", turned)
+    assert found.source.notes[0] == "read" and "turned over" in found.source.notes[1]
     as_written = frame(camera_axes=True, options=FrameOptions(camera_axes=False))
     np.testing.assert_array_equal(as_written.points[0], [1, 3, 5])
     asked = frame(options=FrameOptions(camera_axes=True))
-    assert asked.source.notes == (turned,)
+    assert asked.source.notes == found.source.notes[1:]
 
 
 def test_places_after_the_motion():
@@ -159,105 +121,88 @@ def test_places_after_the_motion():
     found = frame(after)
     np.testing.assert_allclose(found.points[1], [1.8, 3.6, 5.4])
     np.testing.assert_allclose(found.displacement[1], [0.2, 0.4, 0.6])
-    assert found.source.notes == (
-        "x, y, z are places in the deformed state; the displacement is taken off",
-    )
+    assert "x, y, z are places in the deformed state" in found.source.notes[0]
     asked = frame(options=FrameOptions(coordinates="deformed"))
     np.testing.assert_array_equal(asked.points, found.points)
     both = {**{name: VALUES[name] for name in "xyz"}, "x deformed": np.array([1.5, 2.5, 0.0])}
-    both |= {"dy": VALUES["dy"], "dz": VALUES["dz"]}
-    found = frame(both)
+    found = frame(both | {"dy": VALUES["dy"], "dz": VALUES["dz"]})
     np.testing.assert_allclose(found.displacement[:, 0], [0.5, 0.5])
     assert found.source.notes == ("displacements along x are deformed less reference places",)
 
 
 def test_what_is_missing_is_said():
     flat = {name: value for name, value in VALUES.items() if "z" not in name}
-    assert "planar correlation, without z and dz; a stereo one is needed" in complaint(frame, flat)
-    assert "planar correlation, without dz; a" in complaint(frame, {**flat, "z": VALUES["z"]})
     some = {name: VALUES[name] for name in ("x", "y", "dy")}
-    assert "no column of z and dx and dz; name them with columns. Read:" in complaint(frame, some)
+    with_z = {**flat, "z": VALUES["z"]}
+    for values, options, words in (
+        (flat, {}, "without z and dz;"), (with_z, {}, "without dz;"),
+        (some, {}, "no column of z and dx and dz;"), (with_z, {"planar": True}, "dz"),
+    ):  # fmt: skip
+        assert words in complaint(frame, values, options=FrameOptions(**options))
     planar = frame(flat, options=FrameOptions(planar=True))
     np.testing.assert_array_equal(planar.points[:, 2], [0.0, 0.0])
     np.testing.assert_array_equal(planar.displacement[:, 2], [0.0, 0.0])
     assert planar.source.notes == ("planar correlation: z and dz are taken to be zero",)
-    assert "dz" in complaint(frame, {**flat, "z": VALUES["z"]}, options=FrameOptions(planar=True))
     # What nobody asks for may be missing, and is not known.
     free = frame(flat, options=FrameOptions(("x", "y", "dx", "dy")))
     assert np.isnan(free.points[:, 2]).all() and np.isnan(free.displacement[:, 2]).all()
 
 
-@pytest.mark.parametrize(("scale", "good"), [(1e-300, True), (0.0, False), (np.inf, False)])
-def test_scales_of_length(scale, good):
-    if good:
-        assert FrameOptions(length_scale=scale).length_scale == scale
-    else:
-        assert complaint(FrameOptions, length_scale=scale).startswith("length_scale: ")
-
-
-# --- frame files ---
 def test_the_order_of_frames(tmp_path):
-    for name in ("f10.csv", "f2.csv", "f1.csv", "g.csv"):
+    for name in ("f10.csv", "f2.csv", "f1.csv", "g.csv", "a[1].csv"):
         (tmp_path / name).write_text("")
     (tmp_path / "f3.csv").mkdir()
-
-    def order(*names: str) -> tuple[list[str], str | None]:
-        files, note = frame_files([str(tmp_path / name) for name in names])
-        return [file.name for file in files], note
-
-    assert order("f*.csv") == (["f1.csv", "f2.csv", "f10.csv"], None)
-    assert order("f2.csv", "f1.csv", "f10.csv") == (["f2.csv", "f1.csv", "f10.csv"], None)
-    assert order("g.csv", "f?.csv") == (["g.csv", "f1.csv", "f2.csv"], None)
+    for asked, expected in (
+        (["f*.csv"], ["f1.csv", "f2.csv", "f10.csv"]),
+        (["f2.csv", "f1.csv", "f10.csv"], ["f2.csv", "f1.csv", "f10.csv"]),
+        (["g.csv", "f?.csv"], ["g.csv", "f1.csv", "f2.csv"]),
+        # Of quoted patterns the order is meant, whatever a shell would have made of it.
+        (["f1*.csv", "f2.csv"], ["f1.csv", "f10.csv", "f2.csv"]),
+        # A name with a bracket in it is a file before it is a pattern.
+        (["a[1].csv"], ["a[1].csv"]),
+    ):
+        files, note = frame_files([str(tmp_path / name) for name in asked])
+        assert ([file.name for file in files], note) == (expected, None)
     # As a shell sorts an unquoted pattern.
-    files, note = order("f1.csv", "f10.csv", "f2.csv")
-    assert files == ["f1.csv", "f10.csv", "f2.csv"]
-    assert note is not None and "f10.csv before f2.csv; quote the pattern" in note
-    # Of quoted patterns the order is meant, whatever a shell would have made of it.
-    assert order("f1*.csv", "f2.csv") == (["f1.csv", "f10.csv", "f2.csv"], None)
-    # A name with a bracket in it is a file before it is a pattern.
-    (tmp_path / "a[1].csv").write_text("")
-    assert order("a[1].csv")[0] == ["a[1].csv"]
-
-
-def test_files_in_a_folder_of_their_own(tmp_path):
+    files, note = frame_files([str(tmp_path / name) for name in ("f1.csv", "f10.csv", "f2.csv")])
+    assert [file.name for file in files] == ["f1.csv", "f10.csv", "f2.csv"]
+    assert note is not None and "f10.csv before f2.csv" in note
     folder = tmp_path / "run[1]"
     folder.mkdir()
     for name in ("f10.csv", "f2.csv"):
         (folder / name).write_text("")
     assert frame_files(["f*.csv"], folder=folder) == ([folder / "f2.csv", folder / "f10.csv"], None)
     _, note = frame_files(["f10.csv", "f2.csv"], folder=folder)
-    assert "frames in the order given: f10.csv before f2.csv; quote the pattern to have" in note
-    assert f"no file matches '{folder}/g*'" in complaint(frame_files, ["g*"], "data.files", folder)
-    assert complaint(frame_files, ["f2.csv", "f*.csv"], "files", folder) == (
-        f"{folder}/f2.csv: files: is given twice"
-    )
-    assert "files: is a folder, expected files; quote a" in complaint(frame_files, [str(folder)])
+    assert "f10.csv before f2.csv" in note
+    for asked, words in (
+        (["g*"], f"no file matches '{folder}/g*'"), ([""], "files: is a folder"),
+        (["f2.csv", "f*.csv"], f"{folder}/f2.csv: files: is given twice"),
+    ):  # fmt: skip
+        assert words in complaint(frame_files, asked, "files", folder)
 
 
-# --- frame choice ---
 #: MPa, as a camera saw a test: rest, rise, hold, release, end of the log.
 SEEN = np.array([np.nan, 0.0, -0.001, 0.010, 0.020, 0.031, 0.031, 0.052, 0.040, 0.012, np.nan])
 
 
-def test_the_nearest_frame_of_the_rise():
+def test_frames_of_the_rise():
     chosen = choose_frames(SEEN, [0.012, 0.0305, 0.05], tolerance=0.003, in_time=True)
     assert chosen.frames == (3, 5, 7)
     assert chosen.left_out == {BEYOND: 2, AT_REST: 2, RELEASED: 2}
     # Not in the order of time, the release cannot be told from the rise.
     assert choose_frames(SEEN, [0.012], tolerance=0.003).frames == (9,)
-
-
-def test_all_frames_by_rising_pressure():
     chosen = choose_frames(SEEN)
     assert chosen.frames == (3, 9, 4, 5, 8, 7)
     assert chosen.left_out == {BEYOND: 2, AT_REST: 2, REPEATED: 1}
     assert choose_frames(SEEN, in_time=True).frames == (3, 4, 5, 7)
-
-
-def test_some_frames_evenly_spread_in_pressure():
-    pressures = np.arange(0.001, 0.301, 0.001)
-    chosen = choose_frames(pressures, count=4)
-    assert pressures[list(chosen.frames)] == pytest.approx([0.075, 0.15, 0.225, 0.3])
+    # 2 % of the largest asked for is 1.04 kPa.
+    for asked, words in (
+        ([0.0305, 0.0420, 0.052], ["pressures[1]", "within 1.04 kPa of 42 kPa", "at 40 kPa"]),
+        ([0.0195, 0.0205, 0.052], ["pressures[1]", "frame at 20 kPa", "19.5 and to 20.5 kPa"]),
+    ):
+        complaint_with(words, choose_frames, SEEN, asked)
+    assert "the 6 frames" in complaint(choose_frames, SEEN, None, 7)
+    assert "none of the 3 frames is under pressure" in complaint(choose_frames, SEEN[:3])
 
 
 @given(
@@ -270,75 +215,6 @@ def test_as_many_as_asked_for_and_rising(pressures, data):
     taken = each[list(choose_frames(each, count=count).frames)]
     assert len(taken) == count and (np.diff(taken) > 0).all()
     assert taken[-1] == pytest.approx(each.max())
-
-
-@pytest.mark.parametrize(
-    ("asked", "words"),
-    [
-        # 2 % of the largest asked for is 1.04 kPa.
-        ([0.0305, 0.0420, 0.052], ["pressures[1]", "within 1.04 kPa of 42 kPa", "at 40 kPa"]),
-        ([0.0195, 0.0205, 0.052], ["pressures[1]", "frame at 20 kPa", "19.5 and to 20.5 kPa"]),
-    ],
-)
-def test_pressures_without_a_frame_of_their_own(asked, words):
-    complaint_with(words, choose_frames, SEEN, asked)
-    too_many = complaint(choose_frames, SEEN, None, 7)
-    assert "the 6 frames at pressures of their own, got 7" in too_many
-    assert "none of the 3 frames is under pressure" in complaint(choose_frames, SEEN[:3])
-
-
-# --- words of files ---
-#: Of a hundred different letters.
-LONG = "".join(chr(0x4E00 + k) for k in range(100))
-
-
-def quoted(said: str) -> str:
-    """What of LONG is quoted."""
-    found = [letter for letter in LONG if letter in said]
-    assert "".join(found) in said
-    return "".join(found)
-
-
-def file(folder: Path, text: str) -> Path:
-    (folder / "a.csv").write_text(text, encoding="utf-8")
-    return folder / "a.csv"
-
-
-def test_units_and_names(tmp_path):
-    asked = np.ones(2), "", Channel("p", LONG), PRESSURE_UNITS, tmp_path, "column"
-    assert quoted(complaint(in_unit, *asked)) == LONG[:20]
-    assert quoted(complaint(direction_named, LONG)) == LONG[:40]
-    assert quoted(complaint(format_named, "frames", LONG)) == LONG[:40]
-    curves = file(tmp_path, f"Extension,Load\nmm,{LONG}\n0,0\n1,2\n")
-    assert quoted(complaint(read_load_curves, curves, direction="warp")) == LONG[:20]
-    loads = file(tmp_path, f"Time,Load\n{LONG},N\n0,0\n1,2\n")
-    assert quoted(complaint(read_machine_loads, loads, timed=True)) == LONG[:20]
-
-
-def test_cells(tmp_path):
-    channel = Channel("p", "kPa", None, 0.0)
-    cell = file(tmp_path, f"x,p\n0,1\n1,1\n2,{LONG}\n")
-    assert quoted(complaint(value_in_file, cell, channel, PRESSURE_UNITS)) == LONG[:40]
-
-
-def names(count: int) -> list[str]:
-    return [f"n{k:03d}" for k in range(count)]
-
-
-@pytest.mark.parametrize("count", [30, 90])
-def test_names_that_there_are(tmp_path, count):
-    every = names(count)
-    path = file(tmp_path, ",".join(every) + "\n" + ",".join("1" * count) + "\n")
-    there = f"the file has: {', '.join(every)[:300]}"
-    assert complaint(read_table(path).text, "other").endswith(there)
-    line = ",".join(every)[:100]
-    assert complaint(read_frames, [path], FrameOptions()).endswith(f"Line 1 is: {line}")
-
-
-def test_a_header_row_that_might_have_been(tmp_path):
-    path = file(tmp_path, ",".join(names(90)) + "\n" + ",".join("1" * 90) + "\n")
-    said = complaint(read_load_curves, path, direction="warp")
-    assert said.endswith(f"has: {', '.join(names(90))[:200]}")
 
 
 PRESSURES = [0.05, 0.1, 0.2]
@@ -389,37 +265,29 @@ def test_rejected_points_are_dropped_and_counted(case, dropped, frames, tmp_path
     assert len(field.points) == len(frames[0][0])
 
 
-def test_units_and_sigma_are_kept(frames, tmp_path):
-    (field, *_) = read_fields(dic_exports.vic3d(tmp_path, frames), PRESSURES)
-    assert set(field.source.units.values()) == {"mm"} and set(field.sigma) == {0.02}
-    (field, *_) = read_fields(dic_exports.german(tmp_path, frames), PRESSURES)
-    assert (field.source.units["x"], field.source.units["dx"]) == ("m", "µm")
-
-
 def test_what_a_reader_chose_is_said(frames, tmp_path):
-    (field, *_) = read_fields(dic_exports.pyaldic_csv(tmp_path, frames), PRESSURES)
-    deformed, turned = field.source.notes
-    assert deformed.startswith("x, y, z are places in the deformed state")
-    assert "y points down, z away from the camera" in turned
-    (field, *_) = read_fields(dic_exports.matchid_2024(tmp_path, frames), PRESSURES)
-    assert "turned over" in field.source.notes[0]
+    def first(write, **options):
+        options = FrameOptions(QUANTITIES, **options)
+        return read_fields(write(tmp_path, frames), PRESSURES, options=options)[0]
+
+    deformed, turned = first(dic_exports.pyaldic_csv).source.notes
+    assert "places in the deformed state" in deformed and "y points down" in turned
+    assert "turned over" in first(dic_exports.matchid_2024).source.notes[0]
     # The user's word comes first.
-    as_written = FrameOptions(QUANTITIES, camera_axes=False)
-    files = dic_exports.matchid_2024(tmp_path, frames)
-    (field, *_) = read_fields(files, PRESSURES, options=as_written)
+    field = first(dic_exports.matchid_2024, camera_axes=False)
     np.testing.assert_allclose(field.displacement[:, 2], -frames[0][1][:, 2], atol=1e-12)
-    deformed = FrameOptions(QUANTITIES, coordinates="deformed")
-    (field, *_) = read_fields(dic_exports.plain(tmp_path, frames), PRESSURES, options=deformed)
+    field = first(dic_exports.plain, coordinates="deformed")
     np.testing.assert_allclose(field.points, (frames[0][0] - frames[0][1])[:, :2], atol=1e-12)
-
-
-def test_one_file_with_all_frames_may_begin_with_the_reference(frames, tmp_path):
+    # Units and sigma are kept.
+    field = first(dic_exports.vic3d)
+    assert set(field.source.units.values()) == {"mm"} and set(field.sigma) == {0.02}
+    units = first(dic_exports.german).source.units
+    assert (units["x"], units["dx"]) == ("m", "µm")
     files = dic_exports.pyaldic(tmp_path, frames)
     assert len(read_frames(files)) == 4
     assert [f.pressure for f in read_fields(files, PRESSURES)] == PRESSURES
-    assert read_fields(files, [0.0, *PRESSURES])[0].displacement.any() == False  # noqa: E712
-    message = complaint(read_fields, files, [0.1, 0.2])
-    assert "expected one frame for each of 2 pressures, found 4" in message
+    assert not read_fields(files, [0.0, *PRESSURES])[0].displacement.any()
+    assert "for each of 2 pressures, found 4" in complaint(read_fields, files, [0.1, 0.2])
 
 
 TECPLOT = """\
@@ -445,20 +313,9 @@ def test_tecplot_zones_are_frames_in_points_or_blocks(tmp_path):
     np.testing.assert_array_equal(second.displacement, [[0.7, 0.8, 0.9]])
     # Only a first frame in which nothing moves is a reference.
     assert "for each of 1 pressures, found 2" in complaint(read_fields, [path], [0.1])
-    for old, new, words in (
-        ("0.4 0.5 0.6", "0.4 0.5", "line 4: expected 6 numbers a point, found 11 numbers"),
-        ('"dz"', '"p"', "planar correlation, without dz; a stereo one is needed"),
-        ('"dy"', '"p"', "no column of dy; name them with columns"),
-    ):
-        path.write_text(TECPLOT.replace(old, new))
+    for old, words in (('"dz"', "planar correlation, without dz"), ('"dy"', "no column of dy")):
+        path.write_text(TECPLOT.replace(old, '"p"'))
         assert words in complaint(read_fields, [path], [0.1, 0.2])
-
-
-def test_a_short_row_is_not_filled_up_where_blanks_separate(tmp_path):
-    path = tmp_path / "a.txt"
-    path.write_text("x y dx dy dz\n1 2 3 4 5\n1 2 3 4\n")
-    message = complaint(read_fields, [path], [0.1])
-    assert "line 3: expected 5 cells as in the header, found 4" in message
 
 
 def test_small_letters_of_vic3d_are_places_in_the_picture(tmp_path):
@@ -470,33 +327,7 @@ def test_small_letters_of_vic3d_are_places_in_the_picture(tmp_path):
     np.testing.assert_array_equal(np.append(field.points, field.z), [1, 2, 3])
     np.testing.assert_array_equal(field.displacement, [[0.1, 0.2, 0.3]])
     # In a table of unknown origin nobody can tell.
-    message = complaint(read_fields, [path], [0.1], format="csv")
-    assert "the column of dx may be 'u' or 'U'; name one with columns" in message
-
-
-def test_both_states_without_displacements(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text(
-        "x undeformed [mm];y undeformed [mm];z undeformed [mm];"
-        "x deformed [mm];y deformed [mm];z deformed [mm]\n1;2;3;1.5;2.25;13\n"
-    )
-    (field,) = read_fields([path], [0.1])
-    np.testing.assert_array_equal(field.points, [[1, 2]])
-    np.testing.assert_array_equal(field.displacement, [[0.5, 0.25, 10]])
-    assert "displacements along x, y, z are deformed less reference places" in field.source.notes
-
-
-def test_dice_without_a_stereo_model_is_refused(tmp_path):
-    path = tmp_path / "DICe_solution_0.txt"
-    path.write_text(
-        "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA\n0,9,9,1,1,0.1\n"
-    )
-    message = complaint(read_fields, [path], [0.1])
-    assert "has no MODEL_COORDINATES_X: planar and in pixels; run DICe with a stereo" in message
-    # Names in a comment above the numbers.
-    np.savetxt(path, [[1, 2, 3, 4, 5]], delimiter=",", header="made by us\nx,y,dx,dy,dz")
-    (field,) = read_fields([path], [0.1])
-    np.testing.assert_array_equal(field.displacement, [[3, 4, 5]])
+    assert "dx may be 'u' or 'U'" in complaint(read_fields, [path], [0.1], format="csv")
 
 
 @pytest.mark.parametrize("version", [5, 7.3])
@@ -514,7 +345,6 @@ def test_ncorr_is_planar(version, tmp_path):
         order = np.lexsort(frame.points.T[:2]), np.lexsort(points.T[:2])
         np.testing.assert_allclose(frame.points[order[0]], points[order[1]], atol=1e-9)
         np.testing.assert_allclose(frame.displacement[order[0]], moved[order[1]], atol=1e-9)
-        assert "planar correlation: z and dz are taken to be zero" in frame.source.notes
     gauge = virtual_strain_gauge(read, (2.0, -5.0), (18.0, -5.0))
     np.testing.assert_allclose(gauge.strain, [0.01, 0.02], rtol=1e-9)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bubblefit import readers
 from bubblefit.errors import InputError, PlugInFailure
 from bubblefit.readers import registry
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
@@ -25,7 +26,6 @@ from bubblefit.readers.registry import (
 from ..complaints import complaint
 from ..plug_ins import install
 
-# --- registry ---
 STARRED = "*** a camera\n1 2 0 0.1 0.2 0.3\n4 5 0 0.4 0.5 0.6\n7 8 0 nan nan nan\n"
 
 
@@ -45,12 +45,18 @@ def own(monkeypatch):
     monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
 
 
-def test_every_content_has_one_format_that_takes_what_no_other_recognises():
+def test_every_content_has_one_format_that_takes_what_no_other_recognises(tmp_path):
     for content in ("frame", "machine table", "load polynomials"):
         ours = formats(content)
         assert sum(one.recognises is None for one in ours) == 1
         assert format_names(content)[: len(ours)] == tuple(one.name for one in ours)
         assert all(one.title and format_named(content, one.name) == one for one in ours)
+    message = complaint(read_load_curves, tmp_path / "a.csv", format="csb")
+    assert message.startswith("format: 'csb' is not one of: text")
+    for read in (lambda p: read_frames([p]), read_load_curves, read_published_polynomials):
+        assert "no such file" in complaint(read, tmp_path / "a.csv")
+    for read in (read_load_curves, read_published_polynomials):
+        assert "cannot be read" in complaint(read, tmp_path)
 
 
 def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
@@ -69,30 +75,18 @@ def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
     assert format_of("machine table", path).name == "text"
     register_format(starred("other"))
     message = complaint(read_frames, [path])
-    assert message == f"{path}: the format may be 'other' or 'starred'; say which with format"
+    assert f"{path}: the format may be 'other' or 'starred'" in message
     assert len(read_frames([path], format="other")) == 1
-
-
-def test_lost_everywhere_and_several_frames_are_no_field(tmp_path, own):
-    path = tmp_path / "frame.txt"
-    path.write_text("*** a camera\n7 8 0 nan nan nan\n")
-    register_format(starred())
-    assert "no row is left to use: 1 without a value" in complaint(read_fields, [path], [0.1])
     twice = Format("twice", "frame", "two", lambda *a: read_starred(*a) * 2)
     register_format(twice)
     assert len(read_frames([path], format="twice")) == 2
-    message = complaint(read_fields, [path], [0.1], format="twice")
-    assert "expected one frame for each of 1 pressures, found 2" in message
+    said = complaint(read_fields, [path], [0.1], format="twice")
+    assert "expected one frame for each of 1 pressures, found 2" in said
+    path.write_text("*** a camera\n7 8 0 nan nan nan\n")
+    said = complaint(read_fields, [path], [0.1], format="other")
+    assert "no row is left to use: 1 without a value" in said
 
 
-def test_names_that_are_not_there_and_files_that_are_not_there(tmp_path):
-    message = complaint(read_load_curves, tmp_path / "a.csv", format="csb")
-    assert message.startswith("format: 'csb' is not one of: text")
-    for read in (lambda p: read_frames([p]), read_load_curves, read_published_polynomials):
-        assert "no such file" in complaint(read, tmp_path / "a.csv")
-
-
-# --- plug-ins ---
 READER = """
 import json
 import numpy as np
@@ -114,8 +108,9 @@ def install_reader(folder, name="json", text=READER, **options):
     install(folder, name, text.replace("{name}", name), group="bubblefit.readers", **options)
 
 
-def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages, tmp_path):
+def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages, tmp_path, own):
     install_reader(packages)
+    install_reader(packages, "csv", "raise RuntimeError")
     path = tmp_path / "frame.json"
     path.write_text(json.dumps({"places": [[1, 2, 3]], "moves": [[0.1, 0.2, 0.3]]}))
     assert "json" in format_names("frame")
@@ -130,14 +125,9 @@ def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages
             read_frames([path])
         words = f"the plug-in 'json' of acme-things 2.5 fails on {path} ({cause}"
         assert str(failure.value).startswith(words) and "\n" not in str(failure.value)
-
-
-def test_ours_are_asked_before_plug_ins_and_keep_their_names(packages, tmp_path, own):
-    install_reader(packages)
-    install_reader(packages, "csv", "raise RuntimeError")
-    path = tmp_path / "frame.json"
-    path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')
+    # Ours are asked first, and keep their names.
     assert format_named("frame", "csv").title.startswith("columns of text")
+    path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')
     register_format(starred("mine", lambda path, head: head.startswith(b"{")))
     assert format_of("frame", path).name == "mine"
 
@@ -162,19 +152,13 @@ def test_a_broken_reader_breaks_nothing_else(packages, tmp_path, caplog, text, w
         read_frames([path], format="json")
 
 
-# --- data imports ---
 def test_the_library_loads_without_pandas_and_scipy_spatial():
     code = (
         "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.data;"
         "assert not {'pandas', 'scipy.spatial'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_readers_are_where_the_package_says():
-    from bubblefit import readers as data
-
-    for name in data.__all__:
-        assert callable(getattr(data, name)), name
-    with pytest.raises(AttributeError, match="no attribute 'read_everything'"):
-        _ = data.read_everything
+    for name in readers.__all__:
+        assert callable(getattr(readers, name)), name
+    with pytest.raises(AttributeError, match="read_everything"):
+        _ = readers.read_everything

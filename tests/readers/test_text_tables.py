@@ -15,9 +15,8 @@ from bubblefit.readers.text_frames import (
     read_numbers,
 )
 
-from ..complaints import complaint
+from ..complaints import complaint, complaint_with
 
-# --- text tables ---
 WANTED = ("x", "y", "dx", "dy", "dz")
 PLAIN = FrameOptions(WANTED)
 
@@ -28,7 +27,6 @@ def layout(folder: Path, text: str, comment: str = "#", **named: str):
     return find_layout(path, WANTED, named, comment)
 
 
-# --- cells and marks ---
 @pytest.mark.parametrize(
     ("text", "separator", "cells"),
     [
@@ -41,30 +39,26 @@ def test_cells_of_a_line(text, separator, cells):
     assert cells_of(text, separator) == cells
 
 
-def test_what_a_number_is():
+@pytest.mark.parametrize(
+    ("cells", "mark"),
+    [
+        (["1", "2.5"], "."), (["1,5", "2"], ","), (["1,5", "2.5"], "."), (["1,234", "0,5"], ","),
+        (["0,234"], ","), (["1,2345"], ","), (["12", "x.y"], "."), ([",5"], ","),
+        (["12", "1,234", "12,345"], "line 5, column 'x': '1,234': is the"),
+    ],
+)  # fmt: skip
+def test_the_decimal_mark(cells, mark):
+    numbered = [(line, "x", cell) for line, cell in enumerate(cells, 4)]
+    if len(mark) > 1:
+        assert mark in complaint(decimal_mark, Path("a"), numbered)
+    else:
+        assert decimal_mark(Path("a"), numbered) == mark
     for cell in ("1", "-1.5", "+.5", ",5", "1,", "1e5", "1.5E-07"):
         assert is_number(cell), cell
     for cell in ("", ".", "1.2.3", "1e", "e5", "1 2", "nan", "--1"):
         assert not is_number(cell), cell
 
 
-@pytest.mark.parametrize(
-    ("cells", "mark"),
-    [
-        (["1", "2.5"], "."), (["1,5", "2"], ","), (["1,5", "2.5"], "."), (["1,234", "0,5"], ","),
-        (["0,234"], ","), (["1,2345"], ","), (["12", "x.y"], "."), ([",5"], ","),
-    ],
-)  # fmt: skip
-def test_the_decimal_mark(cells, mark):
-    assert decimal_mark(Path("a"), [(1, "x", cell) for cell in cells]) == mark
-
-
-def test_marks_of_thousands():
-    cells = [(4, "x", "12"), (5, "y", "1,234"), (6, "z", "12,345")]
-    assert "line 5, column 'y': '1,234': is the" in complaint(decimal_mark, Path("a.csv"), cells)
-
-
-# --- the layout ---
 @pytest.mark.parametrize(
     ("text", "separator", "header", "lines", "decimal"),
     [
@@ -79,6 +73,9 @@ def test_marks_of_thousands():
         ("x,y,1\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 2, [3], "."),
         ("x,y,dx,dy,dz\nw\nw\nx,y,dx,dy,dz\n1,2,3,4,5\n", ",", 4, [5], "."),
         ("X first,x,y,dx,dy,dz\n0,1,2,3,4,5\n", ",", 1, [2], "."),
+        # Names with blanks make no cells; they stand within the first 300 lines.
+        ("x mm;y mm;dx mm;dy mm;dz mm\n1;2;3;4;5\n", ";", 1, [2], "."),
+        ("word\n" * 299 + "x,y,dx,dy,dz\n1,2,3,4,5\n", ",", 300, [301], "."),
     ],
 )
 def test_where_the_numbers_stand(tmp_path, text, separator, header, lines, decimal):
@@ -99,30 +96,22 @@ def test_a_row_of_units(tmp_path):
 
 
 def test_no_row_of_names(tmp_path):
-    at = tmp_path / "a.txt"
-    assert "expected a header line and rows of numbers," in complaint(layout, tmp_path, "# a\n\n")
-    assert "line 1: expected a header line and" in complaint(layout, tmp_path, "x,y,dx,dy,dz,b,c\n")
-    assert "expected a header line and rows of" in complaint(layout, tmp_path, "some words\n")
-    # One quantity is no table of points; two are.
-    for names in ("a,b", "a,x"):
-        said = complaint(layout, tmp_path, f"# m\n{names}\n1,2\n")
-        assert said.startswith(f"{at}: no row of names") and said.endswith(f"Line 2 is: {names}")
+    for text, words in (
+        ("# a\n\n", "expected a header line and rows of numbers,"),
+        ("x,y,dx,dy,dz,b,c\n", "line 1: expected a header line and"),
+        ("some words\n", "expected a header line and rows of"),
+        ("word\n" * 300 + "x,y,dx,dy,dz\n1,2,3,4,5\n", "no row of names"),
+        # One quantity is no table of points; two are.
+        ("# m\na,b\n1,2\n", "Line 2 is: a,b"), ("# m\na,x\n1,2\n", "Line 2 is: a,x"),
+    ):  # fmt: skip
+        assert words in complaint(layout, tmp_path, text)
     assert layout(tmp_path, "a,x,y\n1,2,3\n").header == 1
+    # A project may call columns 1, 2, ...: the first row of numbers is not their header.
+    named = dict(zip(WANTED, "12345", strict=True))
+    text = "1 2 3 4 5\n7 8 9 10 11\n"
+    assert "no row of names" in complaint(layout, tmp_path, text, **named)
 
 
-def test_the_names_stand_within_the_first_lines(tmp_path):
-    table = "x,y,dx,dy,dz\n1,2,3,4,5\n"
-    above = "word\n" * 299
-    assert layout(tmp_path, above + table).header == 300
-    assert "no row of names" in complaint(layout, tmp_path, "word\n" + above + table)
-
-
-def test_a_heading_with_blanks_makes_no_cells(tmp_path):
-    found = layout(tmp_path, "x mm;y mm;dx mm;dy mm;dz mm\n1;2;3;4;5\n")
-    assert found.separator == ";" and [h.unit for h in found.headings] == ["mm"] * 5
-
-
-# --- headings ---
 @pytest.mark.parametrize(
     ("name", "unit", "quantity", "state"),
     [
@@ -148,8 +137,6 @@ def test_units_of_headings():
     assert heading_of("x_inch").unit == "inch" and heading_of("x um").unit == "um"
     assert heading_of("x", "px").scale is heading_of("x").scale is None
 
-
-def test_the_better_of_several_columns():
     def best(*names: str, upper: bool = False, **named: str) -> dict[str, list[int]]:
         return columns_of([heading_of(name) for name in names], named, upper)
 
@@ -167,22 +154,22 @@ def test_columns_that_cannot_be_told(tmp_path):
     def asked(text: str, options: FrameOptions = PLAIN, **named: str):
         return quantity_columns(Path("a.csv"), layout(tmp_path, text, **named), named, options)
 
-    rest = ",dx,dy,dz\n1,2,3,4,5,6\n"
-    assert "line 1: the column of x" in complaint(asked, f"X,Xpos,y{rest}".replace("Xpos", "X pos"))
-    assert "column 'X': this column appears twice; the file" in complaint(asked, f"X,X,y{rest}")
-    assert "column 'q': this column is missing; the file" in complaint(asked, f"X,X,y{rest}", x="q")
-    assert "column 'y': this column is missing; the" in complaint(asked, "x,dx,dy,dz\n1,2,3,4\n")
+    rest, planar = ",dx,dy,dz\n1,2,3,4,5,6\n", FrameOptions(planar=True)
     after = "x deformed,y,dx,dy,dz\n1,2,3,4,5\n"
-    assert asked(after)["x deformed"] == 0
-    for text in (after.replace("dx", "q"), after.replace("x deformed", "y deformed")):
-        assert "this column is missing" in complaint(asked, text)
-    planar = FrameOptions(planar=True)
-    assert set(asked("x,y,dx,dy\n1,2,3,4\n", planar)) == {"x", "y", "dx", "dy"}
+    for text, named, words in (
+        (f"X,X pos,y{rest}", {}, "line 1: the column of x"), (f"X,X,y{rest}", {}, "'X': this col"),
+        (f"X,X,y{rest}", {"x": "q"}, "column 'q': this column is missing"),
+        ("x,dx,dy,dz\n1,2,3,4\n", {}, "column 'y': this column is missing"),
+        (after.replace("dx", "q"), {}, "is missing"),
+        (after.replace("x deformed", "y deformed"), {}, "is missing"),
+    ):  # fmt: skip
+        assert words in complaint(asked, text, **named)
     for one in ("z", "dz", "z deformed"):
         assert "is missing" in complaint(asked, f"x,y,dx,dy,{one}\n1,2,3,4,5\n", planar)
+    assert asked(after)["x deformed"] == 0
+    assert set(asked("x,y,dx,dy\n1,2,3,4\n", planar)) == {"x", "y", "dx", "dy"}
 
 
-# --- numbers ---
 ROWS = "x{0}y{0}dx{0}dy{0}dz{0}ok\n1{0}2{0}3{0}4{0}5{0}1\n6{0}7{0}{1}{0}9{0}10{0}0\n"
 COLUMNS = {"x": 0, "dx": 2}
 
@@ -207,53 +194,23 @@ def test_the_quick_way_reads_what_the_slow_one_does(tmp_path, separator, number)
         assert _slow(Path("a"), found, COLUMNS, [(5, values)])[1].tolist() == good
 
 
-@pytest.mark.parametrize(
-    "hole", ["", "nan", "NaN", "NAN", "-nan(ind)", "1.#QNAN", "n. def.", "---"]
-)
-def test_holes_are_found_by_either_way(tmp_path, hole):
-    found = layout(tmp_path, ROWS.format(";", hole))
-    for read in (_quick(found, COLUMNS, []), _slow(Path("a"), found, COLUMNS, [])):
-        assert read is not None
-        np.testing.assert_array_equal(read[0]["dx"], [3.0, np.nan])
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_what_the_quick_way_leaves_to_the_slow_one(tmp_path):
+    for hole in ("", "nan", "NaN", "NAN", "-nan(ind)", "1.#QNAN", "n. def.", "---"):
+        found = layout(tmp_path, ROWS.format(";", hole))
+        for read in (_quick(found, COLUMNS, []), _slow(Path("a"), found, COLUMNS, [])):
+            np.testing.assert_array_equal(read[0]["dx"], [3.0, np.nan], hole)
+    for text in (
         # A cell too many or too few in one row; no numbers; a flag without a value.
         ROWS.format(",", "8,5"), ROWS.format(" ", "8 8"), ROWS.format(" ", ""),
         ROWS.format(";", '"8"'), ROWS.format(";", "x"), ROWS.format(";", "1e999"),
         ROWS.format(";", "NA"), ROWS.format(",", "8").replace("10,0", "10,0,7"),
         ROWS.format(";", "8").replace("10;0", "10;"),
-    ],
-)  # fmt: skip
-def test_what_the_quick_way_leaves_to_the_slow_one(tmp_path, text):
-    assert _quick(layout(tmp_path, text), COLUMNS, [(5, None)]) is None
-
-
-def test_a_separator_at_the_end_of_every_row(tmp_path):
+    ):  # fmt: skip
+        assert _quick(layout(tmp_path, text), COLUMNS, [(5, None)]) is None, text
+    # A separator at the end of every row is none.
     text = ROWS.format(";", "8").replace("5;1\n", "5;1;\n").replace("10;0\n", "10;0;\n")
     found = layout(tmp_path, text)
     assert numbers(_quick, found, [(5, None)]) == ({"x": [1.0], "dx": [3.0]}, [True, False])
-
-
-def test_rows_of_another_length_name_their_line(tmp_path):
-    def read(text: str, flags=()):
-        return read_numbers(Path("a.csv"), layout(tmp_path, text), COLUMNS, flags)
-
-    for separator, cell, count in ((",", "8,5", 7), (";", "8;5", 7), (" ", "", 5)):
-        said = complaint(read, ROWS.format(separator, cell))
-        assert f"line 3: expected 6 cells as in the header, found {count}" in said
-    assert "line 3: a quotation mark that is opened and" in complaint(read, ROWS.format(";", '"8'))
-    # Empty cells at the end are none, and missing ones are empty, where there is a separator.
-    text = ROWS.format(";", "8").replace("5;1\n", '"5";1;;\n').replace(";10;0\n", "\n")
-    values, good = read(text)
-    assert values["dx"].tolist() == [3.0, 8.0] and good.tolist() == [True, True]
-    said = complaint(read, ROWS.format(";", "8").replace("10;0", "10;maybe"), [(5, None)])
-    assert "line 3, column 'ok': expected a number, found 'maybe'" in said
-
-
-def test_words_of_flags(tmp_path):
     words = ["true", "False", "YES", "no", "valid", "Invalid"]
     rows = "".join(f"{k},2,3,4,5,{word}\n" for k, word in enumerate(words))
     found = layout(tmp_path, "x,y,dx,dy,dz,ok\n" + rows)
@@ -261,25 +218,35 @@ def test_words_of_flags(tmp_path):
     assert good.tolist() == [True, False] * 3 and values["x"].tolist() == [0.0, 2.0, 4.0]
 
 
+def test_rows_of_another_length_name_their_line(tmp_path):
+    def read(text: str, flags=()):
+        return read_numbers(Path("a.csv"), layout(tmp_path, text), COLUMNS, flags)
+
+    maybe = ROWS.format(";", "8").replace("10;0", "10;maybe")
+    for text, words in (
+        (ROWS.format(",", "8,5"), "line 3: expected 6 cells as in the header, found 7"),
+        (ROWS.format(";", "8;5"), "line 3: expected 6 cells as in the header, found 7"),
+        (ROWS.format(" ", ""), "line 3: expected 6 cells as in the header, found 5"),
+        (ROWS.format(";", '"8'), "line 3: a quotation mark"),
+        (maybe, "line 3, column 'ok': expected a number, found 'maybe'"),
+    ):
+        assert words in complaint(read, text, [(5, None)])
+    # Empty cells at the end are none, and missing ones are empty, where there is a separator.
+    text = ROWS.format(";", "8").replace("5;1\n", '"5";1;;\n').replace(";10;0\n", "\n")
+    values, good = read(text)
+    assert values["dx"].tolist() == [3.0, 8.0] and good.tolist() == [True, True]
+
+
 def test_columns_whose_meaning_is_unclear_are_named(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("x,y,z,dx,dy,dz,Mask,state\n1,2,3,4,5,6,0,1\n")
     (frame,) = read_frames([path], FrameOptions(flag_column="Mask"))
-    assert frame.source.notes == (
-        "column 'state' is not used; flag_column or valid_column says what it means",
-    )
+    (note,) = frame.source.notes
+    assert "column 'state' is not used" in note
     (frame,) = read_frames([path], FrameOptions(valid_column="state", flag_column="Mask"))
     assert frame.source.notes == () and len(frame.points) == 1
 
 
-def test_numbers_are_no_names_whatever_the_columns_are_called(tmp_path):
-    """A project may call columns 1, 2, ...: the first row of numbers is not their header."""
-    named = dict(zip(WANTED, "12345", strict=True))
-    said = complaint(layout, tmp_path, "1 2 3 4 5\n7 8 9 10 11\n", **named)
-    assert "no row of names" in said
-
-
-# --- tables ---
 def table(folder: Path, text: str) -> Path:
     path = folder / "a.csv"
     path.write_text(text)
@@ -287,18 +254,15 @@ def table(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("text", "where", "what"),
+    ("text", "words"),
     [
-        ("a,b\n1,2\n\n# x\n3,4,5\n6,7\n8,9\n", "line 5:", "expected 2 cells as in the header"),
-        ('a,b\n1,2\n3,"4\n5,6\n', "", "a quotation mark that is opened and not closed"),
-        ("# only\na,b\n", "", "found only a header line"),
-        ("\n", "", "found nothing"),
-        ("a,b\n1,2\n\x00,3\n", "", "is not a text file"),
+        ("a,b\n1,2\n\n# x\n3,4,5\n6,7\n8,9\n", "line 5: expected 2 cells as in the header"),
+        ('a,b\n1,2\n3,"4\n5,6\n', "a quotation mark"), ("# only\na,b\n", "found only a header"),
+        ("\n", "found nothing"), ("a,b\n1,2\n\x00,3\n", "is not a text file"),
     ],
 )  # fmt: skip
-def test_what_is_no_table(tmp_path, text, where, what):
-    said = complaint(read_table, table(tmp_path, text))
-    assert "a.csv" in said and where in said and what in said
+def test_what_is_no_table(tmp_path, text, words):
+    complaint_with(["a.csv", words], read_table, table(tmp_path, text))
 
 
 def test_numbers_that_are_none(tmp_path):
@@ -312,19 +276,12 @@ def test_numbers_that_are_none(tmp_path):
     assert "line 6, column 'c': expected the same number as in line 3" in said
     assert read.rows(np.array([True, True, False])).constant("c") == 7
     long = read_table(table(tmp_path, f"a\n{'y' * 60}\n5\nz\n"))
-    assert f"found '{'y' * 40}'; so in 1 more row" in complaint(long.numbers, "a")
-    assert not complaint(long.numbers, "a").endswith("rows")
-
-
-def test_texts_stay_as_they_are(tmp_path):
+    assert complaint(long.numbers, "a").endswith(f"found '{'y' * 40}'; so in 1 more row")
     read = read_table(table(tmp_path, "name,load\nNA,1\nnull,2\n,3\n nan ,4\n5\n"))
     assert read.text("name").tolist() == ["NA", "null", "", " nan ", "5"]
     assert read.lines.tolist() == [2, 3, 4, 5, 6]
     assert read.numbers("load", holes=True)[:4].tolist() == [1, 2, 3, 4]
     assert "line 2, column 'name': expected a number, found 'NA'" in complaint(read.numbers, "name")
-
-
-def test_floats_read_back_exactly(tmp_path):
     path, values = tmp_path / "b.csv", [0.1 + 0.2, 1e-300, -3.0]
     write_table(path, ["v", "n"], [[v, i] for i, v in enumerate(values)], comment="mm")
     assert path.read_text().startswith("# mm\nv,n\n0.30000000000000004,0\n")

@@ -1,0 +1,69 @@
+"""Text exports that are read by their headings alone: ARAMIS, DaVis, MatchID.
+
+GOM ARAMIS, GOM Correlate, ZEISS Correlate (lines of title, semicolons):
+
+    # ARAMIS Professional
+    id;x_undeformed [mm];y_undeformed [mm];z_undeformed [mm];ux [mm];uy [mm];uz [mm]
+
+Source: the public readers of such files in crackpy (windows-1252, semicolons, places in the
+reference state and displacements, NaN since 2020), aramis_cdt (undeformed coordinates and
+displacements as exports of their own) and pypif (two lines of title, units in square brackets). The
+German headings (`Verschiebung X`), the row of units and the decimal comma could not be confirmed
+from a file. What is called "deformed" or "verformt" is taken for a place after the motion.
+
+LaVision DaVis, StrainMaster (semicolons, Latin-1, units in the headings):
+
+    x[mm];y[mm];z[mm];x-displacement[mm];y-displacement[mm];z-displacement[mm]
+
+Source: public scripts that add the displacement to x, y, z for the deformed membrane, so that these
+are places in the reference state. How DaVis marks lost correlation in CSV could not be confirmed:
+rows of zeros throughout and empty cells are left out; zeros in the displacement alone are not.
+
+MatchID Stereo, 2023 and 2024:
+
+    x_pic,y_pic,x,y,z,u,v,w,exx,eyy,exy
+    Coordinates.Image X [Pixel],Coordinates.Image Y [Pixel],coor.X [mm],coor.Y [mm],coor.Z [mm],
+        disp.Horizontal Displacement U [mm],disp.Vertical Displacement V [mm],
+        disp.Out-Of-Plane: W [mm],strain.Strain-global frame: Exx [ ]
+
+Source: the public reader of the package mt2py (headings of both versions; y and z, V and W with the
+other sign), and a reader of these headings for MultiDIC. Which places the coordinates are (before
+the motion), and what a point without correlation looks like, could not be confirmed: "NaN", also as
+German .NET writes it ("n. def."), is taken for one. Where the axes of the export were set by hand,
+`camera_axes = false` leaves them as they are.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ..registry import Format, register_format
+from ..text_frames import text_reader
+
+_ARAMIS = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
+_DAVIS = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
+
+
+def recognises_aramis(path: Path, head: bytes) -> bool:
+    """Return whether a line of title names the maker or the program."""
+    return bool(_ARAMIS.search(b"\n".join(head[:4096].splitlines()[:10]).replace(b"\0", b"")))
+
+
+def recognises_davis(path: Path, head: bytes) -> bool:
+    """Return whether columns are called x and x-displacement, with a unit right behind."""
+    return bool(_DAVIS.search(head[:4096]))
+
+
+def recognises_matchid(path: Path, head: bytes) -> bool:
+    """Return whether the headings are those of either version."""
+    top = head[:4096].lower()
+    return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
+
+
+for name, title, recognises, settings in (
+    ("aramis", "text of ARAMIS or ZEISS Correlate", recognises_aramis, {}),
+    ("davis", "CSV of LaVision DaVis", recognises_davis, {}),
+    ("matchid", "CSV of MatchID Stereo, 2023 or 2024", recognises_matchid, {"camera_axes": True}),
+):
+    register_format(Format(name, "frame", title, text_reader(name, **settings), recognises))
