@@ -25,7 +25,6 @@ from .tables import LONGEST, called, split_unit
 #: Kinds of notes that are made here.
 ORDER = NoteKind("order of frames")
 
-
 Array = NDArray[np.float64]
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
