@@ -19,8 +19,7 @@ from ..errors import InputError
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
-from ..runs.verification import SUBJECTS, numbers
-from ..runs.verification.number import Number
+from ..runs.verification import SUBJECTS, Number, numbers
 from ..solvers.bars import diagnose
 from ..solvers.base import Diagnosis
 from ..solvers.registry import command_line, solver_names

@@ -92,20 +92,14 @@ def left_out(count: int) -> str:
 
 
 def cut_charts(
-    name: str,
-    pressures: ArrayLike,
-    points: ArrayLike,
-    displacement: ArrayLike,
-    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (),
-    caption: str = "",
-) -> Charts:
+    name: str, pressures: ArrayLike, points: ArrayLike, displacement: ArrayLike,
+    measured: Sequence[tuple[ArrayLike, ArrayLike]] = (), caption: str = "",
+) -> Charts:  # fmt: skip
     """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
 
-    Parameters
-    ----------
     pressures : (frames,) MPa. points : (n, 2 or 3) mm, nodes of a full or a quarter mesh.
-    displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements
-    (k, 3) mm, drawn as dots.
+    displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements (k,
+    3) mm, drawn as dots.
     """
     frames, shown = np.asarray(pressures, dtype=float), np.asarray(displacement, dtype=float)
     numbers, charts = chosen(len(frames)), []
@@ -174,10 +168,8 @@ def rise_charts(pressures: ArrayLike, rises: ArrayLike) -> Charts:
 def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
     """Return pressure and height of every frame over time, and one over the other.
 
-    Parameters
-    ----------
-    times : (frames,) s, by the log's clock. pressures : (frames,) MPa, NaN beyond the log.
-    heights : (frames,) mm, of the apex. taken : (n,) MPa, pressures of the frames that are used.
+    times : (frames,) s, by the log's clock. pressures : (frames,) MPa, NaN beyond the log. heights
+    : (frames,) mm, of the apex. taken : (n,) MPa, pressures of the frames that are used.
     """
     kilos, known = 1e3 * pressures, np.isfinite(pressures)
     near = [int(np.argmin(np.where(known, np.abs(pressures - p), np.inf))) for p in taken]
@@ -195,10 +187,7 @@ def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -
 
 
 def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: Array) -> Charts:
-    """Return a map a quantity over the points (n, 2) mm, with rim, warp and fill.
-
-    maps : title with its unit, and values (n,). edge : (m, 2) mm, the rim once around.
-    """
+    """Return maps (title with unit, (n,)) over points (n, 2) mm; edge : the rim, (m, 2) mm."""
     arrow, charts = 0.5 * float(np.hypot(*edge.T).min()), []
     for title, values in maps:
         series = [
@@ -213,11 +202,7 @@ def registration_charts(points: Array, maps: Sequence[tuple[str, Array]], edge: 
 
 
 def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts:
-    """Return a map a quantity over the disk, zero in the middle of the colours.
-
-    maps : title with its unit, places (n, 2) mm, and values (n,). edge : (m, 2) mm, the rim once
-    around.
-    """
+    """Return maps (title with unit, places (n, 2) mm, (n,)) over the disk, about zero."""
     charts = []
     for title, places, values in maps:
         most = max(float(np.abs(values).max()), 1e-9)
@@ -233,10 +218,7 @@ def disk_charts(maps: Sequence[tuple[str, Array, Array]], edge: Array) -> Charts
 
 
 def sphere_charts(frames: Sequence[Sphere]) -> Charts:
-    """Return how far points lie beyond their sphere: the first few frames, in one scale.
-
-    frames : title, points (n, 3) mm, distance beyond the sphere (n,) mm, which were used (n,).
-    """
+    """Return how far points (n, 3) lie beyond their sphere: the first few frames, in one scale."""
     shown, charts = frames[:FRAMES], []
     most = max(float(np.abs(off[used]).max()) for _, _, off, used in shown) or 1.0
     for title, points, off, used in shown:

@@ -34,19 +34,14 @@ TITLES = {"bias": "45° bias", "bias45": "45° bias"}
 class Series:
     """One curve, band, cloud of points or set of coloured faces of a chart.
 
-    Parameters
-    ----------
-    name : in the legend, "" for none.
-    x, y : (n,) in the units of the axes; None where there is no value. Faces have their corners
-        one after the other.
-    lower, upper : (n,) ends of a band about a curve, or of error bars through dots.
-    look : line, dots, only the band, or faces.
-    colour : index of the palette; rank : 0 to 1 along the colours of rising loads instead.
-    dashes : index of the dash pattern, 0 for solid. ends : draw a dot at the end of the curve.
-    faint : thin, pale and behind the others. marks : draw a dot at every value of a line.
-    values : colours on the chart's scale, one for every dot or face.
-    shape : Vega's name of the symbol. wide : a thick pale line behind the others. hollow : dots
-    are rings.
+    name : in the legend, "" for none. x, y : (n,) in the units of the axes; None where there is no
+    value. Faces have their corners one after the other. lower, upper : (n,) ends of a band about a
+    curve, or of error bars through dots. look : line, dots, only the band, or faces. colour : index
+    of the palette; rank : 0 to 1 along the colours of rising loads instead. dashes : index of the
+    dash pattern, 0 for solid. ends : draw a dot at the end of the curve. faint : thin, pale and
+    behind the others. marks : draw a dot at every value of a line. values : colours on the chart's
+    scale, one for every dot or face. shape : Vega's name of the symbol. wide : a thick pale line
+    behind the others. hollow : dots are rings.
     """
 
     name: str
@@ -71,16 +66,13 @@ class Series:
 class Chart:
     """One pair of axes; the labels name the units.
 
-    Parameters
-    ----------
-    alt : description in words for those who cannot see the chart.
-    from_zero : the y axis begins at zero. top : end of the y axis, where a band may be wider than
-        is worth showing; None for that of all that is drawn. level : y of a horizontal line.
-    x_names : names at x = 1, 2, ... in place of numbers.
-    equal : both axes have the same scale, as a drawing true to scale needs.
-    scale : label of the colours of `Series.values`. shades : their kind; ends : values of the
-        first and last colour, those of the data by default.
-    x_range, y_range : part that is shown; everything by default.
+    alt : description in words for those who cannot see the chart. from_zero : the y axis begins at
+    zero. top : end of the y axis, where a band may be wider than is worth showing; None for that of
+    all that is drawn. level : y of a horizontal line. x_names : names at x = 1, 2, ... in place of
+    numbers. equal : both axes have the same scale, as a drawing true to scale needs. scale : label
+    of the colours of `Series.values`. shades : their kind; ends : values of the first and last
+    colour, those of the data by default. x_range, y_range : part that is shown; everything by
+    default.
     """
 
     title: str
@@ -120,12 +112,9 @@ def numbers(values: ArrayLike) -> list[float | None]:
 
 
 def line(
-    name: str,
-    x: ArrayLike,
-    y: ArrayLike,
-    band: tuple[ArrayLike, ArrayLike] | None = None,
+    name: str, x: ArrayLike, y: ArrayLike, band: tuple[ArrayLike, ArrayLike] | None = None,
     **look: Any,
-) -> Series:
+) -> Series:  # fmt: skip
     """Return a curve of arrays (n,), with its band; look : further fields of `Series`."""
     lower, upper = ([], []) if band is None else (numbers(band[0]), numbers(band[1]))
     return Series(name, numbers(x), numbers(y), lower, upper, **look)
@@ -137,14 +126,9 @@ def band(name: str, x: ArrayLike, lower: ArrayLike, upper: ArrayLike, **look: An
 
 
 def dots(
-    name: str,
-    x: ArrayLike,
-    y: ArrayLike,
-    bars: tuple[ArrayLike, ArrayLike] | None = None,
-    most: int = MOST_POINTS,
-    values: ArrayLike = (),
-    **look: Any,
-) -> Series:
+    name: str, x: ArrayLike, y: ArrayLike, bars: tuple[ArrayLike, ArrayLike] | None = None,
+    most: int = MOST_POINTS, values: ArrayLike = (), **look: Any,
+) -> Series:  # fmt: skip
     """Return points of arrays (n,), thinned to at most `most`, with the ends of error bars."""
     every = slice(None, None, max(1, -(-np.size(np.asarray(x)) // most)))
     lower, upper = ([], []) if bars is None else (numbers(end)[every] for end in bars)

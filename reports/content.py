@@ -26,10 +26,7 @@ from .maps import Maps, Solid
 
 @dataclass(frozen=True)
 class Table:
-    """A table; numbers are written with four significant digits, text as it is.
-
-    text : columns that are words: set from the left, as the first always is.
-    """
+    """A table; numbers get four significant digits; text : columns of words, beside the first."""
 
     title: str
     header: Sequence[str]
@@ -103,14 +100,9 @@ class Section:
 class Report:
     """The content of a page, in its order; empty parts are left out.
 
-    Parameters
-    ----------
-    title : of the project.
-    summary : a sentence or two on the quality of the result.
-    facts : for the head of the page.
-    warnings : what a reader must know before using the numbers.
-    files : name and content of the files of the output folder.
-    versions : of the programs, by name.
+    title : of the project. summary : a sentence or two on the quality of the result. facts : for
+    the head of the page. warnings : what a reader must know before using the numbers. files : name
+    and content of the files of the output folder. versions : of the programs, by name.
     """
 
     title: str
@@ -137,11 +129,6 @@ class Report:
         return [(part.file, part.caption) for part in self.parts if isinstance(part, Picture)]
 
 
-def pictures(shown: Sequence[tuple[str, str]]) -> list[Picture]:
-    """Return pictures of files, named from the page, and captions."""
-    return [Picture(file, caption) for file, caption in shown]
-
-
 @dataclass(frozen=True, eq=False)
 class Exhibit:
     """The contribution of one test to a page.
@@ -161,7 +148,8 @@ class Exhibit:
     def all_parts(self, title: str = "") -> list[Part]:
         """Return the parts for the body of the page, in order, below a title unless that is ""."""
         facts = [Facts(self.facts, title)] if self.facts or title else []
-        return [*facts, *self.parts, *pictures(self.figures), *self.tables]
+        pictures = [Picture(file, caption) for file, caption in self.figures]
+        return [*facts, *self.parts, *pictures, *self.tables]
 
 
 PAGE_DATA = "page.json"
@@ -183,10 +171,7 @@ def write_page_data(folder: Path, report: Report) -> Path:
 
 
 def read_page_data(folder: Path) -> Report:
-    """Read the page of a folder's page.json.
-
-    Raises InputError: it is missing, damaged, or of another version's layout.
-    """
+    """Read a folder's page.json; raises InputError: missing, damaged, or of another layout."""
     path = folder / PAGE_DATA
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -231,10 +216,7 @@ Named = tuple[str, Report]
 
 
 def beside(one: Named, other: Named) -> Report:
-    """Merge two pages, each with the folder that names its parts and pictures.
-
-    Pictures are named from the folder that both have in common.
-    """
+    """Merge two pages, each with the folder, in a common one, that names its parts."""
     names = one[0], other[0]
     reports = [_with_folder(report, name) for name, report in (one, other)]
     titles = list(dict.fromkeys(s.title for report in reports for s in report.sections))

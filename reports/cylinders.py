@@ -25,14 +25,11 @@ CLOSE = 2.2
 class BendLine:
     """The curve of one card.
 
-    Parameters
-    ----------
-    name : of the card. rank : of its colour, the same in every figure.
-    deflection, load, pressure, volume : (frames,) mm, N, MPa, mm^3.
-    knee, limit : where they are, mm and N.
-    rms : N, against what was measured.
-    other : deflection (mm) and load (N) of the other end of a band that begins at the curve.
-    off : (frames,) N, how far the load may be off to either side by what the card leaves open.
+    name : of the card. rank : of its colour, the same in every figure. deflection, load, pressure,
+    volume : (frames,) mm, N, MPa, mm^3. knee, limit : where they are, mm and N. rms : N, against
+    what was measured. other : deflection (mm) and load (N) of the other end of a band that begins
+    at the curve. off : (frames,) N, how far the load may be off to either side by what the card
+    leaves open.
     """
 
     name: str
@@ -60,9 +57,7 @@ class BendReadings:
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: what it is called, a curve a card, what was measured, what a band goes between,
-    and what the curves may be off by.
-    """
+    """One case: a curve a card, readings, and names of a band and of what curves may be off by."""
 
     title: str
     lines: Sequence[BendLine] = ()
@@ -73,10 +68,7 @@ class BendPanel:
 
 @dataclass(frozen=True)
 class BeamBodies:
-    """Where the rigid bodies are at the end, mm.
-
-    supports : (z, y) of both axes and the radius. collar : y of its axis, inner radius, length.
-    """
+    """Rigid bodies when bent, mm; supports : (z, y) of the axes; collar_height : y of its axis."""
 
     supports: tuple[tuple[float, float], ...]
     support_radius: float
@@ -91,10 +83,8 @@ def bending_charts(
     """Return load over deflection, a chart a case; cases without curves are left out of a page.
 
     In a file of several columns charts of one row have the same loads; a panel without a title
-    leaves its place free.
-
-    A band is what the card leaves open; the other end of the solver's band is a dashed curve of
-    the card's colour. misses : whether charts of model less mean follow, of
+    leaves its place free. A band is what the card leaves open; the other end of the solver's band
+    is a dashed curve of the card's colour. misses : whether charts of model less mean follow, of
     cases that were measured.
     """
     if not any(panel.lines for panel in panels):
@@ -187,22 +177,14 @@ def gas_charts(panel: BendPanel) -> Charts:
 
 
 def beam_charts(
-    bent: ArrayLike,
-    quads: ArrayLike,
-    strain: ArrayLike,
-    outline: ArrayLike,
-    section: tuple[ArrayLike, ArrayLike],
-    bodies: BeamBodies,
-    title: str = "",
-) -> Charts:
+    bent: ArrayLike, quads: ArrayLike, strain: ArrayLike, outline: ArrayLike,
+    section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies, title: str = "",
+) -> Charts:  # fmt: skip
     """Return a whole beam true to scale, coloured by its strain along the axis.
 
-    Parameters
-    ----------
-    bent : (n, 3) mm, positions; z along the axis, y up.
-    quads : (m, 4). strain : (m,) log strain along the axis when bent.
-    outline : (k, 2) mm, the inflated beam from the side as a closed line (z, y).
-    section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
+    bent : (n, 3) mm, positions; z along the axis, y up. quads : (m, 4). strain : (m,) log strain
+    along the axis when bent. outline : (k, 2) mm, the inflated beam from the side as a closed line
+    (z, y). section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
     bodies : supports and collar when bent.
     """
     now, before = np.asarray(bent, dtype=float), np.asarray(outline, dtype=float)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import NOTES, NOTES_ARE
@@ -339,17 +340,13 @@ MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
 SMOOTH = 121
 SAVE_CARD = "Save the material card (material.toml)"
 FILES = (
-    (RESULT, "all numbers of this page, for programs"),
-    (CARD, "the material card"),
+    (RESULT, "all numbers of this page, for programs"), (CARD, "the material card"),
     (MODULI, "tangent moduli along their strains, with their bands"),
     (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
-    (RESIDUALS, "every matched value beside the model's"),
-    (NOTES, NOTES_ARE),
-    ("history.csv", "one row an analysis"),
-    (MODULI_PICTURE, "picture of the moduli"),
-    (OPTIMA, "picture of the optima"),
-    (PINNED, "picture of what each test pins down"),
-)
+    (RESIDUALS, "every matched value beside the model's"), (NOTES, NOTES_ARE),
+    ("history.csv", "one row an analysis"), (MODULI_PICTURE, "picture of the moduli"),
+    (OPTIMA, "picture of the optima"), (PINNED, "picture of what each test pins down"),
+)  # fmt: skip
 
 
 def write_fit(fit: Fit, folder: Path) -> Path:
@@ -478,10 +475,7 @@ FAILED = "This failed, and there is no result."
 
 
 def write_failure(folder: Path, title: str, said: str, more: Sequence[str]) -> Path:
-    """Write the page of a fit, or of predictions, that failed; return its path.
-
-    title : of the project. said : the failure in one line. more : other lines for the page.
-    """
+    """Write the page of a fit, or predictions, that failed: as said in one line, and more lines."""
     return write_report(folder, Report(title, f"{FAILED} {said}", warnings=more))
 
 
@@ -497,19 +491,24 @@ def coefficients_table(fit: Fit) -> list[Table]:
     """Return the unknowns with their correlations; nothing where these are not known."""
     if fit.best.certainty is None or fit.best.certainty.posterior is None:
         return []
-    found = coefficients_of(fit)
-    names = found["unknown"].tolist()
-    own = ["unknown", "value", "sigma", "unit"]
-    rows: list[list[object]] = [
-        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
-        for _, row in found.iterrows()
-    ]
     note = (
         "One standard deviation by noise, bounds left aside; then the correlations. Coefficients "
         "make up for each other: single ones are far less certain than the moduli they make."
     )
-    header = ["unknown", "value", "1 sigma", "unit", *names]
-    return [Table(COEFFICIENTS_TITLE, header, rows, note, text=(3,))]
+    unit = {"unit": "unit"}
+    return [correlation_table(COEFFICIENTS_TITLE, coefficients_of(fit), unit, note, text=(3,))]
+
+
+def correlation_table(
+    title: str, found: pd.DataFrame, own: Mapping[str, str], note: str, text: Sequence[int] = ()
+) -> Table:
+    """Return unknowns with their correlations; own : a column of theirs with its heading."""
+    names, columns = found["unknown"].tolist(), ["unknown", "value", "sigma", *own]
+    rows: list[list[object]] = [
+        [*(row[column] for column in columns), *(two_digits(row[name]) for name in names)]
+        for _, row in found.iterrows()
+    ]
+    return Table(title, ["unknown", "value", "1 sigma", *own.values(), *names], rows, note, text)
 
 
 RECORD_TITLE = "The record"

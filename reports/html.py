@@ -38,15 +38,7 @@ WIDEST = 1600
 
 
 def write_report(folder: Path | str, report: Report) -> Path:
-    """Write `page.json` and, made of it, `report.html` into the output folder.
-
-    Pictures must be there already.
-
-    Raises
-    ------
-    OutputError : a file cannot be written.
-    jinja2.UndefinedError : the template asks for what the report does not have.
-    """
+    """Write page.json and report.html, made of it and the folder's pictures; raises OutputError."""
     folder = Path(folder)
     (folder / PAGE).unlink(missing_ok=True) if folder.is_dir() else None
     write_page_data(folder, report)
@@ -54,10 +46,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
 
 
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
-    """Write only the page: report.html of the folder, or another file.
-
-    Raises OutputError: it cannot be written.
-    """
+    """Write only the page: report.html of the folder, or another file; raises OutputError."""
     path = folder / PAGE if path is None else path
     with replacing(path) as temporary:
         temporary.write_text(page_text(folder, report), encoding="utf-8", newline="")
@@ -100,11 +89,9 @@ def policy(style: str, *scripts: str) -> str:
     allowed: Mapping[str, str] = {
         "default-src": "'none'",
         "script-src": " ".join(_hash(script) for script in scripts if script),
-        "style-src": _hash(style),
-        "img-src": "data:",
-        "base-uri": "'none'",
+        "style-src": _hash(style), "img-src": "data:", "base-uri": "'none'",
         "form-action": "'none'",
-    }
+    }  # fmt: skip
     return "; ".join(f"{name} {value}" for name, value in allowed.items())
 
 
@@ -129,10 +116,7 @@ def data_link(text: str) -> str:
 
 
 def data_uri(folder: Path, file: str) -> str:
-    """Return a PNG of the folder as a link, "" where there is no such picture in it.
-
-    Names that lead out of the folder are of no picture in it.
-    """
+    """Return a PNG of the folder as a link; "" where there is none within it."""
     path = (folder / file).resolve()
     if not path.is_relative_to(folder.resolve()):
         return ""
@@ -182,10 +166,7 @@ def browser_command(browser: str, home: Path) -> list[str]:
 
 
 def print_page(page: Path, path: Path) -> Path:
-    """Print a page on A4 as PDF.
-
-    Raises OutputError: there is no browser, it fails, or the file cannot be written.
-    """
+    """Print a page on A4 as PDF; raises OutputError, also where there is no browser."""
     browser = find_browser()
     if browser is None:
         said = f"needs a browser to print with, and there is none of {', '.join(BROWSERS)}"

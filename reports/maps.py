@@ -1,4 +1,4 @@
-"""Draw values at places and surfaces over several loads: maps, and a body to turn.
+"""Draw values at places and surfaces over several loads: maps, a body to turn, ParaView's files.
 
 Arrays are kept packed (`Packed`); maps are charts of coloured dots that Vega draws; the surface is
 drawn here for paper, and moved by a script of the page.
@@ -11,12 +11,16 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import prod
+from pathlib import Path
 from typing import Any, Literal
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike, NDArray
 
+from ..files import replacing, write_text
+from ..meshes.mesh import Mesh
 from .charts import Array, Chart, Shades, dots, ends_of
 from .vega import COLOURS, view
 
@@ -40,10 +44,7 @@ class Packed:
 
     @property
     def values(self) -> Array:
-        """The array; each value within half a `step` of the packed one.
-
-        Raises ValueError: the data are damaged, or of another shape.
-        """
+        """The array, within half a `step`; raises ValueError: data damaged, or of another shape."""
         count = prod(self.shape)
         try:
             # One byte more than expected shows longer data, which are not unpacked.
@@ -72,10 +73,8 @@ def pack(values: ArrayLike) -> Packed:
 
 #: Maps of a row, and their colours.
 BESIDE: Mapping[str, Shades] = {
-    "measured": "from least",
-    "modelled": "from least",
-    "modelled − measured": "about zero",
-}
+    "measured": "from least", "modelled": "from least", "modelled − measured": "about zero",
+}  # fmt: skip
 #: Pixels of a map, and of which a colour bar is four fifths.
 SIDE = 150.0
 #: Places that are drawn of one load; of more, every second, third ... is.
@@ -98,10 +97,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Maps:
-    """Maps of the same places, load by load, with a slider of the loads.
-
-    loads : a name each ("22 kPa"). counts : places of each load. places : (all, 2) mm.
-    """
+    """Maps of the same places (all, 2) mm, of which each load has some (counts), with a slider."""
 
     name: str
     loads: Sequence[str]
@@ -142,15 +138,10 @@ class Solid:
 
 
 def maps_of(
-    name: str,
-    slider: str,
-    loads: Sequence[str],
-    places: Sequence[Array],
+    name: str, slider: str, loads: Sequence[str], places: Sequence[Array],
     rows: Sequence[tuple[str, str, Sequence[Array], Sequence[Array], Sequence[Array]]],
-    labels: tuple[str, str],
-    caption: str,
-    alt: str,
-) -> Maps:
+    labels: tuple[str, str], caption: str, alt: str,
+) -> Maps:  # fmt: skip
     """Return maps of several quantities: measured, modelled and their difference.
 
     places : (n, 2) mm of each load. rows : name, unit, and of each load (n,) measured, modelled and
@@ -311,3 +302,42 @@ def classes(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.
     share = (values - low) / (high - low)
     number = np.clip(np.floor(np.nan_to_num(share) * CLASSES), 0, CLASSES - 1).astype(np.intp)
     return np.where(np.isfinite(values), number, -1)
+
+
+def write_vtu(
+    mesh: Mesh,
+    displacement: ArrayLike,
+    path: Path | str,
+    point_data: Mapping[str, ArrayLike] | None = None,
+    cell_data: Mapping[str, ArrayLike] | None = None,
+) -> Path:
+    """Write the deformed mesh as a VTK unstructured grid.
+
+    displacement : (n, 3) mm; also written as point data, so the mesh at rest is `displacement`
+    subtracted (ParaView: Warp By Vector, scale -1). point_data, cell_data : (n, ...), (m, ...).
+    Raises OutputError, and ValueError for a field that does not have one row a node.
+    """
+    import meshio
+
+    u = np.asarray(displacement, dtype=float)
+    points = {"displacement": u} | {n: np.asarray(own) for n, own in (point_data or {}).items()}
+    for name, own in points.items():
+        if len(own) != len(mesh.points):
+            raise ValueError(f"{name}: {len(own)} rows for {len(mesh.points)} nodes")
+    cells = {name: [np.asarray(own)] for name, own in (cell_data or {}).items()}
+    grid = meshio.Mesh(mesh.points + u, [("quad", mesh.quads)], points, cells)
+    with replacing(path) as temporary:
+        meshio.write(temporary, grid, file_format="vtu")
+    return Path(path)
+
+
+def write_pvd(path: Path, files: Sequence[tuple[float, Path]]) -> Path:
+    """Write a collection (.pvd) of files, each with its time; raises OutputError."""
+    rows = [
+        f'    <DataSet timestep="{time:.9g}" part="0" '
+        f"file={quoteattr(file.relative_to(path.parent).as_posix())}/>\n"
+        for time, file in files
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+    write_text(path, head + "".join(rows) + "  </Collection>\n</VTKFile>\n")
+    return path

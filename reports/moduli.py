@@ -28,27 +28,18 @@ SAMPLES = "percentiles of the samples"
 
 
 def moduli_charts(
-    strains: ArrayLike,
-    moduli: ArrayLike,
-    known: ArrayLike | None = None,
-    band: ArrayLike | None = None,
-    caption: str = "",
-    names: Sequence[str] | None = None,
-) -> Charts:
+    strains: ArrayLike, moduli: ArrayLike, known: ArrayLike | None = None,
+    band: ArrayLike | None = None, caption: str = "", names: Sequence[str] | None = None,
+) -> Charts:  # fmt: skip
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
 
-    Parameters
-    ----------
     strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached;
-        (fits, 3, k) where every law has a range of its own.
-    moduli : (fits, 3, k) MPa, best fit first, in the same order.
-    known : (3, k) MPa; a second row of charts then shows the deviation from it in percent.
-    band : (2, 3, k) MPa, ends of the band of the first fit; not drawn where it is not finite.
-    names : of the fits where they are different laws, and not one's best and the next.
-
-    Raises
-    ------
-    ValueError : not one name a fit, or strains of each law's own together with a known solution.
+    (fits, 3, k) where every law has a range of its own. moduli : (fits, 3, k) MPa, best fit first,
+    in the same order. known : (3, k) MPa; a second row of charts then shows the deviation from it
+    in percent. band : (2, 3, k) MPa, ends of the band of the first fit; not drawn where it is not
+    finite. names : of the fits where they are different laws, and not one's best and the next.
+    Raises ValueError: not one name a fit, or strains of each law's own together with a known
+    solution.
     """
     fits, given = np.asarray(moduli, dtype=float), np.asarray(strains, dtype=float)
     if names is not None and len(names) != len(fits):
@@ -155,16 +146,10 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
 
 
 def bootstrap_charts(
-    strains: Mapping[str, Array],
-    best: Mapping[str, Array],
-    samples: Mapping[str, Array],
-    fit: Mapping[str, Array],
-    caption: str,
-) -> Charts:
-    """Return charts of moduli with percentiles of a bootstrap beside the band of their fit.
-
-    strains, best : (n,) by modulus, MPa. samples, fit : (2, n), lower and upper ends.
-    """
+    strains: Mapping[str, Array], best: Mapping[str, Array], samples: Mapping[str, Array],
+    fit: Mapping[str, Array], caption: str,
+) -> Charts:  # fmt: skip
+    """Return moduli (n,) MPa with the ends (2, n) of samples and of the fit's band."""
     charts = []
     for (title, label), name in zip(PANELS, strains, strict=True):
         x, low, high = strains[name], samples[name][0], samples[name][1]

@@ -121,10 +121,7 @@ def _notes(predictions: Predictions) -> list[Table]:
 
 
 def write_check(check: Check, folder: Path) -> Path:
-    """Write check.json, the tests' own figures and report.html; return the page's path.
-
-    Raises OutputError: they cannot be written.
-    """
+    """Write check.json, the tests' own figures and report.html; return the page's path."""
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "check.json", json.dumps(check.result, indent=1) + "\n")
     several = len(check.setup.tests) > 1
@@ -141,8 +138,7 @@ def write_check(check: Check, folder: Path) -> Path:
         for label, value in exhibit.facts
     ]
     report = Report(
-        title=f"{check.setup.project.title}: a look at the data",
-        summary=_check_summary(check),
+        title=f"{check.setup.project.title}: a look at the data", summary=_check_summary(check),
         facts=facts,
         warnings=[
             words
@@ -159,9 +155,8 @@ def write_check(check: Check, folder: Path) -> Path:
                 [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
             ),
         ],
-        files=[("check.json", "the doubts in plain values")],
-        versions={"bubblefit": __version__},
-    )
+        files=[("check.json", "the doubts in plain values")], versions={"bubblefit": __version__},
+    )  # fmt: skip
     return write_report(folder, report)
 
 
@@ -180,12 +175,7 @@ UNFINISHED = (
 
 
 def page_of_folder(folder: Path) -> Report:
-    """Return the page of an output folder: of its page.json, else of its records so far.
-
-    Raises
-    ------
-    InputError : no output folder, or a damaged one, or one of a version that wrote no page.json.
-    """
+    """Return the page of an output folder, of its records while unfinished; raises InputError."""
     if (folder / PAGE_DATA).exists():
         return read_page_data(folder)
     if (folder / RESULT).exists():

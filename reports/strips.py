@@ -36,15 +36,11 @@ GRIP = 0.06
 class StripCurves:
     """Loads of one direction; a curve is a pair of elongation (mm) and load (N).
 
-    Parameters
-    ----------
-    direction : "warp", "fill", "bias" (or "bias45").
-    models : (name, elongation, load), best first; each may end where it likes. Where it starts
-        above zero it is taken to have started unloaded at zero elongation.
-    points : measured, of any number of specimens, in any order.
-    polynomial : the load curve fitted to them, on increasing elongations.
-    scatter : N, of the specimens about their curve.
-    rms : N, of each model in turn (Eqs 3.4-3.6), as far as known.
+    direction : "warp", "fill", "bias" (or "bias45"). models : (name, elongation, load), best first;
+    each may end where it likes. Where it starts above zero it is taken to have started unloaded at
+    zero elongation. points : measured, of any number of specimens, in any order. polynomial : the
+    load curve fitted to them, on increasing elongations. scatter : N, of the specimens about their
+    curve. rms : N, of each model in turn (Eqs 3.4-3.6), as far as known.
     """
 
     direction: str
@@ -57,10 +53,7 @@ class StripCurves:
 
 @dataclass(frozen=True, eq=False)
 class OrderErrors:
-    """One direction's load polynomials: orders (k,), rmse and left_out (k,) N, and the choice.
-
-    `left_out` is the root mean square of the errors at points left out of the fit one by one.
-    """
+    """One direction's polynomials by order: RMSE and leave-one-out error (k,) N, the choice."""
 
     direction: str
     orders: Sequence[int]
@@ -81,11 +74,7 @@ class BiaxialPanel:
 
 
 def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
-    """Return the loads of each strip over gauge elongation, and what the models miss.
-
-    Differences are those from the polynomial, with the measured points' own as dots; from the
-    points where there is no polynomial. There is none where a strip has neither.
-    """
+    """Return loads over elongation, and differences from the polynomial, else the points."""
     if not curves:
         raise ValueError("load_charts: no strips to draw")
     # The same model has the same colour in every chart.
@@ -171,10 +160,7 @@ def specimen_charts(
 
 
 def order_charts(directions: Sequence[OrderErrors]) -> Charts:
-    """Return RMSE and leave-one-out error over the polynomial order, a chart a direction.
-
-    A ring marks the chosen order. An axis is logarithmic where its errors span a decade.
-    """
+    """Return RMSE and leave-one-out error over the order; a ring is the chosen one."""
     if not directions:
         raise ValueError("order_charts: no directions to draw")
     charts = []
@@ -196,28 +182,15 @@ def order_charts(directions: Sequence[OrderErrors]) -> Charts:
 
 
 def strip_charts(
-    points: ArrayLike,
-    quads: ArrayLike,
-    displacement: ArrayLike,
-    shear: ArrayLike,
-    gauge: ArrayLike,
-    title: str = "",
-    grips: bool = True,
-) -> Charts:
+    points: ArrayLike, quads: ArrayLike, displacement: ArrayLike, shear: ArrayLike,
+    gauge: ArrayLike, title: str = "", grips: bool = True,
+) -> Charts:  # fmt: skip
     """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
 
-    Parameters
-    ----------
-    points : (n, 3) or (n, 2) mm, at rest.
-    quads : (m, 4) nodes.
-    displacement : (n, 3) or (n, 2) mm.
-    shear : (m,) gamma12 of each quad, signed or its magnitude.
-    gauge : (2,) nodes of the virtual strain gauge.
-    grips : whether the ends are held in grips, to be drawn.
-
-    Raises
-    ------
-    ValueError : not one shear strain a quad.
+    points : (n, 3) or (n, 2) mm, at rest. quads : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
+    shear : (m,) gamma12 of each quad, signed or its magnitude. gauge : (2,) nodes of the virtual
+    strain gauge. grips : whether the ends are held in grips, to be drawn. Raises ValueError: not
+    one shear strain a quad.
     """
     rest = np.asarray(points, dtype=float)[:, :2]
     now = rest + np.asarray(displacement, dtype=float)[:, :2]
@@ -267,10 +240,7 @@ def _grips(rest: Array, now: Array) -> list[Series]:
 
 
 def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
-    """Return the strains of both yarns over the larger load, a chart a ratio.
-
-    Raises ValueError: no panels.
-    """
+    """Return the strains of both yarns over the larger load, a chart a ratio."""
     if not panels:
         raise ValueError("biaxial_charts: no ratio to draw")
     charts = []

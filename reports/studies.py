@@ -102,11 +102,7 @@ def optima_chart(
 
 
 def convergence_charts(models: Sequence[ConvergencePanel], what: str, caption: str) -> Charts:
-    """Return a chart of the changes under refinement of each model, and one of the cost.
-
-    A change that falls like size^p lies on a straight line of slope p; grey lines show 1 and 2.
-    what : "elements" or "increments".
-    """
+    """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
     if not models:
         raise ValueError("convergence_charts: no models to draw")
     charts = [_changes(model, SIZES[what]) for model in models]
@@ -176,10 +172,7 @@ def nu12_charts(
 
 
 def profile_charts(panels: Sequence[ProfilePanel], threshold: float, caption: str) -> Charts:
-    """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends.
-
-    Raises ValueError: no panels.
-    """
+    """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends."""
     if not panels:
         raise ValueError("profile_charts: no profiles to draw")
     return Charts("profiles", [_profile(panel, threshold) for panel in panels], caption)
@@ -215,11 +208,9 @@ def weights_charts(
 ) -> list[Charts]:
     """Return charts of the errors of the tests, then of the moduli, over a weight.
 
-    Parameters
-    ----------
-    counted : the kind of test that is weighted. counts : times the project's weight.
-    errors : relative, by test. moduli : MPa, by name and strain. sigma : relative, by name, at
-    these strains where the weight is as written; None where it is not known.
+    counted : the kind of test that is weighted. counts : times the project's weight. errors :
+    relative, by test. moduli : MPa, by name and strain. sigma : relative, by name, at these strains
+    where the weight is as written; None where it is not known.
     """
     across = f"weight of {counted}, times that of the project"
     drawn = [
@@ -299,10 +290,7 @@ def _form(row: LawRow) -> str:
 
 
 def plan_charts(tests: Sequence[str], sigma: Mapping[str, Sequence[float]], caption: str) -> Charts:
-    """Return a chart of 1 sigma, %, of each modulus with each test that could be made.
-
-    sigma : by modulus, one a test; from 100 % on as unknown: a ring at the end of the axis.
-    """
+    """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
     if not tests:
         raise ValueError("plan_charts: no tests to draw")
     every = {name: np.asarray(own, dtype=float) for name, own in sigma.items()}
@@ -325,14 +313,9 @@ def _aside(count: int) -> np.ndarray:
 
 
 def _named(
-    across: str,
-    up: str,
-    names: Sequence[str],
-    values: Mapping[str, np.ndarray],
-    alt: str,
-    level: float | None = None,
-    more: Sequence[Series] = (),
-) -> Chart:
+    across: str, up: str, names: Sequence[str], values: Mapping[str, np.ndarray], alt: str,
+    level: float | None = None, more: Sequence[Series] = (),
+) -> Chart:  # fmt: skip
     """Return a chart over names instead of numbers."""
     place = np.arange(len(names)) + 1.0
     series = [

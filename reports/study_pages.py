@@ -1,20 +1,21 @@
 """Write the folder of a study: tables, figures, notes.csv, report.html and, last, result.json.
 
-A function a study, found by the type of its result (`runs.presenters`); all end in `write_folder`.
+A function a study, found by the type of its result (`runs.folder`); all end in `write_folder`.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from ..errors import NOTES, NOTES_ARE, Note, SolverFailure, percent
+from ..errors import NOTES, NOTES_ARE, SolverFailure, percent
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
 from ..files import replacing, write_notes, write_text
@@ -29,8 +30,8 @@ from ..runs.refinement import Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
 from ..solvers.base import History
 from .charts import Charts
-from .content import Listing, Report, Section, Table, pictures
-from .fit_page import citation, two_digits
+from .content import Listing, Picture, Report, Section, Table
+from .fit_page import citation, correlation_table
 from .html import write_report
 from .moduli import bootstrap_charts
 from .studies import (
@@ -62,36 +63,11 @@ UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square alon
 ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
 
 
-class Study(Protocol):
-    """The result of a study: its numbers, and what is to be said of them."""
-
-    @property
-    def notes(self) -> Sequence[Note]: ...
-    @property
-    def result(self) -> dict[str, Any]: ...
-    def table(self) -> pd.DataFrame: ...
-    def lines(self) -> list[str]: ...
-
-
 def write_folder(
-    folder: Path,
-    study: Study,
-    page: Report,
-    tables: Mapping[str, pd.DataFrame],
-    figures: Mapping[str, Charts],
-    digits: int | None = None,
-) -> Path:
-    """Write everything of a study; return the page's path.
-
-    Parameters
-    ----------
-    tables, figures : by the names of their files.
-    digits : significant ones of the tables' numbers, all unless given.
-
-    Raises
-    ------
-    OutputError : a file cannot be written.
-    """
+    folder: Path, study: Any, page: Report, tables: Mapping[str, pd.DataFrame],
+    figures: Mapping[str, Charts], digits: int | None = None,
+) -> Path:  # fmt: skip
+    """Write tables and figures by file name, with so many digits, and the page; return its path."""
     if (folder / RESULT).exists():  # a folder that is half written has no result
         (folder / RESULT).unlink()
     form = None if digits is None else f"%.{digits}g"
@@ -101,42 +77,30 @@ def write_folder(
     for name, charts in figures.items():
         save(folder / name, charts)
     write_notes(folder, study.notes)
-    written = write_report(folder, page)
+    warnings, files = [note.line for note in study.notes], [*page.files, *FILES]
+    written = write_report(folder, replace(page, warnings=warnings, files=files))
     write_text(folder / RESULT, json.dumps(study.result, indent=1) + "\n")
     return written
 
 
 def write_plain(
-    folder: Path,
-    study: Study,
-    title: str,
-    name: str,
-    charts: Sequence[Charts],
-    figure: Charts | None = None,
-    digits: int | None = None,
-) -> Path:
-    """Write a study whose page is its lines, charts and table; return the page's path.
-
-    name : of the table NAME.csv and, where there is a figure, of NAME.png.
-    """
+    folder: Path, study: Any, title: str, name: str, charts: Sequence[Charts],
+    figure: Charts | None = None, digits: int | None = None,
+) -> Path:  # fmt: skip
+    """Write a study whose page is its lines, charts and table: NAME.csv, with a figure NAME.png."""
     table, lines = study.table(), study.lines()
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     rows = table.to_numpy(object).tolist()
     file, picture = f"{name}.csv", f"{name}.png"
     page = Report(
         title=title,
-        warnings=[note.line for note in study.notes],
         sections=[
             Section("What it comes to", [Listing("\n".join(lines))] if lines else []),
             Section("Figure", charts),
             Section("The numbers", [Table("The numbers", list(table.columns), rows, text=text)]),
             Section("How to cite", citation()),
         ],
-        files=[
-            (file, "the table"),
-            *([(picture, "picture of the charts")] if figure else []),
-            *FILES,
-        ],
+        files=[(file, "the table"), *([(picture, "picture of the charts")] if figure else [])],
     )
     figures = {} if figure is None else {picture: figure}
     return write_folder(folder, study, page, {file: table}, figures, digits)
@@ -199,12 +163,10 @@ def write_weights(study: weights.WeightStudy, folder: Path) -> Path:
         for name in COMPONENTS
     }
     parts = weights_charts(
-        study.counted,
-        [run.count for run in ended],
-        {name: [run.relative[name] for run in ended] for name in ended[0].relative},
-        moduli,
+        study.counted, [run.count for run in ended],
+        {name: [run.relative[name] for run in ended] for name in ended[0].relative}, moduli,
         {name: study.sigma(name) for name in COMPONENTS},
-    )
+    )  # fmt: skip
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.title}: the weight of {study.counted}"
     return write_plain(folder, study, title, "weights", parts, figure, 9)
@@ -220,6 +182,10 @@ def write_bootstrap(study: bootstrap.Bootstrap, folder: Path) -> Path:
     rows: list[list[object]] = [[name, *map(percent, study.sigma[name])] for name in COMPONENTS]
     header = ["modulus", "1 sigma of the samples", "of the fit, by noise"]
     scatter = Table("How far the moduli scatter", header, rows, bootstrap.METHOD, text=(1, 2))
+    unknowns = correlation_table(
+        "Unknowns over the samples", coefficients, {"sigma_of_fit": "of the fit"},
+        "Coefficients in MPa; then the correlations over the samples.",
+    )  # fmt: skip
     page = Report(
         title=f"{found.setup.project.title}: bootstrap over {study.over}",
         summary=f"1 sigma over {len(study.samples)} samples: {sigma}.",
@@ -230,30 +196,16 @@ def write_bootstrap(study: bootstrap.Bootstrap, folder: Path) -> Path:
             ("analyses", study.analyses),
             ("samples that did not settle", study.unfinished),
         ],
-        warnings=[note.line for note in study.notes],
-        sections=[Section("The samples", [charts, scatter, _correlations(coefficients)])],
+        sections=[Section("The samples", [charts, scatter, unknowns])],
         files=[
             ("bootstrap.csv", "moduli along their strains, with both bands"),
             ("bootstrap.png", "picture of the moduli"),
             ("coefficients.csv", "the unknowns, with their correlations over the samples"),
             (bootstrap.SAMPLES, "every sample: what was drawn, and the optimiser's unknowns"),
-            *FILES,
         ],
     )
     tables = {"bootstrap.csv": study.table(), "coefficients.csv": coefficients}
     return write_folder(folder, study, page, tables, {"bootstrap.png": charts}, 9)
-
-
-def _correlations(found: pd.DataFrame) -> Table:
-    names = found["unknown"].tolist()
-    own = ["unknown", "value", "sigma", "sigma_of_fit"]
-    rows: list[list[object]] = [
-        [*(row[column] for column in own), *(two_digits(row[name]) for name in names)]
-        for _, row in found.iterrows()
-    ]
-    header = ["unknown", "value", "1 sigma", "of the fit", *names]
-    note = "Coefficients in MPa; then the correlations over the samples."
-    return Table("Unknowns over the samples", header, rows, note)
 
 
 def write_profiles(study: profile.Profiles, folder: Path) -> Path:
@@ -276,14 +228,13 @@ def write_profiles(study: profile.Profiles, folder: Path) -> Path:
             ("tests", ", ".join(study.tests)),
             ("analyses", study.analyses),
         ],
-        warnings=[note.line for note in study.notes],
         sections=[
             Section(
                 "The profiles",
                 [charts, Table("Between what each modulus lies", header, rows, profile.METHOD)],
             )
         ],
-        files=[("profile.csv", "the curves"), ("profile.png", "picture of the profiles"), *FILES],
+        files=[("profile.csv", "the curves"), ("profile.png", "picture of the profiles")],
     )
     tables, figures = {"profile.csv": study.table()}, {"profile.png": charts}
     return write_folder(folder, study, page, tables, figures, 9)
@@ -330,16 +281,14 @@ def write_plan(study: plan.Plan, folder: Path) -> Path:
     )
     title = "Which test next"
     page = Report(
-        title=f"{study.title}: which test next?",
-        summary=f"{first.title}: 1 sigma of {change}.",
+        title=f"{study.title}: which test next?", summary=f"{first.title}: 1 sigma of {change}.",
         facts=facts,
-        warnings=[note.line for note in study.notes],
         sections=[
             Section(title, [charts, Table(title, header, rows, plan.ASSUMED, text=(4,))]),
             Section("Along the strains", along),
         ],
-        files=[("plan.csv", "the tables"), ("plan.png", "picture of the chart"), *FILES],
-    )
+        files=[("plan.csv", "the tables"), ("plan.png", "picture of the chart")],
+    )  # fmt: skip
     return write_folder(folder, study, page, {"plan.csv": study.table()}, {"plan.png": charts}, 6)
 
 
@@ -358,12 +307,11 @@ def write_comparison(study: LawComparison, folder: Path) -> Path:
         title=f"{study.project.title}: forms of the moduli",
         summary="; ".join(study.conclusion),
         facts=[("error", error), ("the data's own noise", total)],
-        warnings=[note.line for note in study.notes],
         sections=[
             Section("Errors", [charts, Table("Errors", list(table.columns), cells, note)]),
-            Section("The forms side by side", pictures(responses)),
+            Section("The forms side by side", [Picture(*own) for own in responses]),
         ],
-        files=[("comparison.csv", "the table"), ("laws.png", "picture of the errors"), *FILES],
+        files=[("comparison.csv", "the table"), ("laws.png", "picture of the errors")],
     )
     tables, figures = {"comparison.csv": table}, {"laws.png": charts}
     return write_folder(folder, study, page, tables, figures, 9)

@@ -87,12 +87,7 @@ CONFIG: Spec = {
 
 
 def save(path: Path | str, charts: Charts) -> Path:
-    """Write charts as a file (PNG, SVG or PDF by its suffix), whole or not at all.
-
-    Raises
-    ------
-    ValueError : nothing to draw, or another suffix. OutputError : the file cannot be written.
-    """
+    """Write charts as PNG, SVG or PDF by suffix; raises ValueError, OutputError."""
     if not charts.charts:
         raise ValueError(f"{charts.name}: nothing to draw")
     content = rendered(charts, Path(path).suffix.lower())
@@ -248,10 +243,7 @@ def dark_style() -> str:
 
 @cache
 def library() -> str:
-    """Return Vega as one script for the page, kept in the cache of the computer.
-
-    Raises OutputError: vl-convert does not give it.
-    """
+    """Return Vega as one script, kept in the cache of the computer; raises OutputError."""
     path = cache_folder() / f"vega-{version('vl-convert-python')}.js"
     try:
         return path.read_text(encoding="utf-8")
@@ -307,7 +299,8 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
     if chart.level is not None:
         rule = {"x": {"value": 0}, "x2": {"signal": "width"}, "y": _at("y", value=chart.level)}
         spec["marks"].append(_mark("rule", "", {**rule, "stroke": {"value": SOFT}}))
-    dot = dot or (70.0 if _few(chart) else None)
+    dotted = all(s.look == "dots" for s in chart.series)
+    dot = dot or (70.0 if dotted and sum(len(s.x) for s in chart.series) <= FEW else None)
     layers: list[tuple[int, Spec]] = []
     for number, s in enumerate(chart.series):
         spec["data"].append(_data(f"s{number}", s))
@@ -326,10 +319,7 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
 
 
 def printable(chart: Chart) -> Chart:
-    """Return the chart with every character replaced that no drawing may hold.
-
-    vl-convert ends the whole process at them.
-    """
+    """Return the chart without characters at which vl-convert ends the whole process."""
 
     def words(text: str) -> str:
         return UNPRINTABLE.sub("\ufffd", text)
@@ -352,11 +342,6 @@ def colour(s: Series) -> str:
 def _outline() -> Spec:
     schema = "https://vega.github.io/schema/vega/v6.json"
     return {"$schema": schema, "padding": 5, "autosize": "pad", "config": CONFIG}
-
-
-def _few(chart: Chart) -> bool:
-    dotted = all(s.look == "dots" for s in chart.series)
-    return dotted and sum(len(s.x) for s in chart.series) <= FEW
 
 
 def _scale(name: str, domain: str, log: bool) -> Spec:
@@ -478,7 +463,7 @@ def _legend(entries: Sequence[Series], width: float) -> Spec:
     ways = {
         "stroke": [colour(s) for s in entries],
         "strokeDash": [DASHES[s.dashes % 4] if s.look == "line" else [] for s in entries],
-        "fill": [_legend_fill(s) for s in entries],
+        "fill": ["transparent" if s.hollow or s.look == "line" else colour(s) for s in entries],
         "shape": [{"line": "stroke", "band": "square"}.get(s.look, s.shape) for s in entries],
         "size": [260 if s.look == "line" else 60 for s in entries],
         "opacity": [0.3 if s.look == "band" else 0.55 if s.faint or s.wide else 1 for s in entries],
@@ -494,7 +479,3 @@ def _legend(entries: Sequence[Series], width: float) -> Spec:
         "rowPadding": 2, "offset": 8,
     }  # fmt: skip
     return {"scales": scales, "legends": [legend]}
-
-
-def _legend_fill(s: Series) -> str:
-    return "transparent" if s.hollow or s.look == "line" else colour(s)

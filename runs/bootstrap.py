@@ -25,8 +25,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .folder import Store
-from .presenters import Presented
+from .folder import Presented, Store
 from .series import StudyRecord
 from .setup import fingerprints
 from .validation import TESTS, name_of, parts_of
@@ -205,24 +204,17 @@ class Bootstrap(Presented):
         """The content of result.json."""
         setup = self.found.setup
         return {
-            "command": "bootstrap",
-            "title": setup.project.title,
-            "project": str(setup.project.path),
-            "card": self.found.card,
-            "tests": [test.test.name for test in setup.tests],
-            "over": self.over,
+            "command": "bootstrap", "title": setup.project.title,
+            "project": str(setup.project.path), "card": self.found.card,
+            "tests": [test.test.name for test in setup.tests], "over": self.over,
             "groups": {group.name: [u.name for u in group.units] for group in self.groups},
-            "seed": setup.project.fit.seed,
-            "samples": len(self.samples),
-            "analyses": self.analyses,
-            "unfinished": self.unfinished,
-            "level": LEVEL,
+            "seed": setup.project.fit.seed, "samples": len(self.samples), "analyses": self.analyses,
+            "unfinished": self.unfinished, "level": LEVEL,
             "up_to_strain": by_strain(self.found.best.valid),
             "sigma_relative": {name: own for name, (own, _) in self.sigma.items()},
             "sigma_relative_of_fit": {name: of for name, (_, of) in self.sigma.items()},
-            "method": METHOD,
-            "notes": rows(self.notes),
-        }
+            "method": METHOD, "notes": rows(self.notes),
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """Return the result in words, for the terminal."""
@@ -241,35 +233,21 @@ class Bootstrap(Presented):
 
 
 def bootstrap(
-    project: Project,
-    over: str,
-    samples: int = COUNT,
-    card: Card = None,
-    tests: str | Sequence[str] | None = None,
-    *,
-    seed: int | None = None,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
+    project: Project, over: str, samples: int = COUNT, card: Card = None,
+    tests: str | Sequence[str] | None = None, *, seed: int | None = None,
+    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Progress | None = None,
-) -> Bootstrap:
+) -> Bootstrap:  # fmt: skip
     """Draw parts of the data with replacement and fit every draw.
 
     Every refit begins at the optimum of the fit that wrote the card and takes a few analyses. What
-    is drawn twice counts twice.
-
-    Parameters
-    ----------
-    over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
-        "specimens", "directions", "ratios". samples : number of draws. card : the one that the
-        project's fit left in its usual folder unless given. tests : as for `fit`. seed : of the
-        draws, the project's unless given. out : folder in which every sample is kept as it ends;
-        resume : read what it holds.
-
-    Raises
-    ------
-    InputError : in the project or its data; fewer than two units. OutputError : the
-        folder is used or cannot be written. SolverFailure : the tests cannot be run with the card.
+    is drawn twice counts twice. over : "tests" (among those of their kind), or a sort of parts of
+    the tests: "frames", "specimens", "directions", "ratios". samples : number of draws. card : the
+    one that the project's fit left in its usual folder unless given. tests : as for `fit`. seed :
+    of the draws, the project's unless given. out : folder in which every sample is kept as it ends;
+    resume : read what it holds. Raises InputError: in the project or its data; fewer than two
+    units; OutputError: the folder is used or cannot be written; SolverFailure: the tests cannot be
+    run with the card.
     """
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")
@@ -320,10 +298,7 @@ def _tests(found: Optimum) -> list[Group]:
 
 
 def _parts(found: Optimum, sort: str) -> list[Group]:
-    """Return parts of tests, grouped by comparison; whole comparisons are grouped by test.
-
-    So specimens are drawn direction by direction.
-    """
+    """Return parts of tests, grouped by comparison (specimens by direction), else by test."""
     setup, problem = found.setup, found.problem
     grouped: dict[str, list[Unit]] = {}
     for part in parts_of(setup, sort, "--over"):

@@ -23,7 +23,7 @@ from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import executor_of
 from .fit import FitEvent, stored_fit
-from .presenters import Presented
+from .folder import Presented
 from .result import Fit
 from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
@@ -49,11 +49,8 @@ LOST = "no fit without its points ended well, or no analysis at them: the form i
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
     """Return the project with each of the forms, by name; all that its solver carries unless given.
 
-    names : of forms; "spline:8" is a spline of eight knots for each modulus.
-
-    Raises
-    ------
-    InputError : no such form, or bounds that do not go with every form.
+    names : of forms; "spline:8" is a spline of eight knots for each modulus. Raises InputError: no
+    such form, or bounds that do not go with every form.
     """
     bounds = project.law.bounds
     if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
@@ -123,12 +120,9 @@ def validate(
     """Fit without the points of each fold and judge at these points; None now and then.
 
     Strain range and breaks of the law, and scales of relative errors, follow from the points
-    matched, and the fits begin at random starts of their own: the points left out enter only by
-    how far the models are strained.
-
-    Parameters
-    ----------
-    count : of folds, at most. starts : random starts a fold, the best of which counts.
+    matched, and the fits begin at random starts of their own: the points left out enter only by how
+    far the models are strained. count : of folds, at most. starts : random starts a fold, the best
+    of which counts.
     """
     parts = folds(setup, count)
     missing = [fold for fold in range(len(parts)) if fold not in done]
@@ -160,9 +154,8 @@ def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
     point = judged.evaluate(unknowns, False, warm=False)
     if point is None:
         return FoldError(fold, None, {})
-    return FoldError(
-        fold, part_of_objective(judged, point.residual), errors(judged, point.residual)
-    )
+    value = float(judged.blocks.norms(point.residual).sum())
+    return FoldError(fold, value, errors(judged, point.residual))
 
 
 def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
@@ -180,11 +173,6 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
     return best
 
 
-def part_of_objective(problem: FitProblem, residual: np.ndarray) -> float:
-    """Return the share of the problem's comparisons in the objective."""
-    return float(problem.blocks.norms(residual).sum())
-
-
 def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
     """Return the root mean square by comparison, in its unit."""
     misfit = residual * problem.scale
@@ -195,13 +183,9 @@ def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
 
 
 def errors_of_folds(
-    setup: FitSetup,
-    found: Fit,
-    folds: int,
-    starts: int,
-    folder: Path | None,
+    setup: FitSetup, found: Fit, folds: int, starts: int, folder: Path | None,
     tell: Callable[[FoldError | None], None],
-) -> tuple[FoldError, ...]:
+) -> tuple[FoldError, ...]:  # fmt: skip
     """Return the errors of the folds, read where the folder has them of this fit.
 
     folds : at most; starts : random starts of each. folder : None where nothing is written. tell :
@@ -218,10 +202,7 @@ def errors_of_folds(
 
 @dataclass(frozen=True, eq=False)
 class FormFit:
-    """The best fit of one form of the moduli, and its errors in the folds.
-
-    compared : the comparisons whose points can be left out.
-    """
+    """The best fit of a form of the moduli, and its errors in folds of some comparisons."""
 
     name: str
     fit: Fit
@@ -241,13 +222,10 @@ class FormFit:
     @property
     def fitted(self) -> float:
         """Share of those comparisons in the objective of the fit to all points."""
-        return part_of_objective(self._judged, self._residual)
+        return float(self._judged.blocks.norms(self._residual).sum())
 
     def left_out(self, comparison: str | None = None) -> list[float]:
-        """Return each fold's error at the points left out, NaN where it failed.
-
-        Their part of the objective, or the root mean square of one comparison in its unit.
-        """
+        """Return each fold's part of the objective, or RMS of a comparison; NaN if it failed."""
         if comparison is not None:
             return [fold.rms.get(comparison, math.nan) for fold in self.folds]
         return [math.nan if fold.value is None else fold.value for fold in self.folds]
@@ -370,33 +348,18 @@ def compare_laws(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *,
-    folds: int = FOLDS,
-    starts: int = STARTS,
-    fold_starts: int = FOLD_STARTS,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
-    command_line: Sequence[str] | None = None,
-) -> LawComparison:
+    *, folds: int = FOLDS, starts: int = STARTS, fold_starts: int = FOLD_STARTS,
+    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    progress: Progress | None = None, command_line: Sequence[str] | None = None,
+) -> LawComparison:  # fmt: skip
     """Fit every form to the tests, then without some specimens, and judge it at those.
 
-    Tests without known specimens stay whole in every fold.
-
-    Parameters
-    ----------
-    tests : by name or kind; every test that can be fitted unless given.
-    forms : as for `candidates`.
-    folds : at most; fold_starts : random starts of the fit of each.
-    starts : random starts of the fit of each form.
-    out : folder with a folder for each form, written as the fits end.
-    command_line : as for `fit`.
-
-    Raises
-    ------
-    InputError : in the project or its data, no test with specimens, nothing to resume.
-    OutputError, NoFeasibleStart, SolverFailure : as `fit`.
+    Tests without known specimens stay whole in every fold. tests : by name or kind; every test that
+    can be fitted unless given. forms : as for `candidates`. folds : at most; fold_starts : random
+    starts of the fit of each. starts : random starts of the fit of each form. out : folder with a
+    folder for each form, written as the fits end. command_line : as for `fit`. Raises InputError:
+    in the project or its data, no test with specimens, nothing to resume; OutputError,
+    NoFeasibleStart, SolverFailure: as `fit`.
     """
     tell = progress or (lambda event: None)
     # All of them first: a mistake in the project shows before the first fit.
@@ -432,19 +395,15 @@ def compare_laws(
 
 def _form(form: FormFit) -> dict[str, Any]:
     return {
-        "form": form.name,
-        **form.fit.law.form.to_card(),
-        "coefficients": form.coefficients,
-        "objective": form.fit.objective,
-        "fitted": form.fitted,
-        "rms": form.rms,
+        "form": form.name, **form.fit.law.form.to_card(), "coefficients": form.coefficients,
+        "objective": form.fit.objective, "fitted": form.fitted, "rms": form.rms,
         "cross_validated": _number(form.validated),
         "cross_validated_by_part": {
             name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
         },
         "folds": [_number(value) for value in form.left_out()],
         "starts_objective": [r.objective for r in form.fit.best.ranked],
-    }
+    }  # fmt: skip
 
 
 def _number(value: float) -> float | None:

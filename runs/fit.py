@@ -21,8 +21,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, settings_of
 from .best import BestFit, best_fit, with_certainty
 from .executor import Task, executor_of
-from .folder import Store
-from .presenters import failure_page, write_report
+from .folder import Store, failure_page, write_report
 from .record import Record, data_rows, facts_of, solver_facts, this_run
 from .result import Fit
 from .setup import FitSetup, coarse_problem, fingerprints, prepare_fit

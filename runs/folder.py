@@ -1,4 +1,4 @@
-"""The output folder of a run: its store, kept runs and analyses, tables, resuming."""
+"""The output folder of a run: its store, kept runs and analyses, resuming, and its presenter."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import re
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, OutputError
+from ..errors import InputError, NoFeasibleStart, Note, NoteKind, OutputError, SolverFailure
 from ..experiments.kinds import RunRecord
 from ..files import output_errors, remove_unfinished, replacing, write_text
 from ..solvers.base import History
@@ -317,3 +318,57 @@ class KeptAnalyses(RunCache):
         """Raise OutputError: the study's own tables would not be written either."""
         with output_errors(self.folder):
             raise error
+
+
+#: Module of `reports` and its function, by the type of the result.
+PRESENTERS = {
+    "Bootstrap": ("study_pages", "write_bootstrap"),
+    "Check": ("run_pages", "write_check"),
+    "Fit": ("fit_page", "write_fit"),
+    "LawComparison": ("study_pages", "write_comparison"),
+    "Nu12Study": ("study_pages", "write_nu12"),
+    "Plan": ("study_pages", "write_plan"),
+    "Predictions": ("run_pages", "write_predictions"),
+    "Profiles": ("study_pages", "write_profiles"),
+    "Refinement": ("study_pages", "write_refinement"),
+    "Validation": ("study_pages", "write_validation"),
+    "WeightStudy": ("study_pages", "write_weights"),
+}
+
+
+def write_report(result: Any, folder: Path | str) -> Path:
+    """Write all files of a result, report.html among them, and return the page's path.
+
+    Presenters look at results from above, so that no result imports them. Raises OutputError.
+    """
+    module, function = PRESENTERS[type(result).__name__]
+    page: Path = getattr(import_module(f"bubblefit.reports.{module}"), function)(
+        result, Path(folder)
+    )
+    return page
+
+
+class Presented:
+    """A result that its presenter writes."""
+
+    def write(self, folder: Path | str) -> None:
+        """Write all files and the page into a folder; raises OutputError."""
+        write_report(self, folder)
+
+
+@contextmanager
+def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
+    """Write report.html of a failure within the block, if there is a folder, and raise it again.
+
+    Yields further lines of the page, to be filled. title : of the project.
+    """
+    more: list[str] = []
+    try:
+        yield more
+    except (SolverFailure, NoFeasibleStart) as failure:
+        if folder is not None:
+            said = str(failure).splitlines()[0]
+            present = import_module("bubblefit.reports.fit_page")
+            with suppress(OutputError):  # the failure itself says more
+                present.write_failure(folder, title, said, more)
+        raise

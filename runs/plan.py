@@ -35,7 +35,7 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from .presenters import Presented
+from .folder import Presented
 from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
 from .simulation import FAILED
@@ -105,8 +105,6 @@ class Prospect:
 class Plan(Presented):
     """The tests that could be made next, best first.
 
-    Parameters
-    ----------
     card : its name. tests : the present ones. ends : (3,) largest strains (eps1, eps2, gamma12) of
     the moduli. rank : WORST, or a modulus. now : of the present tests alone. candidates : ranked.
     following : the best test after the first, None where there is none.
@@ -143,10 +141,7 @@ class Plan(Presented):
         return found
 
     def table(self) -> pd.DataFrame:
-        """Return columns rank, test, kind, specimens, noise, sigma_E1, sigma_E1_at_0 ...
-
-        The first row, of rank 0, is of the present tests. Relative: 0.01 is 1 %.
-        """
+        """Return a row a test, with relative sigma of each modulus; rank 0 is the present."""
         import pandas as pd
 
         table = []
@@ -169,28 +164,20 @@ class Plan(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "plan",
-            "title": self.title,
-            "project": str(self.project),
-            "card": self.card,
-            "tests": list(self.tests),
-            "criterion": self.criterion,
+            "command": "plan", "title": self.title, "project": str(self.project), "card": self.card,
+            "tests": list(self.tests), "criterion": self.criterion,
             "strains": {name: at.tolist() for name, at in self.strains.items()},
-            "up_to_strain": by_strain(self.ends),
-            "now": self._numbers(self.now),
+            "up_to_strain": by_strain(self.ends), "now": self._numbers(self.now),
             "candidates": [self._numbers(test) for test in self.candidates],
             "following": None if self.following is None else self._numbers(self.following),
-            "assumed": ASSUMED,
-            "notes": rows(self.notes),
-        }
+            "assumed": ASSUMED, "notes": rows(self.notes),
+        }  # fmt: skip
 
     def _numbers(self, test: Prospect) -> dict[str, Any]:
         return {
-            **test.row,
-            "sigma": test.summary,
-            "sigma_at": self.at(test),
+            **test.row, "sigma": test.summary, "sigma_at": self.at(test),
             "unknown": [name for name, value in test.summary.items() if value >= UNKNOWN],
-        }
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """Return a table for the terminal, and its assumptions."""
@@ -244,10 +231,7 @@ class Present:
 
 
 def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
-    """Run the tests with a card, and fit offsets and the sheet's surface to them.
-
-    Raises SolverFailure: they cannot be run with it.
-    """
+    """Run the tests with a card, offsets and surface fitted; raises SolverFailure."""
     law = _law(setup, card)
     make = setup.make_leading
     comparisons = tuple(
@@ -278,36 +262,23 @@ def _law(setup: FitSetup, card: MaterialCard) -> HypoelasticLaw:
 
 
 def plan(
-    project: Project,
-    card: MaterialCard | Path | str | None = None,
-    tests: str | Sequence[str] | None = None,
-    *,
-    strain: Sequence[float] | None = None,
-    rank: str = WORST,
-    specimens: int | None = None,
-    noise: Mapping[str, float] | None = None,
+    project: Project, card: MaterialCard | Path | str | None = None,
+    tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,
+    rank: str = WORST, specimens: int | None = None, noise: Mapping[str, float] | None = None,
     progress: Progress | None = None,
-) -> Plan:
+) -> Plan:  # fmt: skip
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
 
     The information of the present tests (misfit or noise, whichever is larger; neighbours that err
     as one counted as one) and that of the candidate, from the derivatives at a law, are added.
-    Nothing is fitted but offsets and the sheet's surface.
-
-    Parameters
-    ----------
-    card : the present optimum, as itself, its file or its name; the one that the project's fit
-        left in its usual folder unless given.
-    tests : the present ones, by name or kind; every test that can be fitted unless given.
-    strain : largest (warp, fill, shear) of the moduli; the card's valid range unless given.
-    rank : "worst" for the least certain modulus, or "E1", "E2", "G12".
-    specimens : of every candidate; the usual number of its kind unless given.
-    noise : of measured values of a kind (mm, N), instead of that of the project's own tests.
-
-    Raises
-    ------
-    InputError : in the project or its data, no card, no candidates. SolverFailure : the present
-        tests cannot be run with the card.
+    Nothing is fitted but offsets and the sheet's surface. card : the present optimum, as itself,
+    its file or its name; the one that the project's fit left in its usual folder unless given.
+    tests : the present ones, by name or kind; every test that can be fitted unless given. strain :
+    largest (warp, fill, shear) of the moduli; the card's valid range unless given. rank : "worst"
+    for the least certain modulus, or "E1", "E2", "G12". specimens : of every candidate; the usual
+    number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
+    of the project's own tests. Raises InputError: in the project or its data, no card, no
+    candidates; SolverFailure: the present tests cannot be run with the card.
     """
     if rank not in (WORST, *COMPONENTS):
         expected = f"{WORST}, {', '.join(COMPONENTS)}"
@@ -354,14 +325,10 @@ def plan(
         project.title,
         project.path,
         "of the fit" if card is None else card_words(card),
-        [test.name for test in chosen],
-        asked.ends,
-        rank,
-        Prospect(NOW, "", 1, "", asked.sigma(before)),
-        [test for test, _ in found],
-        _following(asked, before, found, rank),
-        notes,
-    )
+        [test.name for test in chosen], asked.ends, rank,
+        Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
+        _following(asked, before, found, rank), notes,
+    )  # fmt: skip
 
 
 def _ends(
@@ -400,11 +367,8 @@ def _added(
 
 
 def _following(
-    asked: LawQuery,
-    before: Array,
-    found: Sequence[tuple[Prospect, Array]],
-    rank: str,
-) -> Prospect | None:
+    asked: LawQuery, before: Array, found: Sequence[tuple[Prospect, Array]], rank: str,
+) -> Prospect | None:  # fmt: skip
     """Return the best test after the first, which may be the same again."""
     first = before + found[0][1]
     every = [replace(test, sigma=asked.sigma(first + more)) for test, more in found]

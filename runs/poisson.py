@@ -16,16 +16,8 @@ from ..materials.card import MaterialCard
 from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
-from .presenters import Presented
-from .series import (
-    Part,
-    Series,
-    card_of,
-    card_words,
-    parts_of,
-    studied_tests,
-    thickness_notes,
-)
+from .folder import Presented
+from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import FAILED, Progress
 
 if TYPE_CHECKING:
@@ -64,10 +56,7 @@ def by_response(
     responses: Sequence[Mapping[str, float] | None],
     base: Mapping[str, float],
 ) -> dict[str, Ratios]:
-    """Return the ratios of every response of the run at the base nu12.
-
-    responses : of each nu12, by name; None where the run failed, without those it did not reach.
-    """
+    """Return the ratios of every response of the base run; a run that failed is None."""
     return {
         name: ratios(nu12, [np.nan if r is None else r.get(name, np.nan) for r in responses], value)
         for name, value in base.items()
@@ -76,10 +65,7 @@ def by_response(
 
 @dataclass(frozen=True, eq=False)
 class PartRatios:
-    """One part of a test.
-
-    response : name of the kind of responses. failed : why a run failed, by nu12.
-    """
+    """One part of a test; response : name of their kind; failed : why a run failed, by nu12."""
 
     response: str
     responses: Mapping[str, Ratios]
@@ -107,12 +93,8 @@ class Nu12Study(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "study nu12",
-            "project": str(self.project),
-            "card": self.card,
-            "solver": self.solver,
-            "base_nu12": self.base,
-            "response": self.response,
+            "command": "study nu12", "project": str(self.project), "card": self.card,
+            "solver": self.solver, "base_nu12": self.base, "response": self.response,
             "models": {
                 name: {
                     "responses": {
@@ -129,7 +111,7 @@ class Nu12Study(Presented):
                 for name, part in self.parts.items()
             },
             "notes": rows(self.notes),
-        }
+        }  # fmt: skip
 
     def table(self) -> pd.DataFrame:
         """Return columns model, response, nu12, value, to_base, to_mean."""
@@ -166,23 +148,14 @@ class Nu12Study(Presented):
 
 
 def vary_nu12(
-    project: Project,
-    card: MaterialCard | Path | str,
-    values: Sequence[float] = NU12,
-    tests: str | Sequence[str] | None = None,
-    progress: Progress | None = None,
+    project: Project, card: MaterialCard | Path | str, values: Sequence[float] = NU12,
+    tests: str | Sequence[str] | None = None, progress: Progress | None = None,
     kept: RunCache | None = None,
-) -> Nu12Study:
+) -> Nu12Study:  # fmt: skip
     """Run tests with a card whose Poisson's ratio is changed, the moduli as they are.
 
-    Parameters
-    ----------
-    values : of nu12. card, tests, progress, kept : as for `refine`.
-
-    Raises
-    ------
-    InputError : a value out of range, no such test.
-    SolverFailure : of the card as it is, or of all other values.
+    values : of nu12. card, tests, progress, kept : as for `refine`. Raises InputError: a value out
+    of range, no such test; SolverFailure: of the card as it is, or of all other values.
     """
     for value in values:
         if not 0 <= value < 1:
@@ -192,13 +165,10 @@ def vary_nu12(
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     series.total = len(parts) * (1 + len(several))
     return Nu12Study(
-        project.path,
-        card_words(card),
-        series.solver.name,
-        material.law.nu12,
+        project.path, card_words(card), series.solver.name, material.law.nu12,
         {name: _part(series, part, several) for name, part in parts.items()},
         tuple(thickness_notes(project, material)),
-    )
+    )  # fmt: skip
 
 
 def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:

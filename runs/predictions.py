@@ -34,8 +34,7 @@ from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .executor import Task, executor_of
-from .folder import PROVENANCE, RunRecords
-from .presenters import failure_page, write_report
+from .folder import PROVENANCE, RunRecords, failure_page, write_report
 from .record import Record, data_rows, solver_facts, this_run, versions
 from .starts import log_run
 

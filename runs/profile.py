@@ -27,7 +27,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .presenters import Presented
+from .folder import Presented
 from .setup import FitSetup
 
 if TYPE_CHECKING:
@@ -146,24 +146,17 @@ class Profile:
         """The content of result.json."""
         values, ratios = self.curve
         return {
-            "modulus": self.modulus,
-            "strain": self.strain,
-            "MPa": self.best,
-            "lower_MPa": self.ends[0],
-            "upper_MPa": self.ends[1],
-            "fit_sigma_MPa": self.sigma,
-            "fit_lower_MPa": self.band[0],
-            "fit_upper_MPa": self.band[1],
+            "modulus": self.modulus, "strain": self.strain, "MPa": self.best,
+            "lower_MPa": self.ends[0], "upper_MPa": self.ends[1], "fit_sigma_MPa": self.sigma,
+            "fit_lower_MPa": self.band[0], "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
             "not_closed": {
                 word: side.why
                 for word, side in (("below", self.below), ("above", self.above))
                 if side.why
             },
-            "curve_MPa": values,
-            "curve_minus_2_log_L": ratios,
-            "analyses": self.analyses,
-        }
+            "curve_MPa": values, "curve_minus_2_log_L": ratios, "analyses": self.analyses,
+        }  # fmt: skip
 
 
 def _why(side: Side) -> str:
@@ -212,18 +205,11 @@ class Profiles(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "profile",
-            "title": self.title,
-            "project": str(self.project),
-            "card": self.card,
-            "tests": list(self.tests),
-            "level": LEVEL,
-            "threshold": THRESHOLD,
-            "profiles": [one.numbers for one in self.each],
-            "analyses": self.analyses,
-            "method": METHOD,
-            "notes": rows(self.notes),
-        }
+            "command": "profile", "title": self.title, "project": str(self.project),
+            "card": self.card, "tests": list(self.tests), "level": LEVEL, "threshold": THRESHOLD,
+            "profiles": [one.numbers for one in self.each], "analyses": self.analyses,
+            "method": METHOD, "notes": rows(self.notes),
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """Return the result in words, for the terminal."""
@@ -232,27 +218,16 @@ class Profiles(Presented):
 
 
 def profile(
-    project: Project,
-    moduli: Mapping[str, Sequence[float]] | None = None,
-    card: Card = None,
-    tests: str | Sequence[str] | None = None,
-    *,
-    progress: Progress | None = None,
-) -> Profiles:
+    project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
+    tests: str | Sequence[str] | None = None, *, progress: Progress | None = None,
+) -> Profiles:  # fmt: skip
     """Hold moduli away from their best and refit everything else, until the data contradict.
 
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
-
-    Parameters
-    ----------
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
-        where a modulus has no strains. card : the one that the project's fit left in its usual
-        folder unless given. tests : as for `fit`.
-
-    Raises
-    ------
-    InputError : in the project or its data; no such modulus, or a strain beyond the law's.
-    SolverFailure : the tests cannot be run with the card.
+    where a modulus has no strains. card : the one that the project's fit left in its usual folder
+    unless given. tests : as for `fit`. Raises InputError: in the project or its data; no such
+    modulus, or a strain beyond the law's; SolverFailure: the tests cannot be run with the card.
     """
     asked = _asked(moduli)
     found = find_optimum(project, card, tests)
@@ -277,14 +252,9 @@ def profile(
         + sum(p.analyses for p in each)
     )
     return Profiles(
-        project.title,
-        project.path,
-        found.card,
-        tuple(t.test.name for t in found.setup.tests),
-        each,
-        analyses,
-        (*found.notes, *(note for one in each for note in one.notes)),
-    )
+        project.title, project.path, found.card, tuple(t.test.name for t in found.setup.tests),
+        each, analyses, (*found.notes, *(note for one in each for note in one.notes)),
+    )  # fmt: skip
 
 
 def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
@@ -339,12 +309,7 @@ def _profile(found: Optimum, name: str, strain: float, below: Side, above: Side)
     row = modulus_row(unknowns, name, strain)
     band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]
     return Profile(
-        name,
-        strain,
-        float(row @ found.point.unknowns),
-        float(np.sqrt(row @ found.posterior.covariance @ row)),
-        (float(band[0]), float(band[1])),
-        below,
-        above,
-        (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
-    )
+        name, strain, float(row @ found.point.unknowns),
+        float(np.sqrt(row @ found.posterior.covariance @ row)), (float(band[0]), float(band[1])),
+        below, above, (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
+    )  # fmt: skip

@@ -26,16 +26,8 @@ from ..materials.card import MaterialCard
 from ..meshes.mesh import Mesh
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
-from .presenters import Presented
-from .series import (
-    Part,
-    Series,
-    card_of,
-    card_words,
-    parts_of,
-    studied_tests,
-    thickness_notes,
-)
+from .folder import Presented
+from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
 from .simulation import FAILED, Progress
 
 if TYPE_CHECKING:
@@ -69,19 +61,10 @@ class Convergence:
 def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     """Return the order p with which two successive changes fall.
 
-    Parameters
-    ----------
-    sizes : (3,) coarse to fine, decreasing.
-    changes : (2,) from the coarse to the middle level and from the middle to the fine one: of a
-        value, or a norm of what changes.
-
-    Returns
-    -------
-    p, or None: changes of opposite sign, or a ratio that no order from `LOWEST` to `HIGHEST` has.
-
-    Raises
-    ------
-    ValueError : sizes that do not decrease.
+    sizes : (3,) coarse to fine, decreasing. changes : (2,) from the coarse to the middle level and
+    from the middle to the fine one: of a value, or a norm of what changes. Returns: p, or None:
+    changes of opposite sign, or a ratio that no order from `LOWEST` to `HIGHEST` has. Raises
+    ValueError: sizes that do not decrease.
     """
     h, d = _sizes(sizes, 3), np.asarray(changes, dtype=float)
     if d[1] == 0 or not np.isfinite(d).all() or d[0] / d[1] <= 0:
@@ -98,10 +81,7 @@ def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
 
 
 def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
-    """Return the value at size zero from the two finest levels (2,), coarse and fine.
-
-    Raises ValueError: sizes that do not decrease.
-    """
+    """Return the value at size zero from the two finest levels (2,); raises ValueError."""
     h, f = _sizes(sizes, 2), np.asarray(values, dtype=float)
     return float(f[1] + (f[1] - f[0]) / ((h[0] / h[1]) ** order - 1.0))
 
@@ -109,14 +89,9 @@ def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
 def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 0.0) -> Convergence:
     """Return order and limit of a sequence of refinements.
 
-    Parameters
-    ----------
-    sizes, values : (levels,) coarse to fine; sizes decrease, in any unit.
-    noise : relative change that is not the refinement's: the accuracy of solver and files.
-
-    Raises
-    ------
-    ValueError : sizes that do not decrease, or not one for each value.
+    sizes, values : (levels,) coarse to fine; sizes decrease, in any unit. noise : relative change
+    that is not the refinement's: the accuracy of solver and files. Raises ValueError: sizes that do
+    not decrease, or not one for each value.
     """
     h, f = _sizes(sizes, len(values)), np.asarray(values, dtype=float)
     changes = np.diff(f)
@@ -182,11 +157,9 @@ class Level:
     def row(self) -> dict[str, Any]:
         """The columns of a level in tables and JSON."""
         return {
-            "factor": self.factor,
-            "elements": self.elements,
-            "increments": self.part.increments,
+            "factor": self.factor, "elements": self.elements, "increments": self.part.increments,
             "size": self.size,
-        }
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,14 +200,11 @@ class Refinement(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json: cost and values of each level, orders and limits."""
         return {
-            "command": "study mesh",
-            "project": str(self.project),
-            "card": self.card,
-            "solver": self.solver,
-            "refined": self.what,
+            "command": "study mesh", "project": str(self.project), "card": self.card,
+            "solver": self.solver, "refined": self.what,
             "models": {name: _part(runs, self.noise) for name, runs in self.runs.items()},
             "notes": rows(self.notes),
-        }
+        }  # fmt: skip
 
     def table(self) -> pd.DataFrame:
         """Return a row a part, level and quantity, with its deviation from the finest level."""
@@ -247,12 +217,9 @@ class Refinement(Presented):
             changes = rms_changes(runs)
             for run in runs:
                 start = {
-                    "model": name,
-                    "refined": self.what,
-                    **run.level.row,
-                    "seconds": run.seconds,
+                    "model": name, "refined": self.what, **run.level.row, "seconds": run.seconds,
                     "iterations": run.iterations,
-                }
+                }  # fmt: skip
                 for quantity, value in (run.values or {}).items():
                     off = value - finest.get(quantity, np.nan)
                     percent = 100 * off / finest.get(quantity, np.nan)
@@ -343,14 +310,11 @@ def _quantity(name: str, finest: float, good: Sequence[LevelRun], noise: float) 
     best = finest if observed.limit is None else observed.limit
     own = next((value for level, value in known.items() if level.factor == 1), None)
     return {
-        "finest": finest,
-        "order": observed.order,
-        "order_one_coarser": observed.previous,
-        "limit": observed.limit,
-        "remark": observed.remark,
+        "finest": finest, "order": observed.order, "order_one_coarser": observed.previous,
+        "limit": observed.limit, "remark": observed.remark,
         "own_error": None if own is None else own / best - 1.0,
         "own_error_against": "finest" if observed.limit is None else "limit",
-    }
+    }  # fmt: skip
 
 
 def ended(runs: Sequence[LevelRun]) -> list[LevelRun]:
@@ -392,30 +356,19 @@ def edge_length(mesh: Mesh) -> float:
 
 
 def refine(
-    project: Project,
-    card: MaterialCard | Path | str,
-    tests: str | Sequence[str] | None = None,
-    what: Refined = "elements",
-    levels: int = 4,
-    factor: int = 2,
-    coarser: int | None = None,
-    progress: Progress | None = None,
-    kept: RunCache | None = None,
-) -> Refinement:
+    project: Project, card: MaterialCard | Path | str, tests: str | Sequence[str] | None = None,
+    what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None,
+    progress: Progress | None = None, kept: RunCache | None = None,
+) -> Refinement:  # fmt: skip
     """Run tests with a card on finer and finer meshes, or with more and more increments.
 
-    Parameters
-    ----------
     card : itself, its file, or its name in the project. tests : names or kinds, all unless given.
     levels : number of refinements of `what`. factor : edges, or increments, are divided by it from
     one level to the next. coarser : levels coarser than the project's own; 1 of elements and 0 of
     increments unless given. progress : called with every `Step`. kept : cache of the analyses that
-    ended, from which an interrupted study resumes.
-
-    Raises
-    ------
-    InputError : a level that cannot be meshed, or equals another.
-    SolverFailure : nothing can be compared, because fewer than two levels ended well anywhere.
+    ended, from which an interrupted study resumes. Raises InputError: a level that cannot be
+    meshed, or equals another; SolverFailure: nothing can be compared, because fewer than two levels
+    ended well anywhere.
     """
     below = (1 if what == "elements" else 0) if coarser is None else coarser
     if below >= levels:

@@ -34,8 +34,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE, write_table
-from .presenters import write_report
+from .folder import PROVENANCE, write_report, write_table
 from .record import Record, versions
 from .setup import CoarseToFine, FitSetup
 from .starts import coarse_columns

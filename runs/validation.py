@@ -40,7 +40,7 @@ from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
 from .fit import FitEvent, stored_fit
-from .presenters import Presented
+from .folder import Presented
 from .result import Fit
 from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -77,10 +77,7 @@ class HeldOut:
 
 
 def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver) -> HeldOut:
-    """Run a law on a test, and fit the test's nuisance unknowns to it.
-
-    law : with the strain range for which it is known.
-    """
+    """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns."""
     name = prepared.test.name
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True))
     problem, y = problem_at(law, comparisons)
@@ -97,17 +94,10 @@ def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolve
 
 
 def held_out_part(
-    prepared: PreparedTest,
-    law: HypoelasticLaw,
-    make_solver: MakeSolver,
-    part: Masks,
-    nuisance: NuisanceValues,
-    name: str,
-) -> HeldOut:
-    """Run a law on a test and judge it at a part alone, with the nuisance values of the rest.
-
-    part : points of the part, of every comparison. name : of the test with its part.
-    """
+    prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver, part: Masks,
+    nuisance: NuisanceValues, name: str,
+) -> HeldOut:  # fmt: skip
+    """Run a law on a test and judge it at a part alone, with nuisance values of the rest."""
     comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
@@ -130,12 +120,9 @@ def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
 
 
 def _fitted(
-    prepared: PreparedTest,
-    problem: FitProblem,
-    point: Evaluation,
-    law: HypoelasticLaw,
+    prepared: PreparedTest, problem: FitProblem, point: Evaluation, law: HypoelasticLaw,
     make_solver: MakeSolver,
-) -> FittedTest:
+) -> FittedTest:  # fmt: skip
     """Return the test as after a fit, in its own objective."""
     reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
     own = prepared.comparisons(make_solver, Weighting())
@@ -220,18 +207,15 @@ class Validation(Presented):
         table = self.table()
         means = {law: None if np.isnan(mean) else mean for law, mean in self.means.items()}
         return {
-            "command": "validate",
-            "title": self.title,
-            "version": __version__,
-            "left_out": self.leave,
-            "error": "mean relative RMS error of a test, or of its part",
+            "command": "validate", "title": self.title, "version": __version__,
+            "left_out": self.leave, "error": "mean relative RMS error of a test, or of its part",
             "mean_foretold": means,
             "rows": [
                 {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()}
                 for row in table.to_dict("records")
             ],
             "notes": rows(self.notes),
-        }
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """Return a table for the terminal, and the conclusions."""
@@ -290,17 +274,8 @@ class Part:
         return {name: ~mask for name, mask in self.masks.items()}
 
 
-def sorts_of(tests: Sequence[PreparedTest]) -> list[str]:
-    """Return the sorts of parts that tests have."""
-    found = [sort for test in tests if isinstance(test, Divisible) for sort in test.parts]
-    return list(dict.fromkeys(found))
-
-
 def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
-    """Return every part of a sort, test by test; option : named by errors.
-
-    Raises InputError: no test has two or more of them.
-    """
+    """Return every part of a sort, test by test; raises InputError, naming the option: none."""
     parts = [
         Part(number, name, masks)
         for number, test in enumerate(setup.tests)
@@ -308,7 +283,8 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
         for name, masks in test.parts.get(sort, {}).items()
     ]
     if not parts:
-        there = ", ".join(sorts_of(setup.tests)) or "none"
+        sorts = [own for test in setup.tests if isinstance(test, Divisible) for own in test.parts]
+        there = ", ".join(dict.fromkeys(sorts)) or "none"
         problem = (
             f"no test has two or more {sort} of which a fit could do without one; what can be "
             f"left out of the tests chosen: {there}, or whole tests"
@@ -358,13 +334,9 @@ def _task(
 
 
 def errors_left_out(
-    setup: FitSetup,
-    parts: Sequence[Part],
-    starts: int,
-    folder: Path | None,
-    file: str,
+    setup: FitSetup, parts: Sequence[Part], starts: int, folder: Path | None, file: str,
     tell: Callable[[str | None], None],
-) -> list[HeldOut]:
+) -> list[HeldOut]:  # fmt: skip
     """Return the errors at each part of the fit without it, read where the folder has them.
 
     folder, file : where each part is written as it ends; None for nowhere. tell : called with the
@@ -373,7 +345,10 @@ def errors_left_out(
     names = [name_of(setup, part) for part in parts]
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
     mark = mark_of(of)
-    ended = {} if folder is None else _written(folder / file, mark)
+    written = None if folder is None else read_marked(
+        folder / file, mark, lambda content: [_judged(row) for row in content["parts"]]
+    )  # fmt: skip
+    ended = {one.test: one for one in written or ()}
     known = {k: ended[name] for k, name in enumerate(names) if name in ended}
     missing = [k for k in range(len(parts)) if k not in known]
     prepare = functools.partial(_task, setup, parts, starts)
@@ -388,12 +363,6 @@ def errors_left_out(
                 write_marked(folder, file, mark, {"parts": rows})
         tell(None if event is None else f"without {names[event[0]]}")
     return [known[k] for k in range(len(parts))]
-
-
-def _written(path: Path, mark: str) -> dict[str, HeldOut]:
-    """Read errors by name of the part; none where the mark is another."""
-    judged = read_marked(path, mark, lambda content: [_judged(row) for row in content["parts"]])
-    return {one.test: one for one in judged or ()}
 
 
 def _plain(one: HeldOut) -> dict[str, Any]:
@@ -411,32 +380,20 @@ def validate(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *,
-    leave: str = TESTS,
-    starts: int = STARTS,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
+    *, leave: str = TESTS, starts: int = STARTS, out: Path | str | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Progress | None = None,
     command_line: Sequence[str] | None = None,
-) -> Validation:
+) -> Validation:  # fmt: skip
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
 
     Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
-    a part of a test (a frame) they are those of the fit to the rest of the test.
-
-    Parameters
-    ----------
-    tests : by name or kind; every test that can be fitted unless given.
-    forms : of the moduli, as for `compare_laws`; the project's own unless given.
-    leave : "tests", or a sort of parts that the tests have: "frames" of a bubble, "specimens" or
-        "directions" of strips.
-    out : folder with a folder for each fit, written as the fits end.
-
-    Raises
-    ------
-    InputError : in the project or its data, fewer than two tests or parts, nothing to resume.
-    OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    a part of a test (a frame) they are those of the fit to the rest of the test. tests : by name or
+    kind; every test that can be fitted unless given. forms : of the moduli, as for `compare_laws`;
+    the project's own unless given. leave : "tests", or a sort of parts that the tests have:
+    "frames" of a bubble, "specimens" or "directions" of strips. out : folder with a folder for each
+    fit, written as the fits end. Raises InputError: in the project or its data, fewer than two
+    tests or parts, nothing to resume; OutputError, NoFeasibleStart, SolverFailure: as
+    `bubblefit.fit`.
     """
     tell = progress or (lambda event: None)
     project = project.with_fit(starts=starts)
@@ -490,10 +447,7 @@ def judge_cards(
     cards: Mapping[str, MaterialCard],
     tests: str | Sequence[str] | None = None,
 ) -> Validation:
-    """Judge cards at the tests of a project, without any fit of the law.
-
-    Raises InputError: in the project or its data, a card of another thickness than the fabric's.
-    """
+    """Judge cards at tests without any fit of the law; raises InputError: another thickness."""
     for name, card in cards.items():
         if (words := thickness_difference(card, project.fabric.thickness)) is not None:
             raise InputError(project.path, "fabric.thickness", f"{name}: {words}")

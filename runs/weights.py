@@ -17,7 +17,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .compare import errors
 from .fit import FitEvent, stored_fit
-from .presenters import Presented
+from .folder import Presented
 from .result import Fit
 from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints
@@ -124,12 +124,8 @@ class WeightStudy(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "validate",
-            "title": self.title,
-            "version": __version__,
-            "weights_of": self.counted,
-            "tests_counted": list(self.names),
-            "error": ERROR,
+            "command": "validate", "title": self.title, "version": __version__,
+            "weights_of": self.counted, "tests_counted": list(self.names), "error": ERROR,
             "strain": {n: [self.strain(n, p) for p in PLACES] for n in COMPONENTS},
             "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
             "change": {name: list(self.change(name)) for name in COMPONENTS},
@@ -144,7 +140,7 @@ class WeightStudy(Presented):
                 for run in self.ended
             ],
             "notes": rows(self.notes),
-        }
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """Return a table for the terminal, and how far the weight moves each modulus."""
@@ -169,31 +165,18 @@ class WeightStudy(Presented):
 
 
 def weight_study(
-    project: Project,
-    counted: str,
-    tests: str | Sequence[str] | None = None,
-    *,
-    starts: int = STARTS,
-    counts: Sequence[float] = COUNTS,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress | None = None,
+    project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
+    starts: int = STARTS, counts: Sequence[float] = COUNTS, out: Path | str | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Progress | None = None,
     command_line: Sequence[str] | None = None,
-) -> WeightStudy:
+) -> WeightStudy:  # fmt: skip
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
 
-    Parameters
-    ----------
     counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
     starts : of the fit at the project's weights; the others begin at the optimum beside them.
     counts : factors of the weight in the project. out : folder in which every fit is written as it
-    ends.
-
-    Raises
-    ------
-    InputError : in the project or its data; no test of that kind or name, or no other one.
-    OutputError, NoFeasibleStart, SolverFailure : as `bubblefit.fit`.
+    ends. Raises InputError: in the project or its data; no test of that kind or name, or no other
+    one; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
     """
     tell = progress or (lambda event: None)
     project = project.with_fit(starts=starts)
@@ -223,12 +206,9 @@ def weight_study(
 
 
 def _runs(
-    found: Fit,
-    names: Sequence[str],
-    counts: Sequence[float],
-    record: StudyRecord[WeightedFit],
+    found: Fit, names: Sequence[str], counts: Sequence[float], record: StudyRecord[WeightedFit],
     tell: Progress,
-) -> Iterator[WeightedFit]:
+) -> Iterator[WeightedFit]:  # fmt: skip
     """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
     yield _weighted(found.setup, found, 1.0, found.problem, own.residual, own.unknowns, 0)

@@ -1,16 +1,11 @@
 """A headless browser without a network, spoken to through its own protocol."""
 
-from __future__ import annotations
-
 import base64
 import json
 import os
 import subprocess
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
 
 from bubblefit.reports.html import BROWSERS, browser_command
 
@@ -23,11 +18,9 @@ PATIENCE = 60.0
 class Browser:
     """One page of a browser: what it loads, what it complains of, and how it looks."""
 
-    def __init__(self, into: int, out: int) -> None:
+    def __init__(self, into, out):
         self._into, self._out, self._number, self._rest = into, out, 0, b""
-        self._session: str | None = None
-        self.complaints: list[str] = []
-        self.requests: list[str] = []
+        self._session, self.complaints, self.requests = None, [], []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]
@@ -36,10 +29,10 @@ class Browser:
         self.call("Network.emulateNetworkConditions", offline=True, latency=0,
                   downloadThroughput=0, uploadThroughput=0)  # fmt: skip
 
-    def call(self, method: str, **parameters: Any) -> Any:
+    def call(self, method, **parameters):
         """The answer to a command."""
         self._number += 1
-        message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
+        message = {"id": self._number, "method": method, "params": parameters}
         if self._session is not None:
             message["sessionId"] = self._session
         os.write(self._into, json.dumps(message).encode() + b"\0")
@@ -50,7 +43,7 @@ class Browser:
             self._note(said)
         raise AssertionError("the browser has gone")
 
-    def open(self, page: Path) -> None:
+    def open(self, page):
         """Open a file and wait until its script says that it is ready."""
         self.call("Page.navigate", url=page.resolve().as_uri())
         end = time.monotonic() + PATIENCE
@@ -58,13 +51,25 @@ class Browser:
             assert time.monotonic() < end, self.complaints or "the page is never ready"
             time.sleep(0.05)
 
-    def run(self, script: str) -> Any:
+    def run(self, script, **options):
         """The value of an expression in the page."""
-        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        call = {"expression": script, "returnByValue": True, **options}
+        answer = self.call("Runtime.evaluate", **call)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
-    def press(self, selector: str, key: str) -> None:
+    def wait(self, script):
+        """The value of a promise in the page."""
+        return self.run(script, awaitPromise=True)
+
+    def box(self, selector):
+        """Place and size of the first element of a selector."""
+        return self.run(
+            "(({x, y, width, height}) => [x, y, width, height])"
+            f"(document.querySelector({selector!r}).getBoundingClientRect())"
+        )
+
+    def press(self, selector, key):
         """Give the first element of a selector the focus, and press a key there."""
         assert self.run(f"document.querySelector({selector!r}).focus(), 1") == 1
         assert self.run(f"document.activeElement.matches({selector!r})"), f"{selector}: no focus"
@@ -74,22 +79,17 @@ class Browser:
         self.call("Input.dispatchKeyEvent", type="keyDown", **named)
         self.call("Input.dispatchKeyEvent", type="keyUp", **named)
         # Two frames: what waits for the next one is drawn then.
-        self.call(
-            "Runtime.evaluate", awaitPromise=True,
-            expression="new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))",
-        )  # fmt: skip
+        self.wait("new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))")
 
-    def look(self, selector: str) -> bytes:
+    def look(self, selector):
         """A picture of the first element of a selector."""
-        box = self.run(
-            f"(({{x, y, width, height}}) => [x + scrollX, y + scrollY, width, height])"
-            f"(document.querySelector({selector!r}).getBoundingClientRect())"
-        )
-        clip = dict(zip(("x", "y", "width", "height"), box, strict=True), scale=1)
+        x, y, width, height = self.box(selector)
+        x, y = x + self.run("scrollX"), y + self.run("scrollY")
+        clip = {"x": x, "y": y, "width": width, "height": height, "scale": 1}
         shot = self.call("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)
         return base64.b64decode(shot["data"])
 
-    def _messages(self) -> Iterator[dict[str, Any]]:
+    def _messages(self):
         while True:
             while b"\0" in self._rest:
                 one, self._rest = self._rest.split(b"\0", 1)
@@ -99,7 +99,7 @@ class Browser:
                 return
             self._rest += more
 
-    def _note(self, said: dict[str, Any]) -> None:
+    def _note(self, said):
         method, parameters = said.get("method"), said.get("params", {})
         if method == "Runtime.exceptionThrown":
             self.complaints.append(parameters["exceptionDetails"]["text"])
@@ -112,12 +112,12 @@ class Browser:
 
 
 @contextmanager
-def browser(home: Path) -> Iterator[Browser]:
+def browser(home):
     """A browser for a `with` block; left out, with the reason, where there is none."""
     program = needs.program(*BROWSERS, package="chromium")
     (theirs_in, ours_in), (ours_out, theirs_out) = os.pipe(), os.pipe()
 
-    def as_three_and_four() -> None:
+    def as_three_and_four():
         read, write = os.dup(theirs_in), os.dup(theirs_out)
         os.dup2(read, 3)
         os.dup2(write, 4)

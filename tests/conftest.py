@@ -19,7 +19,7 @@ from hypothesis import settings
 
 from . import needs
 from .bars import BarKind, BarSolver
-from .figure_checks import check_charts
+from .drawings import check_charts
 from .golden_files import Golden
 
 # Stand-ins of solvers lie anywhere; tests of who may name a program take this away.

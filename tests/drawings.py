@@ -1,66 +1,61 @@
-"""What charts show, for the tests: numbers of their series, words of legends and axes."""
+"""Charts of tests: numbers of their series, words of legends and axes, and what holds for all."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from math import isfinite
 
 import numpy as np
-import pandas as pd
-import pytest
-from bubblefit.reports.charts import Chart, Charts, Series
+from bubblefit.reports.charts import Charts, axis_ends
+from bubblefit.reports.content import read_page_data
+from bubblefit.reports.vega import picture
+
+#: Axes that are plain numbers, ratios or names.
+WITHOUT_UNIT = ("nu12", "strain", "share", "objective", "order", "start", "form", "-2 log L",
+                "test", "weight", "load / ", "left out", "elements", "seconds", "largest", "/ that",
+                "stress error", "error", "e")  # fmt: skip
 
 
-def data(chart: Chart) -> list[np.ndarray]:
+def charts_of(folder):
+    """Charts of the page, from the data beside it, by name."""
+    return {p.name: p.charts for p in read_page_data(folder).parts if isinstance(p, Charts)}
+
+
+def data(chart):
     """(2, k) of every series of lines or dots, in order; what is not there is NaN."""
     return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.look in ("line", "dots")]
 
 
-def named(chart: Chart) -> dict[str, Series]:
+def named(chart):
     """The series by name; of several with one name the first."""
     return {s.name: s for s in reversed(chart.series)}
 
 
-def lines(chart: Chart, name: str) -> list[np.ndarray]:
+def lines(chart, name):
     """(2, k) of every line or cloud of the name."""
     return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.name == name and s.y]
 
 
-def legend(charts: Charts) -> list[str]:
+def legend(charts):
     """Names of all series, each once."""
-    names = [s.name for chart in charts.charts for s in chart.series if s.name]
-    return list(dict.fromkeys(names))
+    return list(dict.fromkeys(s.name for chart in charts.charts for s in chart.series if s.name))
 
 
-def shown(chart: Chart) -> tuple[str, str, str]:
+def shown(chart):
     """Words of the axes, x and y, and the title."""
     return chart.x_label, chart.y_label, chart.title
 
 
-def caught(patch: pytest.MonkeyPatch, module: Any, *names: str) -> list[tuple[Any, ...]]:
+def caught(patch, module, *names):
     """Calls of a module's declarations of charts that it saves: the file, then the arguments.
 
     Nothing is drawn.
     """
-    calls: list[tuple[Any, ...]] = []
-
-    def declared(*args: Any, **_: Any) -> tuple[Any, ...]:
-        return args
-
-    def saved(path: Path, args: tuple[Any, ...]) -> None:
-        calls.append((path, *args))
-
+    calls = []
     for name in names:
-        patch.setattr(module, name, declared)
-    save: Callable[..., None] = saved
-    patch.setattr(module, "save", save)
+        patch.setattr(module, name, lambda *args, **_: args)
+    patch.setattr(module, "save", lambda path, args: calls.append((path, *args)))
     return calls
 
 
-def check_convergence(
-    charts: Charts, table: pd.DataFrame, what: str, rms: dict[str, Any] | None = None
-) -> None:
+def check_convergence(charts, table, what, rms=None):
     """The charts of one model show what convergence.csv has: changes over size, and the cost.
 
     rms : "rms_N" of the result, where the model has a load curve.
@@ -76,7 +71,6 @@ def check_convergence(
     for name, curve in zip(names, data(changes), strict=False):
         rows = table[table.quantity == name]
         if name == "RMS along the load curve":
-            assert rms is not None
             change = 100 * np.array(rms["to_next_finer"]) / rms["largest_load"]
         else:
             change = 100 * np.abs(np.diff(rows.value) / rows.value.iloc[-1])
@@ -88,3 +82,39 @@ def check_convergence(
     levels = table.drop_duplicates("factor")
     work = levels.elements * levels.increments
     np.testing.assert_allclose(data(cost)[0], [work, levels.seconds], rtol=1e-5)
+
+
+def check_charts(charts):
+    """What holds for every chart: words and units, numbers that belong together, all in sight."""
+    assert charts.charts and picture(charts)["marks"]
+    for number, chart in enumerate(charts.charts):
+        where = f"{charts.name}, chart {number} ({chart.title})"
+        if not (chart.title or chart.series):
+            continue  # a free place
+        for label in (chart.x_label, chart.y_label):
+            assert label and label == label.strip(), f"{where}: {label!r}"
+            assert ", " in label or any(word in label for word in WITHOUT_UNIT) or len(label) <= 3
+        for series in chart.series:
+            _check_series(series, f"{where}: {series.name!r}")
+        x, y = axis_ends(chart)
+        for (low, high), log in ((x, chart.log_x), (y, chart.log_y)):
+            assert isfinite(low) and isfinite(high) and low < high and (low > 0 or not log), where
+        if chart.x_range or chart.y_range or chart.x_names:
+            continue
+        # Axes hold every curve, unless they say that they show a part.
+        for a, b in ((a, b) for s in chart.series for a, b in zip(s.x, s.y, strict=False)):
+            if a is None or b is None:
+                continue
+            assert x[0] <= a <= x[1] or (chart.log_x and a <= 0), f"{where}: x = {a} is not seen"
+            assert y[0] <= b <= y[1] or (chart.log_y and b <= 0), f"{where}: y = {b} is not seen"
+
+
+def _check_series(s, where):
+    if s.look == "faces":
+        assert len(s.x) == len(s.y) and len(s.x) % len(s.values) == 0, where
+        return
+    for own in (s.y, s.lower, s.upper, s.values):
+        assert len(own) in (0, len(s.x)), where
+    assert len(s.lower) == len(s.upper) and (s.y or s.upper or not s.x), where
+    known = [(a, b) for a, b in zip(s.lower, s.upper, strict=True) if None not in (a, b)]
+    assert all(a <= b for a, b in known), f"{where}: a band upside down"

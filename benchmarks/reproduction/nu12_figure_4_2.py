@@ -20,7 +20,7 @@ import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.poisson import Ratios, vary_nu12
-from bubblefit.runs.verification.published import FIGURE
+from bubblefit.runs.verification import FIGURE
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
 #: "Plus or minus three percent".

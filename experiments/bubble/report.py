@@ -38,9 +38,8 @@ from ...reports.bubbles import (
 )
 from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
-from ...reports.maps import Maps, Shade, Solid, maps_of, pack
+from ...reports.maps import Maps, Shade, Solid, maps_of, pack, write_pvd, write_vtu
 from ...reports.vega import save
-from ...reports.vtu import write_pvd, write_vtu
 from ...solvers.base import History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from .findings import (

@@ -28,8 +28,8 @@ from ...reports.cylinders import (
     bending_charts,
     gas_charts,
 )
+from ...reports.maps import write_vtu
 from ...reports.vega import save
-from ...reports.vtu import write_vtu
 from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
 from .predicted import (
     BendingRun,

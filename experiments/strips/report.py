@@ -18,6 +18,7 @@ from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
 from ...reports.content import Exhibit, Table
+from ...reports.maps import write_vtu
 from ...reports.moduli import moduli_together
 from ...reports.strips import (
     OrderErrors,
@@ -28,7 +29,6 @@ from ...reports.strips import (
     strip_charts,
 )
 from ...reports.vega import save
-from ...reports.vtu import write_vtu
 from ...solvers.base import History
 from ..kinds import (
     READING,

@@ -14,6 +14,8 @@ turned against each other: no stress at angles below t from the compressed side,
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +33,45 @@ from ...solvers.base import History
 from ...solvers.membrane.bubble import Wall
 from ...solvers.membrane.closed import closed_membrane
 from ...solvers.membrane.solver import MembraneSolver
-from .number import Number
+
+
+@dataclass(frozen=True)
+class Number:
+    """A published or closed-form number, and the one that this program computes for it.
+
+    what : the quantity and the case. ours, theirs : in `unit` ("" for a pure number). allowed :
+    largest deviation, relative or in `unit` where `absolute`, by the error of model, mesh or the
+    reading of a figure. source : publication or closed form.
+    """
+
+    what: str
+    ours: float
+    theirs: float
+    unit: str
+    allowed: float
+    source: str
+    absolute: bool = False
+
+    @property
+    def deviation(self) -> float:
+        """Ours less theirs, relative to theirs, or in `unit` where `absolute`."""
+        off = self.ours - self.theirs
+        return off if self.absolute else off / abs(self.theirs)
+
+    @property
+    def met(self) -> bool:
+        """True where the deviation is allowed; NaN is not."""
+        return abs(self.deviation) <= self.allowed
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The number in tables and JSON."""
+        return {
+            "what": self.what, "ours": self.ours, "theirs": self.theirs, "unit": self.unit,
+            "deviation": self.deviation, "allowed": self.allowed, "absolute": self.absolute,
+            "met": self.met, "source": self.source,
+        }  # fmt: skip
+
 
 TERMS = 60
 RADIUS, THICKNESS, MODULUS = 100.0, 0.81, 300.0
@@ -166,16 +206,10 @@ def middle_of_tube(pressures: Sequence[float] | NDArray[np.float64]) -> tuple[fl
 
 
 def tube_model(
-    across: int,
-    along: int,
-    length: float,
-    pressures: Sequence[float] | NDArray[np.float64],
+    across: int, along: int, length: float, pressures: Sequence[float] | NDArray[np.float64],
     caps: bool = True,
-) -> InflatedModel:
-    """Return a quarter of a tube: x >= 0, z >= 0, its lowest node in the middle held up.
-
-    across, along : facets. caps : a flat one at the end, which otherwise keeps its place along z.
-    """
+) -> InflatedModel:  # fmt: skip
+    """Return a quarter of a tube, x, z >= 0, of facets across and along, hung up at its foot."""
     mesh = half_tube(across, along, RADIUS_THIN_WALLS, length, caps)
     hang = mesh.node_sets["foot"][[np.argmin(mesh.points[mesh.node_sets["foot"], 2])]]
     mesh = Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "hang": hang})
@@ -191,10 +225,7 @@ def tube_model(
 def in_the_middle(
     model: InflatedModel, history: History, stress: NDArray[np.float64]
 ) -> tuple[float, float, float]:
-    """Return radius (mm), axial and hoop stress (MPa) of a tube at z = 0 and the last pressure.
-
-    stress : (quads, points, 3) MPa, at the last pressure.
-    """
+    """Return radius (mm), axial and hoop stress (MPa) at z = 0; stress : (quads, points, 3)."""
     near = model.mesh.points[model.mesh.quads][..., 2].min(axis=1) < 1e-6
     ring = np.flatnonzero(model.mesh.points[:, 2] < 1e-6)
     height = (model.mesh.points + history.displacement[-1])[ring, 1]
@@ -254,14 +285,9 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
 class PlaneEnds:
     """A quarter of a tube whose end at `LENGTH` stays plane, at a given turn and stretch.
 
-    Parameters
-    ----------
     across : facets around the half circle. share : of its stiffness that the wall keeps across
-        wrinkles; None carries compression.
-
-    Raises
-    ------
-    SolverFailure : here and in `moment`, no equilibrium was found.
+    wrinkles; None carries compression. Raises SolverFailure: here and in `moment`, no equilibrium
+    was found.
     """
 
     def __init__(self, across: int, share: float | None) -> None:

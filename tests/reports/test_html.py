@@ -1,16 +1,18 @@
-"""The page as text: everything shown, escaped, inside one file, and made again from its data."""
-
-from __future__ import annotations
+"""The page as text: everything shown, escaped, in one file, made again from its data; VTU files."""
 
 import base64
+import hashlib
 import json
+import os
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, OutputError
+from bubblefit.files import replacing
+from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports.charts import Chart, Charts, dots, line
 from bubblefit.reports.content import (
     Download,
@@ -23,9 +25,9 @@ from bubblefit.reports.content import (
     Words,
     read_page_data,
     round_trip,
-)
-from bubblefit.reports.html import write_page, write_report
-from bubblefit.reports.maps import Shade, Solid, maps_of, pack
+)  # fmt: skip
+from bubblefit.reports.html import number, percent, write_page, write_report
+from bubblefit.reports.maps import Shade, Solid, maps_of, pack, write_vtu
 from PIL import Image
 
 #: A square of four quads, raised more and more.
@@ -35,35 +37,25 @@ HEIGHTS = [k * (2.0 - (PLACES**2).sum(axis=1)) for k in (1.0, 2.0)]
 LOADS = ["22 kPa", "59 kPa"]
 
 
-def curves() -> Charts:
+def full_report():
     x = np.linspace(0.0, 0.1, 5)
     best = line("best <1>", x, 300 - 1000 * x, band=(250 - 1000 * x, 350 - 1000 * x), ends=True)
-    chart = Chart(
-        "E1", "strain", "MPa", [best, dots("measured", x, 290 - 900 * x, colour=1)], "it falls"
-    )
-    return Charts("moduli", [chart], "Tangent moduli")
-
-
-def maps() -> object:
+    measured = dots("measured", x, 290 - 900 * x, colour=1)
+    chart = Chart("E1", "strain", "MPa", [best, measured], "it falls")
     rows = [("dz", "mm", [h + 0.1 for h in HEIGHTS], HEIGHTS, [-0.1 * h for h in HEIGHTS])]
-    return maps_of("bubble", "pressure", LOADS, [PLACES] * 2, rows, ("x", "y"), "Maps", "a dome")
-
-
-def solid() -> Solid:
+    maps = maps_of("bubble", "pressure", LOADS, [PLACES] * 2, rows, ("x", "y"), "Maps", "a dome")
     points = np.array([np.column_stack([PLACES, h]) for h in HEIGHTS])
     shade = Shade("height", "mm", pack([h[QUADS].mean(axis=1) for h in HEIGHTS]))
-    return Solid("dome", LOADS, "pressure", pack(points), pack(QUADS), [shade], "Dome", "a dome")
-
-
-def full_report() -> Report:
+    solid = Solid("dome", LOADS, "pressure", pack(points), pack(QUADS), [shade], "Dome", "a dome")
     return Report(
-        title="Test <1> & more",
-        summary="Good.",
-        facts=[("objective e", 3.1234567e-12), ("method", "lm")],
-        warnings=["beta_0 <is> on its bound"],
-        sections=[
-            Section("Curves", [curves(), Picture("figures/sorted optima.png", "Optima")]),
-            Section("Fields", [maps(), solid()]),
+        "Test <1> & more", "Good.", [("objective e", 3.1234567e-12), ("method", "lm")],
+        ["beta_0 <is> on its bound"],
+        [
+            Section("Curves", [
+                Charts("moduli", [chart], "Tangent moduli"),
+                Picture("figures/sorted optima.png", "Optima"),
+            ]),
+            Section("Fields", [maps, solid]),
             Section("Nothing", []),
             Section("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
             Section("More", [
@@ -72,19 +64,16 @@ def full_report() -> Report:
                 Download("card.toml", "a = 'é'\n", "Save it"),
             ]),
         ],
-        files=[("result.json", "everything")],
-        versions={"bubblefit": "0.1.0"},
+        [("result.json", "everything")], {"bubblefit": "0.1.0"},
     )  # fmt: skip
 
 
 class Tags(HTMLParser):
     """Checks that tags close in order, and collects links and labels."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
-        self.open: list[str] = []
-        self.links: list[str] = []
-        self.pictures: list[dict[str, str]] = []
+        self.open, self.links, self.pictures = [], [], []
 
     def handle_starttag(self, tag, attrs):
         own = dict(attrs)
@@ -99,7 +88,7 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def drawn(folder: Path) -> Path:
+def drawn(folder):
     """A picture where the report has it."""
     path = folder / "figures" / "sorted optima.png"
     path.parent.mkdir()
@@ -107,42 +96,44 @@ def drawn(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("report", [full_report(), Report(title="Bare")], ids=["full", "bare"])
-def test_page_is_well_formed_and_loads_nothing(tmp_path: Path, report: Report):
-    drawn(tmp_path)
-    tags = Tags()
-    text = write_report(tmp_path, report).read_text(encoding="utf-8")
-    tags.feed(text)
-    assert tags.open == []
-    assert all(link.startswith("data:") for link in tags.links)
-    outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert "@import" not in outside and not re.search(r"url\((?!#)", outside)
-    assert len(text) < 5_000_000
-    # Whoever does not see a figure reads what it shows.
-    assert all(own.get("alt") or own.get("aria-label") for own in tags.pictures)
-    assert len(tags.pictures) == (1 + 1 + 3 + 1 if report.sections else 0)
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    """The folder of a full report."""
+    folder = tmp_path_factory.mktemp("full")
+    drawn(folder)
+    return write_report(folder, full_report()).parent
 
 
-def test_page_runs_nothing_but_its_own_script(tmp_path: Path):
+def test_page_is_well_formed_and_loads_nothing(full, tmp_path):
+    for page, pictures in ((full, 6), (write_report(tmp_path, Report(title="Bare")).parent, 0)):
+        tags = Tags()
+        text = (page / "report.html").read_text(encoding="utf-8")
+        tags.feed(text)
+        assert tags.open == []
+        assert all(link.startswith("data:") for link in tags.links)
+        outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+        assert "@import" not in outside and not re.search(r"url\((?!#)", outside)
+        assert len(text) < 5_000_000
+        # Whoever does not see a figure reads what it shows.
+        assert all(own.get("alt") or own.get("aria-label") for own in tags.pictures)
+        assert len(tags.pictures) == pictures
+
+
+def test_page_runs_nothing_but_its_own_script(full):
     """A hash of the very bytes between the tags; everything else is forbidden."""
-    import hashlib
-
-    text = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
+    text = (full / "report.html").read_text(encoding="utf-8")
     rules = re.search(r'Security-Policy" content="(.*?)"', text)
-    assert rules is not None
     allowed = dict(rule.split(" ", 1) for rule in rules[1].replace("&#39;", "'").split("; "))
     assert allowed["default-src"] == "'none'" and allowed["img-src"] == "data:"
-    for tag, rule in (("script", "script-src"), ("style", "style-src")):
+    for tag, rule, count in (("script", "script-src", 2), ("style", "style-src", 1)):
         every = re.findall(rf"<{tag}>(.*?)</{tag}>", text, re.DOTALL)
         hashes = [hashlib.sha256(own.encode()).digest() for own in every]
         digests = {f"'sha256-{base64.b64encode(own).decode()}'" for own in hashes}
-        assert set(allowed[rule].split()) == digests
-        assert len(every) == (2 if tag == "script" else 1)
+        assert set(allowed[rule].split()) == digests and len(every) == count
 
 
-def test_page_shows_everything_and_escapes(tmp_path: Path):
-    drawn(tmp_path)
-    page = write_report(tmp_path, full_report()).read_text(encoding="utf-8")
+def test_page_shows_everything_and_escapes(full):
+    page = (full / "report.html").read_text(encoding="utf-8")
     for text in (
         "Test &lt;1&gt; &amp; more", "3.123e-12", "beta_0 &lt;is&gt;", "0.9997", "Table 4.1",
         "result.json", "bubblefit 0.1.0", "best &lt;1&gt;", "said &lt;so&gt;", "a &lt; b",
@@ -152,10 +143,10 @@ def test_page_shows_everything_and_escapes(tmp_path: Path):
         assert text in page, text
     assert ">Nothing<" not in page and "<so>" not in page
     card = re.search(r'href="data:application/octet-stream;base64,(.*?)"', page)
-    assert card is not None and base64.b64decode(card[1]).decode() == "a = 'é'\n"
+    assert base64.b64decode(card[1]).decode() == "a = 'é'\n"
 
 
-def test_a_picture_that_is_not_there_is_named(tmp_path: Path):
+def test_a_picture_that_is_not_there_is_named(tmp_path):
     (tmp_path / "out").mkdir()
     outside = drawn(tmp_path)
     names = ["lost.png", "../figures/sorted optima.png", str(outside)]
@@ -165,27 +156,23 @@ def test_a_picture_that_is_not_there_is_named(tmp_path: Path):
     assert page.count("is not in the folder") == 3
 
 
-def test_the_page_is_made_again_of_its_data(tmp_path: Path):
-    drawn(tmp_path)
-    first = write_report(tmp_path, full_report()).read_bytes()
-    again = write_page(tmp_path, read_page_data(tmp_path), tmp_path / "again.html").read_bytes()
-    assert again == first
-    assert read_page_data(tmp_path) == round_trip(full_report())
+def test_the_page_is_made_again_of_its_data(full, tmp_path):
+    again = write_page(full, read_page_data(full), tmp_path / "again.html").read_bytes()
+    assert again == (full / "report.html").read_bytes()
+    assert read_page_data(full) == round_trip(full_report())
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("{", "is damaged"),
-        ("[]", "is damaged"),
-        ("{}", "is damaged"),
+        ("{", "is damaged"), ("[]", "is damaged"), ("{}", "is damaged"),
         ('{"layout": 99, "title": "x"}', "another version's layout: expected 1, got 99"),
         ('{"layout": 1, "title": 3}', "title"),
         ('{"layout": 1, "title": "x", "sections": [{"title": "s", "parts": [{"part": "?"}]}]}',
          "sections.0.parts.0"),
     ],
 )  # fmt: skip
-def test_data_that_are_no_page(tmp_path: Path, content: str, said: str):
+def test_data_that_are_no_page(tmp_path, content, said):
     (tmp_path / "page.json").write_text(content)
     with pytest.raises(InputError, match=re.escape(said)):
         read_page_data(tmp_path)
@@ -193,7 +180,7 @@ def test_data_that_are_no_page(tmp_path: Path, content: str, said: str):
         read_page_data(tmp_path / "none")
 
 
-def test_data_are_strict_json(tmp_path: Path):
+def test_data_are_strict_json(tmp_path):
     """What is no number is missing, in curves and in tables alike."""
     chart = Chart("a", "x", "y", [line("b", [0, 1, np.nan], [np.inf, 2, 3])])
     table = Table("t", ["a"], [[np.float64("nan")], [np.int64(3)]])
@@ -205,7 +192,41 @@ def test_data_are_strict_json(tmp_path: Path):
     assert shown["rows"] == [[None], [3]]
 
 
-def test_output_folder_that_cannot_be_made(tmp_path: Path):
-    (tmp_path / "file").write_text("")
+def test_vtu_holds_the_deformed_mesh(tmp_path):
+    points = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], dtype=float)
+    mesh = Mesh(points, np.array([[0, 1, 2, 3]]), {"rim": np.arange(4)})
+    u = np.arange(12.0).reshape(4, 3)
+    path = write_vtu(
+        mesh, u, tmp_path / "b.vtu", {"height": u[:, 2]}, {"thickness": np.array([0.81])}
+    )
+    back = meshio.read(path)
+    assert back.points == pytest.approx(mesh.points + u)
+    assert back.point_data["displacement"] == pytest.approx(u)
+    assert back.point_data["height"] == pytest.approx(u[:, 2])
+    assert back.cell_data["thickness"][0] == pytest.approx([0.81])
+    with pytest.raises(ValueError, match="height: 3 rows for 4 nodes"):
+        write_vtu(mesh, u, path, {"height": np.zeros(3)})
+
+
+def test_numbers():
+    assert [number(v) for v in (None, float("nan"), 3, "x", 0.123456)] == [
+        "–", "–", "3", "x", "0.1235",
+    ]  # fmt: skip
+    assert [number(v) for v in (float("inf"), 12345.6, True)] == ["–", "1.235e+04", "True"]
+    shares = (0.01234, 0.9949, 0.995, 0.996, 1.234, 12.0, 0.1, 0.0)
+    assert [percent(share) for share in shares] == [
+        "1.2 %", "99 %", "100 %", "100 %", "123 %", "1200 %", "10 %", "0 %",
+    ]  # fmt: skip
+
+
+def test_replacing_keeps_the_old_file_when_the_block_fails(tmp_path):
+    path = tmp_path / "result.txt"
+    path.write_text("old")
+    full = OSError(28, "No space left on device")
+    for failure, error in ((RuntimeError(), RuntimeError), (full, OutputError)):
+        with pytest.raises(error), replacing(path) as temporary:
+            temporary.write_text("half")
+            raise failure
+        assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
     with pytest.raises(OutputError, match=r"page\.json: cannot be written"):
-        write_report(tmp_path / "file", Report(title="x"))
+        write_report(path, Report(title="x"))

@@ -27,8 +27,8 @@ from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
 from bubblefit.runs.fit import Check, fit
+from bubblefit.runs.folder import PRESENTERS
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
-from bubblefit.runs.presenters import PRESENTERS
 from bubblefit.runs.result import notes_of_fit
 from bubblefit.runs.setup import bounds_of, law_of, prepare_fit, shared_unknowns
 from bubblefit.runs.starts import StartRecord

@@ -1,13 +1,9 @@
 """Forms side by side: every number of result.json, table and page, and going on with it."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import asdict
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
@@ -17,49 +13,38 @@ from bubblefit.errors import Note, OutputError, rows
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
-from bubblefit.reports.content import Report
 from bubblefit.runs import compare
-from bubblefit.runs.compare import (
-    FOLD,
-    LOST,
-    FoldError,
-    FormFit,
-    LawComparison,
-    compare_laws,
-)
+from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare_laws
 from bubblefit.runs.series import StudyRecord, mark_of
 from bubblefit.solvers.base import SNAP
 
 from ..projects import ELONGATION, MODULI, constant_strips
 
-FORMS = ("constant", "linear")
 PARTS = {"one: warp": "warp", "one: fill": "fill"}
 
 
 class Run:
     """A comparison in a folder, what it told, and what was written of it without a picture."""
 
-    def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
-        self.out = folder / "out"
+    def __init__(self, folder, patch):
+        self.out, self.events, self.pages, self.drawn = folder / "out", [], [], []
         self.path = constant_strips(folder, ("starts = 2", "jobs = 1"))
-        self.events: list[Any] = []
-        self.pages: list[Report] = []
-        self.drawn: list[tuple[Any, ...]] = []
         patch.setattr(study_pages, "save", lambda *args: self.drawn.append(args))
         patch.setattr(study_pages, "_responses", lambda *_: [("loads.png", "loads")])
         patch.setattr(bf.Fit, "report", lambda *_: None)
-        patch.setattr(study_pages, "write_report", self.page)
+        patch.setattr(study_pages, "write_report", lambda folder, page: self.pages.append(page))
 
-    def page(self, folder: Path, report: Report) -> Path:
-        self.pages.append(report)
-        return folder / "report.html"
-
-    def compare(self, **options: Any) -> LawComparison:
+    def compare(self, **options):
         self.events.clear()
+        options = {"progress": self.events.append, **options}
         return compare_laws(
-            bf.read_project(self.path), ["one"], FORMS, folds=5, starts=1, fold_starts=1,
-            out=self.out, progress=self.events.append, **options,
+            bf.read_project(self.path), ["one"], ("constant", "linear"), folds=5, starts=1,
+            fold_starts=1, out=self.out, **options,
         )  # fmt: skip
+
+    @property
+    def judged(self):
+        return [event for event in self.events if isinstance(event, FoldError)]
 
 
 @pytest.fixture(scope="module")
@@ -76,43 +61,34 @@ def compared(run):
     return done
 
 
-def difference(direction: str) -> float:
-    """RMS in N of what one specimen foretells of the other, in closed form."""
-    strain = np.log1p(ELONGATION[ELONGATION <= 2.9] / 20)
-    return float(20 * abs(np.subtract(*MODULI["one"][direction])) * np.sqrt(np.mean(strain**2)))
-
-
 def test_every_number(compared):
     result = compared.result
     first, second = result.pop("forms")
-    noise = {
-        name: 10 * abs(np.subtract(*MODULI["one"][direction]))
-        * np.sqrt(np.sum(np.log1p(ELONGATION / 20) ** 2) * 2 / (2 * len(ELONGATION) - 1))
-        for name, direction in PARTS.items()
-    }  # fmt: skip
+    apart = {n: float(abs(np.subtract(*MODULI["one"][own]))) for n, own in PARTS.items()}
+    every = np.log1p(ELONGATION / 20)
+    noise = 10 * np.sqrt(np.sum(every**2) * 2 / (2 * len(ELONGATION) - 1))
     assert result == {
         "command": "compare", "title": "made", "tests": ["one"],
         "objective_is": "sum of the strips' RMS errors, N",
         "units": {"one: warp": "N", "one: fill": "N"}, "fold_starts": 1,
-        "noise": pytest.approx(sum(noise.values()), rel=1e-3),
-        "noise_by_part": pytest.approx(noise, rel=1e-3),
+        "noise": pytest.approx(noise * sum(apart.values()), rel=1e-3),
+        "noise_by_part": pytest.approx({n: noise * d for n, d in apart.items()}, rel=1e-3),
         "least_cross_validated": result["least_cross_validated"], "simplest_as_good": "constant",
         "as_good_within": 0.05, "notes": rows(compared.notes),
     }  # fmt: skip
-    left = {name: difference(direction) for name, direction in PARTS.items()}
+    # One specimen foretells the other, in closed form.
+    strain = every[ELONGATION <= 2.9]
+    left = {n: 20 * d * float(np.sqrt(np.mean(strain**2))) for n, d in apart.items()}
     total = sum(left.values())
     fit = compared.forms[0].fit
     assert first == {
-        "form": "constant",
-        "coefficients": 3,
-        "objective": fit.objective,
+        "form": "constant", "coefficients": 3, "objective": fit.objective,
         "fitted": pytest.approx(fit.objective),  # every strip can be left out
         "rms": pytest.approx({n: d / 2 for n, d in left.items()}, rel=1e-3),
         "cross_validated": pytest.approx(total, rel=1e-3),
         "cross_validated_by_part": pytest.approx(left, rel=1e-3),
-        "folds": pytest.approx([total, total], rel=1e-3),
-        "starts_objective": [fit.objective],
-    }
+        "folds": pytest.approx([total, total], rel=1e-3), "starts_objective": [fit.objective],
+    }  # fmt: skip
     assert second["coefficients"] == 6 and second["form"] == "linear"
     # A modulus that is linear in strain can be the constant one, and differs like it.
     assert second["cross_validated"] == pytest.approx(total, rel=0.05)
@@ -122,42 +98,36 @@ def test_table_and_page(compared, run):
     compared.write(run.out)
     result = json.loads((run.out / "result.json").read_text())
     assert result == compared.result
+    forms = result["forms"]
     found, ((path, charts),) = run.pages[-1], run.drawn
     (chart,) = charts.charts
-    label, noise = chart.y_label, chart.level
-    assert path == run.out / "laws.png" and label == "sum of the strips' RMS errors, N"
-    assert noise == pytest.approx(result["noise"])
+    assert path == run.out / "laws.png" and chart.y_label == result["objective_is"]
+    assert chart.level == pytest.approx(result["noise"])
     folds = [s.y for s in chart.series if s.name == "single folds"]
-    for own, form in zip(folds, result["forms"], strict=True):
+    for own, form in zip(folds, forms, strict=True):
         assert own == pytest.approx(form["folds"], rel=1e-5)
-    assert found.title == "made: forms of the moduli"
-    assert result["least_cross_validated"] in found.summary
-    assert found.figures == [("loads.png", "loads")]
-    assert next(part for part in found.parts if isinstance(part, Charts)) is charts
-    forms = result["forms"]
     for series, key in zip(chart.series, ("fitted", "cross_validated"), strict=False):
         assert series.y == pytest.approx([form[key] for form in forms], rel=1e-5)
     assert chart.x_names == tuple(f"{f['form']} ({f['coefficients']})" for f in forms)
-    assert chart.level == noise
+    assert result["least_cross_validated"] in found.summary
+    assert found.figures == [("loads.png", "loads")]
+    assert next(part for part in found.parts if isinstance(part, Charts)) is charts
     names = [name for name, _ in found.files]
     assert names == ["comparison.csv", "laws.png", "notes.csv", "result.json"]
     assert found.warnings == [note.line for note in compared.notes]
     of = {note.of.split(",")[0] for note in compared.notes}
     assert of == {"constant", "linear"} and len(found.warnings) >= 4
-    columns = [
-        "moduli", "coefficients", "fitted", "cross_validated", "rms one: warp, N",
-        "rms one: fill, N", "left out one: warp, N", "left out one: fill, N",
-    ]  # fmt: skip
     cells = [
-        [
-            form["form"], form["coefficients"], form["fitted"], form["cross_validated"],
-            *form["rms"].values(), *form["cross_validated_by_part"].values(),
-        ]
-        for form in result["forms"]
+        [form["form"], form["coefficients"], form["fitted"], form["cross_validated"],
+         *form["rms"].values(), *form["cross_validated_by_part"].values()]
+        for form in forms
     ]  # fmt: skip
     assert [table.rows for table in found.tables] == [cells]
     table = pd.read_csv(run.out / "comparison.csv")
-    assert list(table.columns) == columns
+    assert list(table.columns) == [
+        "moduli", "coefficients", "fitted", "cross_validated", "rms one: warp, N",
+        "rms one: fill, N", "left out one: warp, N", "left out one: fill, N",
+    ]  # fmt: skip
     for row, own in zip(table.to_numpy(dtype=object).tolist(), cells, strict=True):
         assert row[:2] == own[:2] and row[2:] == pytest.approx(own[2:])
 
@@ -167,22 +137,17 @@ def test_going_on_validates_nothing_twice(compared, run):
     with pytest.raises(OutputError, match="--resume"):
         run.compare()
     again = run.compare(resume=True)
-    assert [form.folds for form in again.forms] == before
-    assert not any(isinstance(event, FoldError) for event in run.events)
-    # Folds of another fit are made anew.
+    assert [form.folds for form in again.forms] == before and not run.judged
+    # Folds of another fit are made anew; cut off after its first fold, only the second is.
     path = run.out / "linear" / "validation.json"
-    path.write_text(json.dumps({"of": "another", "folds": []}))
-    again = run.compare(resume=True)
-    assert [form.folds for form in again.forms] == before
-    assert sum(isinstance(event, FoldError) for event in run.events) == 2
     written = json.loads(path.read_text())
     assert path.read_text() == json.dumps(written, indent=1) + "\n" and len(written["folds"]) == 2
-    # Cut off after its first fold, only the second is made.
-    path.write_text(json.dumps({**written, "folds": written["folds"][:1]}))
-    again = run.compare(resume=True)
-    assert [form.folds for form in again.forms] == before
-    (fold,) = [event for event in run.events if isinstance(event, FoldError)]
-    assert asdict(fold) == written["folds"][1]
+    for change, numbers in (({"of": "another"}, {0, 1}), ({"folds": written["folds"][:1]}, {1})):
+        path.write_text(json.dumps({**written, **change}))
+        assert [form.folds for form in run.compare(resume=True).forms] == before
+        made = {json.dumps(written["folds"][k]) for k in numbers}
+        assert {json.dumps(asdict(fold)) for fold in run.judged} == made
+    assert json.loads(path.read_text()) == written
 
 
 def test_what_is_replaced_is_not_gone_on_with(run, compared):
@@ -195,24 +160,13 @@ def test_what_is_replaced_is_not_gone_on_with(run, compared):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        compare_laws(bf.read_project(run.path), ["one"], FORMS, folds=5, starts=1, fold_starts=1,
-                     out=run.out, progress=stop, overwrite=True)  # fmt: skip
+        run.compare(progress=stop, overwrite=True)
     again = run.compare(resume=True)
     assert [form.fit.project.fit.seed for form in again.forms] == [8, 8]
 
 
-@pytest.mark.usefixtures("no_noise")
-def test_lines_for_the_terminal():
-    forms = form("constant", 3, 161.27), form("cubic", 12, None)
-    lines = LawComparison(forms, 2).lines()
-    for line, words in zip(lines[2:5], ("161.3", "failed", "0.75"), strict=True):
-        assert words in line
-    assert len(lines) == 6 and "constant" in lines[5]
-    assert LawComparison(forms[1:], 2).conclusion == []
-
-
 def test_rows_of_another_fit_are_not_taken(tmp_path):
-    def rows(of: str, folder: Path = tmp_path) -> dict[int, FoldError]:
+    def rows(of, folder=tmp_path):
         return StudyRecord(folder, "rows.json", "folds", FoldError, "fold", {"of": of}).rows
 
     path, mark = tmp_path / "rows.json", mark_of({"of": "this"})
@@ -230,15 +184,13 @@ class Form(FormFit):
     coefficients, fitted, rms = 0, 3.0, {"warp": 2.0, "fill": 4.0}
 
 
-def form(name: str, coefficients: int, *folds: float | None) -> Form:
+def form(name, coefficients, *folds):
     """Its errors in the folds; by part a half and a quarter of them."""
-    unit = SimpleNamespace(unit="N")
-    law = SimpleNamespace(form=Polynomial(0))
-    problem = SimpleNamespace(
-        comparisons=[SimpleNamespace(name=part, objective=unit) for part in ("warp", "fill", "b")]
-    )
-    fit: Any = SimpleNamespace(
-        law=law, problem=problem, objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
+    objective = SimpleNamespace(unit="N")
+    parts = [SimpleNamespace(name=part, objective=objective) for part in ("warp", "fill", "b")]
+    fit = SimpleNamespace(
+        law=SimpleNamespace(form=Polynomial(0)), problem=SimpleNamespace(comparisons=parts),
+        objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
         project=SimpleNamespace(title="made"),
         setup=SimpleNamespace(tests=[], objective_is="error"),
         best=SimpleNamespace(ranked=[SimpleNamespace(objective=9.0)]),
@@ -252,21 +204,15 @@ def form(name: str, coefficients: int, *folds: float | None) -> Form:
     return own
 
 
-@pytest.fixture
-def no_noise(monkeypatch):
+def test_the_simplest_form_that_is_as_good(monkeypatch):
     every = {"warp": 0.5, "fill": 0.25, "b": 7.0}
     monkeypatch.setattr(compare, "noise_of", lambda problem: every)
-
-
-@pytest.mark.usefixtures("no_noise")
-def test_the_simplest_form_that_is_as_good():
-    forms = [
+    forms = (
         form("cubic", 12, 99.0, 101.0), form("linear", 6, 104.0, 105.8),
         form("constant", 3, 105.0, 105.2), form("quadratic", 9, 1.0, None),
-    ]  # fmt: skip
-    result = LawComparison(tuple(forms), 2).result
-    assert result["least_cross_validated"] == "cubic"
-    assert result["simplest_as_good"] == "linear"
+    )  # fmt: skip
+    result = LawComparison(forms, 2).result
+    assert (result["least_cross_validated"], result["simplest_as_good"]) == ("cubic", "linear")
     assert (result["noise"], result["noise_by_part"]) == (0.75, {"warp": 0.5, "fill": 0.25})
     assert result["units"] == {"warp": "N", "fill": "N"}
     first, *_, last = result["forms"]
@@ -274,13 +220,18 @@ def test_the_simplest_form_that_is_as_good():
     assert first["cross_validated_by_part"] == {"warp": 50.0, "fill": 25.0}
     assert last["cross_validated"] is None and last["folds"] == [1.0, None]
     assert last["cross_validated_by_part"] == {"warp": None, "fill": None}
-    table = LawComparison(tuple(forms), 2).table()
+    table = LawComparison(forms, 2).table()
     assert table["cross_validated"].tolist()[:3] == pytest.approx([100.0, 104.9, 105.1])
     assert math.isnan(table["cross_validated"][3]) and np.isnan(table["left out warp, N"][3])
     assert table["left out fill, N"].tolist()[:2] == pytest.approx([25.0, 26.225])
     assert table["rms fill, N"].tolist() == [4.0] * 4
-    lost = LawComparison(tuple(forms[3:]), 2).result
-    assert lost["least_cross_validated"] is None and lost["simplest_as_good"] is None
+    lines = LawComparison(forms[2:], 2).lines()
+    for line, words in zip(lines[2:5], ("105.1", "failed", "0.75"), strict=True):
+        assert words in line
+    assert len(lines) == 6 and "constant" in lines[5]
+    lost = LawComparison(forms[3:], 2)
+    assert lost.result["least_cross_validated"] is lost.result["simplest_as_good"] is None
+    assert lost.conclusion == []
 
 
 def test_a_fold_that_was_lost_is_told_by_its_number():

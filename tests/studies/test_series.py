@@ -1,15 +1,11 @@
 """What studies share: which tests they can run, what parts are called, which card runs."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
-import io
 import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, ClassVar
 
 import pandas as pd
 import pytest
@@ -21,17 +17,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import read_page_data
+from bubblefit.runs import series as module
 from bubblefit.runs import simulation as analyses
 from bubblefit.runs.folder import FOLDER
-from bubblefit.runs.series import (
-    Series,
-    card_of,
-    card_words,
-    part_name,
-    parts_of,
-    studied_tests,
-    thickness_notes,
-)
+from bubblefit.runs.series import card_of, part_name, parts_of, studied_tests, thickness_notes
 from bubblefit.solvers.base import SNAP
 
 from ..bars import BarKind, BarTest, project_of
@@ -85,16 +74,15 @@ def test_the_card_that_is_given(tmp_path):
     project = project_of(BarTest("one"), cards={"own": CARD})
     assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
     assert card_of(project, tmp_path / "c.toml").name == "filed"
-    assert (card_words(CARD), card_words("own"), card_words(Path("c"))) == ("soft", "own", "c")
+    assert tuple(map(module.card_words, (CARD, "own", Path("c")))) == ("soft", "own", "c")
     assert thickness_notes(project, CARD) == []
     (note,) = thickness_notes(project, MaterialCard(CARD.law, 0.6))
     assert note.kind is THICKNESS and "0.6 mm" in note and "0.5 mm" in note
 
 
 def test_analyses_are_told_one_after_the_other(bars):
-    steps: list[Any] = []
-    test = BarTest("one", ("warp", "fill"))
-    series = Series(project_of(test), CARD, steps.append)
+    steps, test = [], BarTest("one", ("warp", "fill"))
+    series = module.Series(project_of(test), CARD, steps.append)
     assert series.total == 0 and series.solver is bars
     series.total = 2
     for part in parts_of(project_of(test), [test], 0.5).values():
@@ -109,23 +97,13 @@ def test_analyses_are_told_one_after_the_other(bars):
     assert [note.kind for note in series.notes(history)] == [BEYOND_CARD]
 
 
-class Made:
-    """The result of a study."""
-
-    notes = (Note(SNAP, "snaps", "one"),)
-    result: ClassVar = {"a": [1]}
-
-    def table(self) -> pd.DataFrame:
-        return pd.DataFrame({"a": [1, 2], "b": ["x", "y"]})
-
-    def lines(self) -> list[str]:
-        return ["it settles"]
-
-
 def test_what_a_study_writes(tmp_path, monkeypatch):
-    drawn: list[Path] = []
+    drawn, out = [], tmp_path / "new"
     monkeypatch.setattr(study_pages, "save", lambda path, _: drawn.append(path))
-    out, study = tmp_path / "new", Made()
+    study = SimpleNamespace(
+        notes=(Note(SNAP, "snaps", "one"),), result={"a": [1]},
+        table=lambda: pd.DataFrame({"a": [1, 2], "b": ["x", "y"]}), lines=lambda: ["it settles"],
+    )  # fmt: skip
     study_pages.write_plain(out, study, "Finer", "mesh", [], Charts("x", [], ""))
     page = read_page_data(out)
     assert page.title == "Finer" and page.warnings == [note.line for note in study.notes]
@@ -159,91 +137,76 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def killed_after(monkeypatch: pytest.MonkeyPatch, count: int) -> list[int]:
+@contextlib.contextmanager
+def killed_after(count):
     """Of the analyses that are made, one more than `count` is the end; how many there were."""
-    made = [0]
+    made, real = [0], analyses.Once.run
 
-    def run(self, model, law, *given, real=analyses.Once.run, **named):
+    def run(self, model, law, *given, **named):
         before = self.cache.entries()
         history = real(self, model, law, *given, **named)
-        if len(self.cache.entries()) > len(before):
-            made[0] += 1
+        made[0] += len(self.cache.entries()) > len(before)
         if made[0] > count:
             raise Killed
         return history
 
-    monkeypatch.setattr(analyses.Once, "run", run)
-    return made
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analyses.Once, "run", run)
+        yield made
 
 
-def without(result, *names: str):
+def without(result, *names):
     if isinstance(result, dict):
         return {k: without(v, *names) for k, v in result.items() if k not in names}
     return [without(one, *names) for one in result] if isinstance(result, list) else result
 
 
+def written(out):
+    """Result and tables without the seconds, which are those of the run."""
+    tables = {path.name: pd.read_csv(path) for path in sorted(out.glob("*.csv"))}
+    plain = {n: t.drop(columns="seconds", errors="ignore").to_csv() for n, t in tables.items()}
+    return without(result_in(out), "seconds"), plain
+
+
 @pytest.mark.parametrize("what", COMMANDS)
 def test_every_cut_ends_as_if_there_had_been_none(folder, what):
-    command = functools.partial(
-        in_process, *COMMANDS[what], "--card", "card.toml", "--out", "out", cwd=folder
-    )
-    out = folder / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        total = killed_after(patch, 1000)
-        command()
-    whole, tables = result_in(out), sorted(out.glob("*.csv"))
-    before = {path.name: path.read_bytes() for path in tables}
+    command, out = (*COMMANDS[what], "--card", "card.toml", "--out", "out"), folder / "out"
+    again = functools.partial(in_process, *command, cwd=folder)
+    with killed_after(1000) as total:
+        again()
+    whole = written(out)
     assert total[0] >= 2
     for cut in range(total[0]):
         shutil.rmtree(out)
-        with pytest.MonkeyPatch.context() as patch:
-            killed_after(patch, cut)
-            with pytest.raises(Killed):
-                run_here(folder, what)
+        # Not by click's runner, which would take the end for an exception of the command.
+        with killed_after(cut), contextlib.chdir(folder), pytest.raises(Killed):
+            main([*map(str, command)], standalone_mode=False)
         assert not (out / "result.json").exists()
-        with pytest.MonkeyPatch.context() as patch:
-            made = killed_after(patch, 1000)
-            command("--resume")
+        with killed_after(1000) as made:
+            again("--resume")
         assert made[0] == total[0] - cut - 1
-        assert without(result_in(out), "seconds") == without(whole, "seconds")
-        for name, content in before.items():
-            one, other = (pd.read_csv(source) for source in (out / name, io.BytesIO(content)))
-            own = [column for column in one if column not in ("seconds",)]
-            pd.testing.assert_frame_equal(one[own], other[own], check_exact=True)
-
-
-def run_here(folder: Path, what: str) -> None:
-    """Not by click's runner, which would take the end for an exception of the command."""
-    arguments = [*map(str, COMMANDS[what]), "--card", "card.toml", "--out", "out"]
-    with contextlib.chdir(folder):
-        main(arguments, standalone_mode=False)
+        assert written(out) == whole
+    if what == "mesh":
+        first = pd.read_csv(out / "convergence.csv")["seconds"].tolist()
+        again("--resume")
+        assert pd.read_csv(out / "convergence.csv")["seconds"].tolist() == first
 
 
 def test_what_there_is_to_go_on_with(folder):
     arguments = (*COMMANDS["nu12"], "--card", "card.toml", "--out", "out")
-    done = in_process(*arguments, "--resume", cwd=folder, code=2)
-    assert "out: holds nothing to go on with; leave --resume out" in done.output
-    done = in_process(*arguments, "--resume", "--overwrite", cwd=folder, code=2)
-    assert "give one of them, not both" in done.output
+    other = (*COMMANDS["nu12"], "--card", "other.toml", "--out", "out")
+    for options, words in (
+        (["--resume"], "out: holds nothing to go on with; leave --resume out"),
+        (["--resume", "--overwrite"], "give one of them, not both"),
+    ):
+        assert words in in_process(*arguments, *options, cwd=folder, code=2).output
     in_process(*arguments, cwd=folder)
-    done = in_process(*arguments, cwd=folder, code=2)
-    assert "already holds a result" in done.output
-    kept = list((folder / "out" / FOLDER).glob("*/*.run"))
-    assert len(kept) == 4
+    assert "already holds a result" in in_process(*arguments, cwd=folder, code=2).output
+    assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
     # Another card: nothing of the first is taken.
     before = result_in(folder / "out")
-    other = (*COMMANDS["nu12"], "--card", "other.toml", "--out", "out")
     in_process(*other, "--resume", cwd=folder)
     after = result_in(folder / "out")
     assert json.dumps(after["models"]) != json.dumps(before["models"])
     in_process(*other, "--overwrite", cwd=folder)
     assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
-
-
-def test_seconds_are_those_of_the_run(folder):
-    arguments = (*COMMANDS["mesh"], "--card", "card.toml", "--out", "out")
-    in_process(*arguments, cwd=folder)
-    first = pd.read_csv(folder / "out" / "convergence.csv")
-    in_process(*arguments, "--resume", cwd=folder)
-    second = pd.read_csv(folder / "out" / "convergence.csv")
-    assert first["seconds"].tolist() == second["seconds"].tolist()

@@ -12,7 +12,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
-from bubblefit.runs.verification.published import cases, shapes
+from bubblefit.runs.verification import cases, shapes
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.deck import (
     pressure_forces,

@@ -8,6 +8,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.mesh import sampling_matrix
+from bubblefit.runs.verification import cases, shapes
 from bubblefit.runs.verification.closed_forms import (
     FICHTER,
     MODULUS,
@@ -17,7 +18,6 @@ from bubblefit.runs.verification.closed_forms import (
     apex_coefficient,
     stress_series,
 )
-from bubblefit.runs.verification.published import cases, shapes
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 

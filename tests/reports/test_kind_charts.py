@@ -1,0 +1,577 @@
+"""Charts of kinds: cuts and maps of bubbles, loads of strips and beams, the deformed bodies."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bubblefit.meshes.strip_models import strip_mesh
+from bubblefit.reports import bubbles, cylinders, strips
+from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut, point_cut
+from bubblefit.reports.charts import axis_ends, scale_ends
+from bubblefit.reports.cylinders import BendLine, BendPanel, beam_charts, bending_charts
+from bubblefit.reports.strips import OrderErrors, StripCurves, load_charts, order_charts
+
+from ..drawings import check_charts, data, legend, lines, named, shown
+from ..places import PUBLISHED
+
+
+def cap(xy, height):
+    """Displacement (n, 3) of a parabolic cap of radius 100 mm."""
+    inside = 1 - (xy**2).sum(axis=1) / 1e4
+    return np.column_stack([0.05 * xy * inside[:, None], height * inside])
+
+
+def polar(angles):
+    r, t = np.meshgrid(np.linspace(10, 100, 10), angles)
+    ring = np.column_stack([(r * np.cos(t)).ravel(), (r * np.sin(t)).ravel()])
+    return np.vstack([[0.0, 0.0], ring])
+
+
+QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
+PRESSURES, NAMES = np.array([0.022, 0.186, 0.3]), ["22 kPa", "186 kPa", "300 kPa"]
+TURN = np.linspace(0.0, 2 * np.pi, 37)
+EDGE = 100.0 * np.column_stack([np.cos(TURN), np.sin(TURN)])
+
+
+@pytest.mark.parametrize("points", [QUARTER, FULL], ids=["quarter", "full"])
+def test_cuts(points):
+    heights = (13.0, 30.0, 39.0)
+    model = np.array([cap(points, h) for h in heights])
+    grid = FULL[np.hypot(*FULL.T) < 90]
+    measured = [(grid, cap(grid, h + 1)) for h in heights]
+    alone = cut_charts("b", PRESSURES, points, model)
+    both = cut_charts("b", PRESSURES, points, model, measured, "words")
+    check_charts(alone)
+    for axis, (chart, other) in enumerate(zip(alone.charts, both.charts, strict=True)):
+        for curve, height in zip(data(chart), heights, strict=True):
+            at = curve[0] / (1 + 0.05 * (1 - curve[0] ** 2 / 1e4))
+            assert curve[1] == pytest.approx(height * (1 - at**2 / 1e4), rel=0.02, abs=0.3)
+            assert curve[1].max() == pytest.approx(height)
+        tops = [own[1].max() for own in data(other)]
+        assert tops == pytest.approx([13.0, 14.0, 30.0, 31.0, 39.0, 40.0])
+        assert [s.look for s in other.series] == ["line", "dots"] * 3
+        way = (("x, mm", "warp"), ("y, mm", "fill"))[axis]
+        assert shown(chart) == (way[0], "height z, mm", f"Cut along the {way[1]}")
+    assert legend(alone) == NAMES and both.caption == "words"
+
+
+@pytest.mark.parametrize(("lift", "bottom"), [(5.0, 0.0), (-50.0, -52.0)])
+def test_cuts_stand_on_the_sheet(lift, bottom):
+    """The axis begins with height zero, or below where a frame hangs lower; some are drawn."""
+    many = cut_charts("b", np.linspace(0.01, 0.3, 20), FULL, np.array([cap(FULL, 9.0)] * 20))
+    assert len(many.charts[0].series) == bubbles.MOST == 8 and "Of 20 pressures 8" in many.caption
+    hung = cut_charts("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
+    for chart in hung.charts:
+        low = axis_ends(chart)[1][0]
+        assert low == 0.0 if bottom == 0.0 else low < -50.0
+
+
+def test_heights_are_drawn_against_each_other():
+    seen = [np.linspace(1.0, h, 12) for h in (13.0, 30.0, 39.0)]
+    modelled = [z + 0.1 * k for k, z in enumerate(seen)]
+    charts = height_charts(PRESSURES, seen, modelled)
+    check_charts(charts)
+    left, right = charts.charts
+    rule, *pairs = data(left)
+    for own, off, z, model in zip(pairs, data(right), seen, modelled, strict=True):
+        np.testing.assert_allclose(own, [z, model], rtol=1e-5)
+        np.testing.assert_allclose(off, [z, model - z], rtol=1e-5, atol=1e-9)
+    np.testing.assert_array_equal(rule[0], rule[1])
+    assert right.level == 0.0 and legend(charts) == NAMES
+    rms = np.sqrt(np.mean([0.0, 0.01, 0.04]))
+    every, spread = np.concatenate(seen), np.concatenate(modelled) - np.concatenate(seen)
+    lost = (spread**2).sum() / ((every - every.mean()) ** 2).sum()
+    assert shown(left) == ("measured z, mm", "modelled z, mm", f"R² = 1 − {lost:.1e}")
+    assert shown(right) == ("measured z, mm", "modelled − measured, mm", f"RMS {rms:.2g} mm")
+    same = height_charts(PRESSURES, seen, seen).charts
+    assert [chart.title for chart in same] == ["R² = 1 − 0.0e+00", "RMS 0 mm"]
+    # Of equal heights no share is explained; below the mean's error it is negative.
+    first = height_charts([0.022], [[3.0, 3.0]], [[3.0, 4.0]], "known").charts
+    other = height_charts([0.022], [[3.0, 5.0]], [[5.0, 3.0]], "known").charts
+    assert [first[0].title, other[0].title] == ["R² = nan", "R² = -3.000"]
+    assert first[1].y_label == "modelled − known, mm"
+    assert [bubbles._below_one(r) for r in (0.999, 0.9991)] == ["0.999", "1 − 9.0e-04"]
+
+
+def sheet(count):
+    """(count, 2) mm, evenly over the disk."""
+    place = np.arange(count) + 0.5
+    r, t = 99.0 * np.sqrt(place / count), 2.4 * place
+    return np.column_stack([r * np.cos(t), r * np.sin(t)])
+
+
+@pytest.mark.parametrize(("count", "step"), [(500, 1), (6000, 1), (6001, 2)])
+def test_registration(count, step):
+    points = sheet(count)
+    maps = [("height, mm", points[:, 0]), ("rise at 20 kPa, mm", points[:, 1])]
+    charts = bubbles.registration_charts(points, maps, EDGE)
+    for chart, (title, values) in zip(charts.charts, maps, strict=True):
+        spots = chart.series[0]
+        np.testing.assert_allclose(np.transpose([spots.x, spots.y]), points[::step], rtol=1e-5)
+        np.testing.assert_allclose(spots.values, values[::step], rtol=1e-5)
+        np.testing.assert_allclose(lines(chart, "rim")[0].T, EDGE, rtol=1e-5, atol=1e-9)
+        assert chart.equal and f"{chart.title}, {chart.scale}" == title
+        assert shown(chart)[:2] == ("x, mm", "y, mm")
+        # From the centre half way to the rim.
+        assert lines(chart, "warp")[0].tolist() == [[0, 50], [0, 0]]
+        assert lines(chart, "fill")[0].tolist() == [[0, 0], [0, 50]]
+
+
+def test_disk():
+    places = np.vstack([sheet(400), EDGE[:-1]])
+    low = 0.02 * places[:, 0] - 0.5  # mm, from -2.5 to 1.5
+    charts = bubbles.disk_charts([("height, mm", places, low), ("none, mm", places, 0 * low)], EDGE)
+    check_charts(charts)
+    for chart, title, most in zip(charts.charts, ("height", "none"), (2.5, 1e-9), strict=True):
+        assert scale_ends(chart) == pytest.approx((-most, most)) and chart.equal
+        body = chart.series[0]
+        x = np.array(body.x, dtype=float).reshape(-1, 3).mean(axis=1)
+        wanted = 0.02 * x - 0.5 if most > 1 else 0 * x
+        np.testing.assert_allclose(body.values, wanted, atol=1e-4)
+        assert (*shown(chart), chart.scale) == ("x (warp), mm", "y (fill), mm", title, "mm")
+
+
+@pytest.mark.parametrize(("count", "step"), [(6000, 1), (24000, 3)])
+def test_the_first_spheres_in_one_scale(count, step):
+    points, used = np.column_stack([sheet(count), np.zeros(count)]), np.arange(count) % 4 > 0
+    off = np.where(used, points[:, 0] / 1e3, 7.0)
+    charts = bubbles.sphere_charts([(f"{i}", points, (i + 1) * off, used) for i in range(7)]).charts
+    assert [chart.title for chart in charts] == [str(i) for i in range(6)]
+    largest = 6 * np.abs(off[used]).max()
+    for i, chart in enumerate(charts):
+        inside = chart.series[0]
+        np.testing.assert_allclose(inside.x, points[used, 0][::step], rtol=1e-5)
+        np.testing.assert_allclose(inside.values, (i + 1) * off[used][::step], rtol=1e-5)
+        assert scale_ends(chart) == pytest.approx((-largest, largest))
+
+
+def test_points_astray_do_not_make_the_ball_small():
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    points = np.column_stack([20 + 10 * np.cos(turn), 10 * np.sin(turn), 0 * turn])
+    points[4] = [600.0, 0.0, 0.0]
+    used, off = np.arange(40) != 4, np.linspace(-0.2, 0.1, 40)
+    balls = [("a: 10 mm", points, np.where(used, off, 580.0), used)]
+    (chart,) = bubbles.sphere_charts(balls).charts
+    assert axis_ends(chart)[0] == pytest.approx((9.0, 31.0), abs=0.1)
+    assert shown(chart) == ("x, mm", "y, mm", "a: 10 mm") and chart.equal
+    assert scale_ends(chart) == pytest.approx((-0.2, 0.2))
+    assert chart.series[0].values == pytest.approx(off[used], rel=1e-5)
+    assert lines(chart, "left out")[0].tolist() == [[600.0], [0.0]]
+    assert chart.scale == "beyond the sphere, mm"
+
+
+@pytest.mark.parametrize("least", [0.5, -3.0])
+def test_rises(least):
+    charts = bubbles.rise_charts([0.002, 0.02, 0.3], [least, 20.0, 39.0])
+    check_charts(charts)
+    (chart,) = charts.charts
+    np.testing.assert_allclose(data(chart)[0], [[2.0, 20.0, 300.0], [least, 20.0, 39.0]])
+    low = axis_ends(chart)[1][0]
+    assert low == 0.0 if least > 0 else low < -3.0
+    assert shown(chart)[:2] == ("pressure, kPa", "rise about the centre, mm")
+
+
+def test_pressures_and_heights_by_one_clock():
+    times = np.arange(5.0)
+    pressures, heights = np.array([0.0, 0.01, 0.02, 0.03, np.nan]), np.arange(5.0) ** 2
+    charts = bubbles.clock_charts(times, pressures, heights, np.array([0.02]))
+    check_charts(charts)
+    log, _, both = charts.charts
+    pairs = ((times, 1e3 * pressures), (times, heights), (1e3 * pressures, heights))
+    for chart, pair in zip(charts.charts, pairs, strict=True):
+        np.testing.assert_array_equal(data(chart)[0], pair)
+    assert lines(both, "taken")[0].tolist() == [[20.0], [4.0]] and named(both)["taken"].hollow
+    assert shown(log) == ("time by the log's clock, s", "pressure, kPa", "pressure of the log")
+    assert shown(both)[:2] == ("pressure, kPa", "height of the apex, mm")
+
+
+#: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
+ALONG = np.arange(0.0, 100.0, 10.0)
+ROWS = np.vstack(
+    [np.column_stack([ALONG, 0 * ALONG]), np.column_stack([ALONG + 5, 0 * ALONG + 2.5])]
+)
+
+
+def still(points):
+    """Risen by 1 mm for every mm of x, not moved aside."""
+    return np.column_stack([0 * points, points[:, 0]])
+
+
+@pytest.mark.parametrize(
+    ("points", "used"),
+    [
+        # Five points on the axis are its profile; of fewer, those beside it count as well.
+        (ROWS, 10), (np.vstack([ROWS[:5], ROWS[10:]]), 5), (np.vstack([ROWS[:4], ROWS[10:]]), 14),
+        # Half their distance from the axis at most; one alone has to lie on it.
+        ([[3.0, 2.0], [3.0, -2.0]], 2), ([[3.0, 2.0], [7.0, 2.5]], 1), ([[3.0, 2.0]], 0),
+        ([[3.0, 0.0]], 1), ([[3.0, 2.0], [6.0, 2.0]], 0), (np.zeros((0, 2)), 0),
+    ],
+)  # fmt: skip
+def test_points_of_a_cut(points, used):
+    given = np.array(points)
+    cut = point_cut(given, still(given), 0)
+    assert len(cut.position) == used
+    np.testing.assert_array_equal(cut.height, cut.position)
+    assert used == 2 or (np.diff(cut.position) > 0).all()
+
+
+@pytest.mark.parametrize(("on", "taken"), [(5, 5), (4, 81)])
+def test_five_nodes_on_the_axis_are_its_profile(on, taken):
+    """Of fewer, the mesh is cut at as many places from end to end."""
+    x = np.linspace(0.0, 80.0, on)
+    beside = np.column_stack([np.repeat([0.0, 80.0], 2), np.tile([-10.0, 10.0], 2)])
+    points = np.vstack([np.column_stack([x, 0 * x]), beside])
+    cut = node_cut(points, still(points), 0)
+    assert len(cut.position) == taken
+    np.testing.assert_allclose(cut.position, np.linspace(0.0, 80.0, taken))
+    np.testing.assert_allclose(cut.height, cut.position)
+    turned = polar(np.linspace(0, 2 * np.pi, 73)[:-1] + np.pi / 72)
+    cut = node_cut(turned, cap(turned, 30.0), 0)
+    assert len(cut.position) > 70
+    assert np.interp(0.0, cut.position, cut.height) == pytest.approx(30.0, rel=0.01)
+
+
+@pytest.mark.parametrize("cut", [node_cut, point_cut])
+def test_heights_at_rest_do_not_count(cut):
+    """Points of a measured sheet have three coordinates: places are told by x and y."""
+    draw = np.random.default_rng(2)
+    flat = draw.uniform(-50, 50, (200, 2))
+    moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
+    raised = np.column_stack([flat, 600.0 + 40.0 * draw.normal(size=200)])
+    for axis in (0, 1):
+        one, other = cut(flat, moved, axis), cut(raised, moved, axis)
+        assert len(one.position) > 3
+        np.testing.assert_array_equal(one.position, other.position)
+        np.testing.assert_array_equal(one.height, other.height)
+
+
+WAY = np.linspace(0.0, 40.0, 9)
+GRID = np.linspace(0.0, 30.0, 7)
+SOFT = BendLine(
+    "soft", 0, WAY, 3 * WAY, 0.14 + 1e-5 * WAY, 5e7 - 1e4 * WAY, knee=(20.0, 60.0), rms=3.106
+)
+STIFF = BendLine("stiff", 1, WAY, 5 * WAY, 0.14 + 2e-5 * WAY, 5e7 - 2e4 * WAY, limit=(40.0, 200.0))
+READINGS = [(WAY[:5], 3.9 * WAY[:5]), (WAY[:6], 4.1 * WAY[:6])]
+MEASURED = cylinders.BendReadings(READINGS, GRID, 4 * GRID, 0.1 * GRID)
+CASE = BendPanel("one", [SOFT, STIFF], MEASURED)
+
+
+def test_loads_and_what_the_cards_miss():
+    charts = bending_charts([CASE], misses=True, columns=1)
+    check_charts(charts)
+    top, low = charts.charts
+    np.testing.assert_array_equal(lines(top, "soft")[0], [WAY, 3 * WAY])
+    np.testing.assert_array_equal(lines(top, "stiff")[0], [WAY, 5 * WAY])
+    assert lines(top, "knee")[0].ravel().tolist() == [20.0, 60.0]
+    assert lines(top, "limit point")[0].ravel().tolist() == [40.0, 200.0]
+    for drawn, reading in zip(lines(top, "measured"), READINGS, strict=True):
+        np.testing.assert_allclose(drawn, reading)
+    np.testing.assert_array_equal(lines(top, "mean")[0], [GRID, 4 * GRID])
+    scatter = named(top)["scatter of repetitions (±)"]
+    np.testing.assert_allclose([scatter.lower, scatter.upper], [3.9 * GRID, 4.1 * GRID])
+    assert lines(low, "soft")[0] == pytest.approx(np.array([GRID, -GRID]))
+    assert lines(low, "stiff")[0] == pytest.approx(np.array([GRID, GRID]))
+    below = named(low)["scatter of repetitions (±)"]
+    assert (min(below.lower), max(below.upper)) == pytest.approx((-3.0, 3.0)) and low.level == 0
+    assert top.title == "one: RMS error 3.11 N" and low.title == "RMS error: soft 3.11 N"
+    assert shown(top)[:2] == ("deflection of the collar, mm", "load, N")
+    assert low.y_label == "model − mean, N"
+    assert {"soft", "stiff", "measured", "mean", "knee", "limit point"} < set(legend(charts))
+
+
+def test_bands_of_the_solver_and_of_the_card():
+    """The other end stops before; the axes hold both."""
+    own = replace(SOFT, other=(WAY[:7], 9 * WAY[:7]), off=0.5 * WAY)
+    charts = bending_charts([BendPanel("one", [own, STIFF], spread="95 % by the card")])
+    check_charts(charts)
+    (chart,) = charts.charts
+    np.testing.assert_array_equal(lines(chart, "soft, other end")[0], [WAY[:7], 9 * WAY[:7]])
+    first = named(chart)["soft"]
+    np.testing.assert_allclose([first.lower, first.upper], [2.5 * WAY, 3.5 * WAY])
+    assert named(chart)["soft, other end"].colour == first.colour
+    assert "95 % by the card" in named(chart) and axis_ends(chart)[1][1] > 270.0
+
+
+def test_all_cases_with_the_same_loads_in_a_row():
+    panels = [BendPanel("one", [SOFT]), BendPanel("two", [STIFF]), BendPanel("lost"), BendPanel("")]
+    charts = bending_charts(panels, columns=2)
+    check_charts(charts)
+    one, two, lost, free = charts.charts
+    for chart in (one, two):
+        assert axis_ends(chart)[0] == pytest.approx((0.0, 1.06 * 40.0))
+        assert axis_ends(chart)[1] == pytest.approx((0.0, 1.06 * 200.0))
+    assert lost.title == "lost" and not lost.series and not (free.title or free.series)
+    # The page leaves out what has no curve.
+    assert [c.title for c in bending_charts(panels).charts] == ["one: RMS error 3.11 N", "two"]
+    with pytest.raises(ValueError, match="no cases to draw"):
+        bending_charts([BendPanel("none")])
+
+
+def test_readings_beyond_the_cards_are_seen():
+    """Load and deflection go as far as what was measured where that is more."""
+    short = BendLine("short", 0, WAY[:3], WAY[:3])
+    long = replace(MEASURED, readings=[(WAY[:7], 4.1 * WAY[:7])])
+    charts = bending_charts([BendPanel("one", [short], long)], misses=True)
+    check_charts(charts)
+    # Where the card does not go nothing is known of it.
+    off = lines(charts.charts[1], "short")[0][1]
+    assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
+
+
+def test_gas_in_kilopascal_and_litres():
+    charts = cylinders.gas_charts(CASE)
+    check_charts(charts)
+    left, right = charts.charts
+    np.testing.assert_allclose(data(left)[0], [-0.01 * WAY, 140.0 + 0.01 * WAY], atol=1e-9)
+    np.testing.assert_allclose(data(right)[0], [WAY, 140.0 + 0.01 * WAY])
+    assert legend(charts) == ["soft, from 50 litres", "stiff, from 50 litres"]
+    assert "litres" in left.x_label and "kPa" in left.y_label
+
+
+BODIES = cylinders.BeamBodies(((-500.0, -150.0), (500.0, -150.0)), 50.0, 10.0, 100.0, 80.0)
+#: Four quads in a row on the seen side, two behind: (n, 3) mm.
+Z = np.linspace(-600.0, 600.0, 5)
+POINTS = np.array([[x, y, z] for x in (80.0, -80.0) for y in (-75.0, 75.0) for z in Z])
+QUADS = np.array([[i, i + 1, i + 6, i + 5] for i in (0, 1, 2, 3, 10, 11)])
+STRAIN = np.array([0.01, 0.02, 0.03, -0.4, 0.9, 0.9])
+OUTLINE = np.array([[-600.0, -75.0], [600.0, -75.0], [600.0, 75.0], [-600.0, -75.0]])
+RING = (np.array([[-75.0, 0.0], [0.0, 75.0]]), np.array([[-70.0, -5.0], [0.0, 60.0]]))
+
+
+def test_the_side_is_the_half_that_is_seen():
+    charts = beam_charts(POINTS, QUADS, STRAIN, OUTLINE, RING, BODIES, "150 mm, 140 kPa")
+    check_charts(charts)
+    whole, close, cut = charts.charts
+    for chart, title in ((whole, "150 mm, 140 kPa"), (close, "at the collar")):
+        body = chart.series[0]
+        assert len(body.values) == 4 and np.abs(np.array(body.x, float)).max() <= 600.0
+        assert max(body.values) == pytest.approx(0.03)
+        assert chart.equal and chart.scale == "log strain along the axis"
+        np.testing.assert_array_equal(lines(chart, "inflated")[0].T, OUTLINE)
+        assert shown(chart) == ("z, mm", "y, mm", title)
+    tall = 100.0 + 4 * 12.0
+    for chart, ends in (
+        # The supports' feet below, the collar's wall above, and room.
+        (whole, ((-618.0, 618.0), (-220.0, 142.0))),
+        (close, ((-176.0, 176.0), (10.0 - tall, 10.0 + tall))),
+    ):
+        np.testing.assert_allclose(axis_ends(chart), ends)
+    for ring, z in zip(lines(whole, "support"), (-500.0, 500.0), strict=True):
+        assert np.hypot(ring[0] - z, ring[1] + 150.0) == pytest.approx(50.0, rel=1e-4)
+    walls = [(w[0].min(), w[0].max(), w[1].min(), w[1].max()) for w in lines(whole, "collar")]
+    assert walls == [(-40.0, 40.0, -102.0, -90.0), (-40.0, 40.0, 110.0, 122.0)]
+    for ring, name in zip(RING, ("inflated", "bent"), strict=True):
+        np.testing.assert_array_equal(lines(cut, name)[0].T, ring)
+    (ring,) = lines(cut, "collar")
+    assert np.hypot(ring[0], ring[1] - 10.0) == pytest.approx(106.0, rel=1e-4)
+
+
+def test_what_is_nearer_hides_what_is_behind():
+    """Quads on the half that is seen, its middle included, from the far to the near."""
+    x = np.array([40.0, -40.0, 0.0, 80.0])
+    side = np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]])  # z, y
+    points = np.array([[at, y, z + at] for at in x for z, y in side])
+    quads, strain = np.arange(16).reshape(4, 4), np.array([0.1, 0.2, 0.3, 0.4])
+    body = beam_charts(points, quads, strain, 0.1 * OUTLINE, RING, BODIES).charts[0].series[0]
+    assert body.values == [0.3, 0.1, 0.4]
+    middles = np.array(body.x, dtype=float).reshape(-1, 4).mean(axis=1)
+    assert middles == pytest.approx([0.0, 40.0, 80.0])
+
+
+@pytest.mark.parametrize(
+    ("supports", "collar", "rises", "ends"),
+    [
+        (-150.0, 0.0, 0.0, (-200.0, 112.0)),  # feet, collar
+        (0.0, 10.0, 0.0, (-102.0, 122.0)),  # collar
+        (0.0, -10.0, 95.0, (-122.0, 170.0)),  # collar, inflated beam
+        (0.0, 60.0, -80.0, (-155.0, 172.0)),  # beam, collar
+    ],
+)
+def test_the_lowest_and_the_highest(supports, collar, rises, ends):
+    """Of the beam now and before, of collar and supports, with 20 mm of room."""
+    axes = ((-500.0, supports), (500.0, supports))
+    bodies = replace(BODIES, supports=axes, collar_height=collar)
+    now = POINTS + np.array([0.0, min(rises, 0.0), 0.0])
+    before = OUTLINE + np.array([0.0, max(rises, 0.0)])
+    whole = beam_charts(now, QUADS, STRAIN, before, RING, bodies).charts[0]
+    assert axis_ends(whole)[1] == pytest.approx((ends[0] - 20.0, ends[1] + 20.0))
+
+
+@pytest.mark.parametrize(
+    ("strain", "ends"),
+    [([0.01, 0.02, 0.03, -0.4, 0.0, 0.0], (-0.03, 0.03)),
+     ([0.01, 0.02, 0.03, 0.0, 0.0, 0.0], (0.0, 0.03)),
+     ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (0.0, 1.0))],
+)  # fmt: skip
+def test_colours_of_wrinkles(strain, ends):
+    """All of them one colour."""
+    charts = beam_charts(POINTS, QUADS, np.array(strain), OUTLINE, RING, BODIES)
+    assert scale_ends(charts.charts[0]) == pytest.approx(ends)
+
+
+U = np.linspace(0.0, 4.0, 41)
+
+
+def strip(**changes):
+    fields = {
+        "direction": "warp", "points": ([3.0, 1.0, 5.0], [330.0, 90.0, 600.0]),
+        "models": [("Table 3.2", U[1:], 110 * U[1:]), ("bubble", U[1:21], 90 * U[1:21])],
+        "polynomial": (U, 100 * U), "scatter": 21.7, "rms": [3.107, 68.0],
+    }  # fmt: skip
+    return StripCurves(**{**fields, **changes})
+
+
+def test_loads_and_what_the_models_miss():
+    charts = load_charts("l", [strip(), strip(direction="bias45", rms=[50.1])])
+    check_charts(charts)
+    top, bias, low, _ = charts.charts
+    assert charts.columns == 2
+    np.testing.assert_allclose(lines(top, "Table 3.2")[0], [U, 110 * U], rtol=1e-5)
+    assert lines(top, "bubble")[0][0, -1] == pytest.approx(2.0)
+    np.testing.assert_allclose(lines(top, "load polynomial")[0], [U, 100 * U], rtol=1e-5)
+    assert lines(top, "measured")[0][0] == pytest.approx([3.0, 1.0, 5.0])
+    np.testing.assert_allclose(lines(low, "Table 3.2")[0], [U, 10 * U], rtol=1e-5, atol=1e-9)
+    assert lines(low, "bubble")[0][1, -1] == pytest.approx(-20.0)
+    # The measured points about their polynomial; it ends before the last of them.
+    assert lines(low, "measured")[0][1] == pytest.approx([0, -10.0, 30.0, np.nan], nan_ok=True)
+    scatter = named(low)["scatter of specimens (±)"]
+    assert (scatter.lower, scatter.upper) == ([-21.7] * 2, [21.7] * 2) and low.level == 0.0
+    assert low.title == "warp: RMS error Table 3.2 3.11 N, bubble 68 N"
+    assert bias.title == "45° bias: RMS error 50.1 N, scatter 21.7 N"
+    assert shown(top) == ("gauge elongation, mm", "load, N", "warp")
+    assert shown(low)[:2] == ("gauge elongation, mm", "difference, N")
+    names = ["load polynomial", "measured", "Table 3.2", "bubble", "scatter of specimens (±)"]
+    assert legend(charts) == names
+    # A model has one colour in all charts.
+    other = strip(models=[("bubble", U, 95 * U)], rms=())
+    drawn = load_charts("l", [strip(), other]).charts
+    assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
+
+
+def test_without_a_polynomial_the_points_are_the_target():
+    low = load_charts("l", [strip(polynomial=None, rms=())]).charts[1]
+    (spots,) = lines(low, "Table 3.2")
+    assert spots[0] == pytest.approx([0, 1, 3, 5])
+    assert spots[1] == pytest.approx([0, 20.0, 0.0, np.nan], nan_ok=True)
+    alone = strip(polynomial=None, points=None, rms=())
+    (chart,) = load_charts("l", [alone]).charts
+    assert [s.name for s in chart.series] == ["Table 3.2", "bubble"]
+    assert len(load_charts("l", [strip(), alone]).charts) == 3
+
+
+@pytest.mark.parametrize("least", [40.0, -40.0])
+def test_loads_stand_on_zero_and_all_are_seen(least):
+    """The axis begins at no load, or below where a machine recorded less."""
+    pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
+    low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
+    assert (low == 0.0 if least > 0 else low < least) and high > 200.0
+
+
+def test_measured_loads(shared_data):
+    """The published polynomials lie on the published points, to their scatter."""
+
+    def rows(path):
+        with path.open() as text:
+            return list(csv.DictReader(line for line in text if not line.startswith("#")))
+
+    points = rows(shared_data / "uniaxial/valmex7318_load_gauge.csv")
+    for row in rows(PUBLISHED / "published_uniaxial_polynomials.csv"):
+        own = [p for p in points if p["series"] == row["direction"]]
+        x, y = (np.array([float(p[k]) for p in own]) for k in ("gauge_disp_mm", "load_N"))
+        u = np.linspace(0.0, x.max(), 2001)  # to the last point, as they were fitted
+        load = np.polyval([*(float(row[f"c{k}"]) for k in (4, 3, 2, 1)), 0.0], u)
+        scatter = float(row["data_scatter_N"])
+        curve = StripCurves(row["direction"], [("p", u, load)], (x, y), (u, load), scatter)
+        off = lines(load_charts("l", [curve]).charts[1], "measured")[0][1]
+        assert np.sqrt(np.mean(off**2)) == pytest.approx(scatter, rel=0.03)
+
+
+def test_six_specimens_of_a_direction_are_named():
+    x = np.array([0.0, 1.0, 2.0])
+    warp = [(f"specimen {i}", x, (i + 1) * x) for i in range(8)]
+    left, right = strips.specimen_charts({"warp": warp, "fill": [("", x, 5 * x)]}).charts
+    for i, curve in enumerate(data(left)):
+        np.testing.assert_array_equal(curve, [x, (i + 1) * x])
+    assert [s.name for s in left.series] == [*(f"specimen {i}" for i in range(6)), "", ""]
+    assert len(right.series) == 1
+    assert shown(left) == ("elongation of the gauge, mm", "load, N", "warp")
+
+
+def draw_strip(shear, grips=True):
+    mesh = strip_mesh(4.0, 8.0, 4, 8, 3.0)
+    u = np.zeros_like(mesh.points)
+    u[:, 1] = 0.5 * (mesh.points[:, 1] - 8.0)
+    gauge = mesh.node_sets["gauge"]
+    return strips.strip_charts(mesh.points, mesh.quads, u, shear, gauge, "bias", grips)
+
+
+def test_deformed_strip():
+    shear = np.linspace(0.1, 0.6, 32)
+    charts = draw_strip(shear)
+    check_charts(charts)
+    (chart,) = charts.charts
+    body = chart.series[0]
+    assert (min(body.y), max(body.y)) == pytest.approx((-4.0, 8.0))
+    assert body.values == pytest.approx(shear, rel=1e-5)
+    edges = lines(chart, "at rest")[0].T.reshape(-1, 3, 2)
+    assert np.isnan(edges[:, 2]).all()
+    assert np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1).sum() == pytest.approx(24.0)
+    for name, long in (("gauge at rest, 3.00 mm", 3.0), ("gauge, 4.50 mm", 4.5)):
+        assert np.ptp(lines(chart, name)[0], axis=1) == pytest.approx([0.0, long])
+    upper, lower = lines(chart, "grips")
+    assert (upper[1].min(), upper[1].max()) == pytest.approx((8.0, 8.0 + 0.06 * 8.0))
+    assert (lower[1].min(), lower[1].max()) == pytest.approx((-4.0 - 0.06 * 8.0, -4.0))
+    assert np.ptp(upper[0]) == pytest.approx(max(body.x) - min(body.x))
+    assert chart.equal and chart.scale == "shear strain γ12" and chart.title == "bias"
+
+
+@pytest.mark.parametrize(
+    ("ends", "limits"),
+    [((-0.2, 0.6), (-0.6, 0.6)), ((-0.001, 0.6), (-0.001, 0.6)), ((0.0, 0.0), (0.0, 1.0))],
+)
+def test_the_scale_of_shear(ends, limits):
+    (chart,) = draw_strip(np.linspace(*ends, 32), grips=False).charts
+    assert scale_ends(chart) == pytest.approx(limits) and "grips" not in named(chart)
+
+
+def test_orders():
+    orders, rmse = [1, 2, 3, 4, 5], [70.0, 60.0, 30.0, 21.0, 20.0]
+    warp = OrderErrors("warp", orders, rmse, [72.0, 64.0, 33.0, 23.0, 800.0], 4)
+    charts = order_charts([warp, OrderErrors("fill", orders, rmse, rmse, 2)])
+    check_charts(charts)
+    left, right = charts.charts
+    assert (left.log_y, right.log_y) == (True, False)
+    assert (left.title, right.title) == ("warp: order 4", "fill: order 2")
+    assert shown(left)[:2] == ("order of the polynomial", "error of the load, N")
+    assert lines(left, "RMSE of the fit")[0].tolist() == [orders, rmse]
+    assert lines(left, "leave-one-out error")[0][1, -1] == 800.0
+    assert lines(left, "chosen order")[0].tolist() == [[4, 4], [21.0, 23.0]]
+    # Leaving out the one point that an order hangs on has no finite error.
+    lost = [np.nan] * 5
+    for left_out, first in ((lost, lost), ([*rmse[:4], np.inf], rmse)):
+        check_charts(order_charts([OrderErrors("warp", orders, first, left_out, 4)]))
+
+
+def test_biaxial_ratios():
+    load, strain = np.array([0.0, 5.0, 10.0]), np.array([[0.0, 0.0], [1.0, -0.2], [2.0, -0.5]])
+    panel = strips.BiaxialPanel("5:1", load, strain, [("m", load, 2 * strain)])
+    charts = strips.biaxial_charts("b", [panel])
+    check_charts(charts)
+    (chart,) = charts.charts
+    assert shown(chart) == ("larger load, kN/m", "strain, %", "ratio 5:1")
+    for k, yarn in enumerate(("warp", "fill")):
+        for name, factor in (("measured", 1), ("m", 2)):
+            drawn = lines(chart, f"{yarn}, {name}")[0]
+            np.testing.assert_array_equal(drawn, [load, factor * strain[:, k]])
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [(lambda: load_charts("l", []), "no strips"), (lambda: order_charts([]), "no directions"),
+     (lambda: strips.biaxial_charts("b", []), "no ratio"),
+     (lambda: draw_strip(np.zeros(3)), "3 shear strains for 32 quads")],
+)  # fmt: skip
+def test_nothing_to_draw(draw, words):
+    with pytest.raises(ValueError, match=words):
+        draw()
