@@ -39,16 +39,19 @@ def test_ends_of_the_axes():
     def chart(series, **look):
         return axis_ends(Chart("t", "x", "y", series, **look))
 
-    assert chart([line("a", [0, 4], [0, 5], band=([1, 1], [90, 90]))], top=10.0) == (
-        (0, 4),
-        (0, 10),
-    )
+    banded = line("a", [0, 4], [0, 5], band=([1, 1], [90, 90]))
+    assert chart([banded], top=10.0) == ((0, 4), (0, 10))
     assert all(high > low for low, high in chart([]))
     log = chart([line("", [1, 10], [-1, 100])], log_x=True, log_y=True)
     assert log[0] == (1.0, 10.0) and 0 < log[1][0] < 100 < log[1][1]
     assert chart([dots("", [1, 2], [1, 2])], x_names=("a", "b"))[0] == (0.5, 2.5)
     part = chart([line("", [0, 9], [0, 9])], x_range=(1, 2), y_range=(3, 4))
     assert part == ((1, 2), (3, 4))
+    # True to scale.
+    flat = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
+    width, height = (signal["value"] for signal in panel(flat)["signals"][:2])
+    (x0, x1), (y0, y1) = axis_ends(flat)
+    assert width / (x1 - x0) == pytest.approx(height / (y1 - y0), rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -121,13 +124,6 @@ def test_files(tmp_path):
             save(tmp_path / file, own)
 
 
-def test_a_drawing_true_to_scale():
-    chart = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
-    width, height = (signal["value"] for signal in panel(chart)["signals"][:2])
-    (x0, x1), (y0, y1) = axis_ends(chart)
-    assert width / (x1 - x0) == pytest.approx(height / (y1 - y0), rel=1e-3)
-
-
 def test_the_figure_of_the_page():
     """Named parts have names of their own; words are escaped."""
     chart = Chart("<t>", "x, mm", "y, N", [line("<a>", [0, 1], [0, 1]), line("b", [0, 1], [1, 1])])
@@ -136,6 +132,10 @@ def test_the_figure_of_the_page():
     assert "&lt;a&gt;" in one and "<a>" not in one
     names = [set(re.findall(r'id="([^"]+)"', text)) for text in (one, two)]
     assert names[0] and not names[0] & names[1]
+    # A dark screen has a colour for each.
+    style = vega.dark_style()
+    for light in (*vega.PALETTE, *vega.RISING):
+        assert f'svg [stroke="{light}"]' in style and vega.DARK[light] != light
 
 
 @pytest.mark.parametrize("bad", ["\x00", "\x1b", "\x01", "\ud800", "\uffff"])
@@ -146,12 +146,6 @@ def test_characters_that_no_drawing_may_hold(tmp_path, bad):
     chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
     assert "a\ufffdb" in figure(view(chart))
     assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
-
-
-def test_a_dark_screen_has_a_colour_for_each():
-    style = vega.dark_style()
-    for light in (*vega.PALETTE, *vega.RISING):
-        assert f'svg [stroke="{light}"]' in style and vega.DARK[light] != light
 
 
 def maps_at(places, one, two):

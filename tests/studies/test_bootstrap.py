@@ -320,22 +320,17 @@ def test_the_command_plan(tmp_path, few):
     with_range = replace(CARD, law=replace(CARD.law, strain_range=np.array(PLANNED_ENDS)))
     words, result, page, out = commanded(tmp_path, with_range, "plan", "project.toml")
     table = pd.read_csv(out / "plan.csv")
-    assert result["card"] == "of the fit" and result["tests"] == ["one", "two"]
     assert table["test"].tolist() == [NOW, *(c["test"] for c in result["candidates"])]
     assert table["rank"].tolist() == list(range(len(table)))
     first = result["candidates"][0]
     assert table.loc[1, "sigma_G12"] == pytest.approx(first["sigma"]["G12"], rel=1e-5)
     assert table.loc[1, "sigma_E1_at_0.1"] == pytest.approx(first["sigma_at"]["E1"][2], rel=1e-5)
     assert result["now"]["unknown"] == ["G12"]
-    said = words.splitlines()
-    assert next(line for line in said if line.split()[:1] == [NOW]).split()[-1] == "unknown"
-    assert next(line for line in said if line.startswith(" 1. ")).split()[1] in first["test"]
     for text in (first["test"], "unknown", "Assumed:"):
         assert text in page and text in words
     (chart,) = charts_of(out)["plan"]
-    assert chart.x_names[0] == "the present tests alone"
-    for rank, (own, one) in enumerate(zip(chart.x_names[1:], result["candidates"], strict=True), 1):
-        assert own.startswith(f"{rank}. {one['test']}")
+    for name, own in zip(chart.x_names[1:], table["test"][1:], strict=True):
+        assert own in name
     for series in chart.series:
         if series.name.endswith(", not known"):
             assert set(series.y) == {100.0}
@@ -406,15 +401,15 @@ def test_the_command_profile(tmp_path):
         tmp_path, PROFILED, "profile", "project.toml", "--modulus", "E1", "--modulus",
         "E2=0.02,0.1", "--strain", "0.04", "--test", "one", "--quiet", "--jobs", "2",
     )  # fmt: skip
-    names = [(one["modulus"], one["strain"]) for one in said["profiles"]]
+    first, *_ = every = said["profiles"]
+    names = [(one["modulus"], one["strain"]) for one in every]
     assert names == [("E1", 0.04), ("E2", 0.02), ("E2", 0.1)]
     table = pd.read_csv(folder / "profile.csv")
-    first = said["profiles"][0]
     own = table[(table["modulus"] == "E1") & (table["strain"] == 0.04)]
     np.testing.assert_allclose(own["MPa"], first["curve_MPa"], rtol=1e-8)
     np.testing.assert_allclose(own["minus_2_log_L"], first["curve_minus_2_log_L"], rtol=1e-8)
     np.testing.assert_allclose(own["by_sigma"], own["minus_2_log_L"], atol=0.01)
-    assert said["analyses"] > sum(one["analyses"] for one in said["profiles"])
+    assert said["analyses"] > sum(one["analyses"] for one in every)
     assert f"{said['analyses']} analyses" in words
     charts = charts_of(folder)["profiles"]
     assert len(charts) == 3 and charts[0].series[0].x == pytest.approx(own["MPa"], rel=1e-5)

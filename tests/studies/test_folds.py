@@ -77,42 +77,28 @@ def test_the_best_start_of_a_fold_counts(monkeypatch):
         return number
 
     def fit_from(problem, start, options):
-        assert options == "options"
-        best = SimpleNamespace(unknowns=f"of start {start}")
+        best = SimpleNamespace(unknowns=f"of start {start} by {options}")
         return ends[start] and SimpleNamespace(value=ends[start], best=best)
 
     monkeypatch.setattr(compare, "feasible_start", feasible_start)
     monkeypatch.setattr(compare, "fit_from", fit_from)
     problem = SimpleNamespace(reset=lambda: reset.append(1))
-    assert compare.best_of(setup_of(), problem, 5) == "of start 3"
+    assert compare.best_of(setup_of(), problem, 5) == "of start 3 by options"
     assert drawn == [(3, number) for number in range(5)] and len(reset) == 5
-    assert compare.best_of(setup_of(), problem, 3) == "of start 0"
+    assert compare.best_of(setup_of(), problem, 3) == "of start 0 by options"
     ends[0] = None
     assert compare.best_of(setup_of(), problem, 3) is None
 
 
 def test_a_fold_without_a_fit_or_an_analysis(monkeypatch):
-    mask, asked = np.array([True, False]), []
-
-    class Whole:
-        comparisons = (SimpleNamespace(name="bubble"), SimpleNamespace(name="warp"))
-
-        def part(self, numbers):
-            asked.append(numbers)
-            return SimpleNamespace(evaluate=lambda *a, **named: asked.append((a, named)))
-
-    def problem(masks):
-        asked.append({name: own.tolist() for name, own in masks.items()})
-        return Whole()
-
-    for unknowns, expected in (
-        (None, []),
-        ("unknowns", [{"warp": [False, True]}, [1], (("unknowns", False), {"warm": False})]),
-    ):
-        found = SimpleNamespace(problem=problem), unknowns
-        monkeypatch.setattr(compare, "fit_of", lambda *_, found=found: found)
-        assert compare._fold(setup_of(), 4, {"warp": mask}, 1) == FoldError(4, None, {})
-        assert asked == expected
+    part = SimpleNamespace(evaluate=lambda unknowns, jacobian, warm: None)
+    parts = (SimpleNamespace(name="bubble"), SimpleNamespace(name="warp"))
+    whole = SimpleNamespace(comparisons=parts, part=lambda numbers: {(1,): part}[tuple(numbers)])
+    own = SimpleNamespace(problem=lambda masks: {(False, True): whole}[tuple(masks["warp"])])
+    for unknowns in (None, "unknowns"):
+        monkeypatch.setattr(compare, "fit_of", lambda *_, y=unknowns: (own, y))
+        masks = {"warp": np.array([True, False])}
+        assert compare._fold(setup_of(), 4, masks, 1) == FoldError(4, None, {})
 
 
 THREE = """
