@@ -123,11 +123,7 @@ def height_charts(
     modelled: Sequence[ArrayLike],
     measured_label: str = "measured",
 ) -> Charts:
-    """Return modelled against measured z, and their difference (as Figs 4.7 and 5.5).
-
-    pressures : (frames,) MPa. measured, modelled : for each frame (k,) mm, at the same points.
-    measured_label : "known" where the data were computed.
-    """
+    """Return modelled against measured z (k,) mm of each frame, and their difference."""
     frames = np.asarray(pressures, dtype=float)
     pairs = [
         (np.asarray(a, dtype=float).ravel(), np.asarray(b, dtype=float).ravel())
@@ -166,11 +162,7 @@ def rise_charts(pressures: ArrayLike, rises: ArrayLike) -> Charts:
 
 
 def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
-    """Return pressure and height of every frame over time, and one over the other.
-
-    times : (frames,) s, by the log's clock. pressures : (frames,) MPa, NaN beyond the log. heights
-    : (frames,) mm, of the apex. taken : (n,) MPa, pressures of the frames that are used.
-    """
+    """Return pressure (MPa, NaN beyond the log) and apex (mm) over time, and over each other."""
     kilos, known = 1e3 * pressures, np.isfinite(pressures)
     near = [int(np.argmin(np.where(known, np.abs(pressures - p), np.inf))) for p in taken]
     time, pressure, height = "time by the log's clock, s", "pressure, kPa", "height of the apex, mm"

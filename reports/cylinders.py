@@ -80,13 +80,7 @@ class BeamBodies:
 def bending_charts(
     panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
 ) -> Charts:
-    """Return load over deflection, a chart a case; cases without curves are left out of a page.
-
-    In a file of several columns charts of one row have the same loads; a panel without a title
-    leaves its place free. A band is what the card leaves open; the other end of the solver's band
-    is a dashed curve of the card's colour. misses : whether charts of model less mean follow, of
-    cases that were measured.
-    """
+    """Return load over deflection, a chart a case; in columns, a row has the same loads."""
     if not any(panel.lines for panel in panels):
         raise ValueError("bending_charts: no cases to draw")
     drawn = [panel for panel in panels if panel.lines or columns > 1]

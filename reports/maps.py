@@ -142,11 +142,7 @@ def maps_of(
     rows: Sequence[tuple[str, str, Sequence[Array], Sequence[Array], Sequence[Array]]],
     labels: tuple[str, str], caption: str, alt: str,
 ) -> Maps:  # fmt: skip
-    """Return maps of several quantities: measured, modelled and their difference.
-
-    places : (n, 2) mm of each load. rows : name, unit, and of each load (n,) measured, modelled and
-    their difference, of each quantity. labels : of the axes.
-    """
+    """Return maps of measured, modelled and difference (n,), a row with a unit a quantity."""
     every = [max(1, -(-len(own) // MOST_PLACES)) for own in places]
 
     def thin(parts: Sequence[ArrayLike]) -> Array:

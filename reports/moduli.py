@@ -118,11 +118,7 @@ def moduli_together(
 
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
-    """Return charts of the relative uncertainty of the moduli from each test and all together.
-
-    strains : (3, k). sigma : by name, (3, k), one standard deviation in percent of the modulus;
-    what is above `NOT_DETERMINED`, or not finite, is marked by triangles there.
-    """
+    """Return 1 sigma, % of the modulus, (3, k) by test; triangles above `NOT_DETERMINED`."""
     x, charts = np.asarray(strains, dtype=float), []
     for m, (title, label) in enumerate(PANELS):
         series: list[Series] = []

@@ -78,11 +78,7 @@ def optima_chart(
     label: str = "objective",
     references: Mapping[str, float] | None = None,
 ) -> Charts:
-    """Return a chart of the optima of a multistart, from worst to best.
-
-    objectives : (starts,); starts that failed are NaN or infinite and only counted. label : of
-    the objective, with its unit. references : published ones by name, as lines.
-    """
+    """Return the optima (starts,), worst to best, NaN counted, and published ones as lines."""
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     ended = np.maximum(np.sort(values[np.isfinite(values)])[::-1], PERFECT)
     failed = len(values) - len(ended)
@@ -147,11 +143,7 @@ def nu12_charts(
     response: str,
     caption: str,
 ) -> Charts:
-    """Return a chart a model of responses relative to that at the base nu12.
-
-    models : by name of the model and of the response, nu12 and ratio, (n,) each; a ratio that is
-    not finite is a gap. base : nu12 where the ratio is one. response : its name on the axis.
-    """
+    """Return responses over that at the base nu12, a chart a model: nu12 and ratio (n,)."""
     if not models:
         raise ValueError("nu12_charts: no models to draw")
     charts, label = [], f"{response} / that at nu12 = {base:g}"
@@ -206,12 +198,7 @@ def weights_charts(
     moduli: Mapping[str, Mapping[float, Sequence[float]]],
     sigma: Mapping[str, Sequence[float] | None],
 ) -> list[Charts]:
-    """Return charts of the errors of the tests, then of the moduli, over a weight.
-
-    counted : the kind of test that is weighted. counts : times the project's weight. errors :
-    relative, by test. moduli : MPa, by name and strain. sigma : relative, by name, at these strains
-    where the weight is as written; None where it is not known.
-    """
+    """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
     across = f"weight of {counted}, times that of the project"
     drawn = [
         line(name, counts, 100 * np.asarray(values), colour=rank, marks=True)
@@ -253,11 +240,7 @@ def held_out_charts(
 
 
 def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption: str) -> Charts:
-    """Return the errors of each form: of its fit, cross-validated, and of every single fold.
-
-    noise : of the specimens, which no law can beat, as a line. label : of the error, with its
-    unit. The axis is logarithmic where the errors span more than a decade.
-    """
+    """Return errors of forms: of the fit, cross-validated, of every fold; noise, a line."""
     if not rows:
         raise ValueError("law_charts: no laws to draw")
     names = [_form(row) for row in rows]

@@ -75,11 +75,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Bootstrap(Presented):
-    """Fits to samples of a fit's data.
-
-    found : the fit to all of the data. over : the sort of units, by `groups`. before : analyses
-    before the first sample.
-    """
+    """Fits to samples of a fit's data; over : sort of units; before : analyses before the first."""
 
     found: Optimum
     over: str
@@ -138,11 +134,7 @@ class Bootstrap(Presented):
         return {name: (samples[name], fit[name]) for name in samples}
 
     def coefficients(self) -> pd.DataFrame:
-        """Return a row an unknown: value, sigma of the samples and of the fit, and correlations.
-
-        Columns unknown, value, sigma, sigma_of_fit (MPa of a coefficient, else its own unit),
-        then the correlations over the samples by name of the other unknown.
-        """
+        """Return a row an unknown: value, sigma of samples and of the fit, correlations."""
         import pandas as pd
 
         own, known = self.found.problem.unknowns, self.found.posterior

@@ -186,11 +186,7 @@ def errors_of_folds(
     setup: FitSetup, found: Fit, folds: int, starts: int, folder: Path | None,
     tell: Callable[[FoldError | None], None],
 ) -> tuple[FoldError, ...]:  # fmt: skip
-    """Return the errors of the folds, read where the folder has them of this fit.
-
-    folds : at most; starts : random starts of each. folder : None where nothing is written. tell :
-    called with each fold that ended, and with None now and then.
-    """
+    """Return the errors of at most so many folds, read where the folder has them of this fit."""
     depends = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
     record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
     for event in validate(setup, folds, starts, tuple(record.rows)):

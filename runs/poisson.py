@@ -152,11 +152,7 @@ def vary_nu12(
     tests: str | Sequence[str] | None = None, progress: Progress | None = None,
     kept: RunCache | None = None,
 ) -> Nu12Study:  # fmt: skip
-    """Run tests with a card whose Poisson's ratio is changed, the moduli as they are.
-
-    values : of nu12. card, tests, progress, kept : as for `refine`. Raises InputError: a value out
-    of range, no such test; SolverFailure: of the card as it is, or of all other values.
-    """
+    """Run tests with a card whose nu12 is changed; raises InputError, SolverFailure."""
     for value in values:
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")

@@ -138,11 +138,7 @@ def _sizes(sizes: ArrayLike, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One refinement of a part.
-
-    factor : how much finer than the project's own. size : edge length (mm) or step (share of the
-    whole load), as refined.
-    """
+    """One refinement of a part by a factor; size : edge (mm), or step (share of the load)."""
 
     part: Part
     factor: float
@@ -182,11 +178,7 @@ class LevelRun:
 
 @dataclass(frozen=True, eq=False)
 class Refinement(Presented):
-    """The result of a study of refinement: runs by part, coarse to fine.
-
-    noise : relative accuracy of the solver's displacements and loads. warnings : about the whole
-    study, beside those of its runs.
-    """
+    """A study of refinement: runs by part, coarse to fine; noise : relative, of the solver."""
 
     project: Path
     card: str
@@ -336,11 +328,7 @@ def rms_changes(runs: Sequence[LevelRun]) -> list[float]:
 
 
 def rms_between(coarse: Curve, fine: Curve) -> float:
-    """Return the root mean square of the difference of two curves (x, y), where the coarse one is.
-
-    The fine one is interpolated linearly where it has no point there; both start at the origin.
-    Where it stopped early they are compared up to there.
-    """
+    """Return the RMS difference of curves at the coarse one's x, as far as the fine one goes."""
     (x, y), (fx, fy) = coarse, fine
     both = x <= fx[-1] * (1 + 1e-9)
     x, y = x[both], y[both]

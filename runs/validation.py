@@ -152,11 +152,7 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """One law (a form that was fitted, or a card) at one test.
-
-    predicted : by the fit to the rest of the data, or by the card. fitted : by the fit to all of
-    them, None for a card.
-    """
+    """A form or card at one test: predicted by the rest of the data or the card, fitted by all."""
 
     law: str
     predicted: HeldOut
@@ -337,11 +333,7 @@ def errors_left_out(
     setup: FitSetup, parts: Sequence[Part], starts: int, folder: Path | None, file: str,
     tell: Callable[[str | None], None],
 ) -> list[HeldOut]:  # fmt: skip
-    """Return the errors at each part of the fit without it, read where the folder has them.
-
-    folder, file : where each part is written as it ends; None for nowhere. tell : called with the
-    words of each part that ended, and with None now and then.
-    """
+    """Return the errors at each part of the fit without it, read where the file has them."""
     names = [name_of(setup, part) for part in parts]
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
     mark = mark_of(of)

@@ -57,11 +57,7 @@ class WeightedFit:
 
 @dataclass(frozen=True, eq=False)
 class WeightStudy(Presented):
-    """Fits over the weight of some of the tests.
-
-    counted : the kind or name asked for, names : of the tests. found : the fit at the project's
-    weights. runs : by rising weight.
-    """
+    """Fits over the weight of the tests counted (names); found : at the project's weights."""
 
     title: str
     counted: str

@@ -243,12 +243,7 @@ SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
 def numbers(
     subjects: Iterable[str] = SUBJECTS, data: Path | None = None
 ) -> Iterator[tuple[str, list[Number]]]:
-    """Yield the numbers of each subject; none where its program is not installed.
-
-    data : folder of the measured strips, which are not part of the program; they come last. Raises
-    InputError: there is no such subject, or no such data; SolverFailure: an analysis did not end
-    well.
-    """
+    """Yield each subject's numbers, none without its program, then those of the measured data."""
     for subject in (chosen := list(subjects)):
         if subject not in SUBJECTS:
             problem = f"{subject!r} is not one of: {', '.join(SUBJECTS)}"
