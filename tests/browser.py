@@ -11,13 +11,10 @@ from bubblefit.reports.html import BROWSERS, browser_command
 
 from . import needs
 
-#: Seconds that anything may take.
 PATIENCE = 60.0
 
 
 class Browser:
-    """One page of a browser: what it loads, what it complains of, and how it looks."""
-
     def __init__(self, into, out):
         self._into, self._out, self._number, self._rest = into, out, 0, b""
         self._session, self.complaints, self.requests = None, [], []
@@ -30,7 +27,6 @@ class Browser:
                   downloadThroughput=0, uploadThroughput=0)  # fmt: skip
 
     def call(self, method, **parameters):
-        """The answer to a command."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": parameters}
         if self._session is not None:
@@ -44,7 +40,6 @@ class Browser:
         raise AssertionError("the browser has gone")
 
     def open(self, page):
-        """Open a file and wait until its script says that it is ready."""
         self.call("Page.navigate", url=page.resolve().as_uri())
         end = time.monotonic() + PATIENCE
         while self.run("document.documentElement?.dataset.ready") != "yes":
@@ -52,25 +47,21 @@ class Browser:
             time.sleep(0.05)
 
     def run(self, script, **options):
-        """The value of an expression in the page."""
         call = {"expression": script, "returnByValue": True, **options}
         answer = self.call("Runtime.evaluate", **call)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
     def wait(self, script):
-        """The value of a promise in the page."""
         return self.run(script, awaitPromise=True)
 
     def box(self, selector):
-        """Place and size of the first element of a selector."""
         return self.run(
             "(({x, y, width, height}) => [x, y, width, height])"
             f"(document.querySelector({selector!r}).getBoundingClientRect())"
         )
 
     def press(self, selector, key):
-        """Give the first element of a selector the focus, and press a key there."""
         assert self.run(f"document.querySelector({selector!r}).focus(), 1") == 1
         assert self.run(f"document.activeElement.matches({selector!r})"), f"{selector}: no focus"
         code = {"Home": 36, "ArrowLeft": 37, "ArrowRight": 39}.get(key, 0)
@@ -82,7 +73,6 @@ class Browser:
         self.wait("new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))")
 
     def look(self, selector):
-        """A picture of the first element of a selector."""
         x, y, width, height = self.box(selector)
         x, y = x + self.run("scrollX"), y + self.run("scrollY")
         clip = {"x": x, "y": y, "width": width, "height": height, "scale": 1}

@@ -7,39 +7,32 @@ from bubblefit.reports.charts import Charts, axis_ends
 from bubblefit.reports.content import read_page_data
 from bubblefit.reports.vega import picture
 
-#: Axes that are plain numbers, ratios or names.
 WITHOUT_UNIT = ("nu12", "strain", "share", "objective", "order", "start", "form", "-2 log L",
                 "test", "weight", "load / ", "left out", "elements", "seconds", "largest", "/ that",
                 "stress error", "error", "e")  # fmt: skip
 
 
 def charts_of(folder):
-    """Charts of the page, from the data beside it, by name."""
     return {p.name: p.charts for p in read_page_data(folder).parts if isinstance(p, Charts)}
 
 
 def data(chart):
-    """(2, k) of every series of lines or dots, in order; what is not there is NaN."""
     return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.look in ("line", "dots")]
 
 
 def named(chart):
-    """The series by name; of several with one name the first."""
     return {s.name: s for s in reversed(chart.series)}
 
 
 def lines(chart, name):
-    """(2, k) of every line or cloud of the name."""
     return [np.array([s.x, s.y], dtype=float) for s in chart.series if s.name == name and s.y]
 
 
 def legend(charts):
-    """Names of all series, each once."""
     return list(dict.fromkeys(s.name for chart in charts.charts for s in chart.series if s.name))
 
 
 def shown(chart):
-    """Words of the axes, x and y, and the title."""
     return chart.x_label, chart.y_label, chart.title
 
 
@@ -101,7 +94,6 @@ def check_charts(charts):
             assert isfinite(low) and isfinite(high) and low < high and (low > 0 or not log), where
         if chart.x_range or chart.y_range or chart.x_names:
             continue
-        # Axes hold every curve, unless they say that they show a part.
         for a, b in ((a, b) for s in chart.series for a, b in zip(s.x, s.y, strict=False)):
             if a is None or b is None:
                 continue

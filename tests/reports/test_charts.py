@@ -47,7 +47,6 @@ def test_ends_of_the_axes():
     assert chart([dots("", [1, 2], [1, 2])], x_names=("a", "b"))[0] == (0.5, 2.5)
     part = chart([line("", [0, 9], [0, 9])], x_range=(1, 2), y_range=(3, 4))
     assert part == ((1, 2), (3, 4))
-    # True to scale.
     flat = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
     width, height = (signal["value"] for signal in panel(flat)["signals"][:2])
     (x0, x1), (y0, y1) = axis_ends(flat)
@@ -75,7 +74,6 @@ def test_colours_of_values(strain, shades, ends):
 
 
 def test_every_value_is_given_to_vega():
-    """A band, a curve with a gap and an end, dots with error bars: each a mark of its data."""
     curve = line(
         "a", [0, 1, 2, 4], [0, 5, np.nan, 10], band=([0, 4, 4, 9], [1, 6, 6, 10]), ends=True
     )
@@ -115,7 +113,6 @@ def test_files(tmp_path):
     with Image.open(tmp_path / "c.png") as picture:
         assert picture.width > 1000 and len(picture.convert("RGB").getcolors(1 << 20)) > 4
     text = (tmp_path / "c.svg").read_text()
-    # Two squares, true to scale, in the colours of the least and the largest value.
     assert text.count(f'fill="{vega.COLOURS["from least"][0]}"') >= 1
     assert "one &amp; &lt;two&gt;" in text
     for file, own, words in (("none.png", Charts("c", [], ""), "nothing to draw"),
@@ -125,14 +122,12 @@ def test_files(tmp_path):
 
 
 def test_the_figure_of_the_page():
-    """Named parts have names of their own; words are escaped."""
     chart = Chart("<t>", "x, mm", "y, N", [line("<a>", [0, 1], [0, 1]), line("b", [0, 1], [1, 1])])
     one, two = figure(view(chart)), figure(view(replace(chart, title="other")))
     assert one.startswith('<svg class="chart" viewBox="0 0 ') and 'aria-label="&lt;t&gt;"' in one
     assert "&lt;a&gt;" in one and "<a>" not in one
     names = [set(re.findall(r'id="([^"]+)"', text)) for text in (one, two)]
     assert names[0] and not names[0] & names[1]
-    # A dark screen has a colour for each.
     style = vega.dark_style()
     for light in (*vega.PALETTE, *vega.RISING):
         assert f'svg [stroke="{light}"]' in style and vega.DARK[light] != light
@@ -140,7 +135,6 @@ def test_the_figure_of_the_page():
 
 @pytest.mark.parametrize("bad", ["\x00", "\x1b", "\x01", "\ud800", "\uffff"])
 def test_characters_that_no_drawing_may_hold(tmp_path, bad):
-    """They would end the process."""
     words = f"a{bad}b"
     series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
     chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
@@ -163,7 +157,6 @@ def test_many_points_are_thinned():
 
 
 def test_maps_of_a_row_share_their_colours():
-    """Measured and modelled; what is left has its own, about zero."""
     places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     found = maps_at(places, np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0]))
     for own, ends in zip(found.panels, ((0, 4), (0, 4), (-2, 2)), strict=True):
@@ -178,7 +171,6 @@ def test_maps_of_a_row_share_their_colours():
 
 
 def test_a_surface_from_the_front_and_from_above():
-    """Right is right, up is up; what is nearer comes later."""
     points = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     for height, places, nearness in ((0.0, [[1, 0], [0, 0], [0, 1]], [0, -1, 0]),
                                      (90.0, [[1, 0], [0, 1], [0, 0]], [0, 0, 1])):  # fmt: skip
@@ -193,7 +185,6 @@ def test_a_surface_from_the_front_and_from_above():
 
 
 def test_a_surface_is_whole_and_clear_of_its_colour_bar():
-    """However it is turned, from straight above, too; and as large as that allows."""
     turn = np.linspace(0, 2 * np.pi, 25)
     rim = np.column_stack([100 * np.cos(turn), 100 * np.sin(turn), 0 * turn])[None]
     reach = maps.scale_of(rim) * 100

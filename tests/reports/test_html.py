@@ -30,7 +30,6 @@ from bubblefit.reports.html import number, percent, write_page, write_report
 from bubblefit.reports.maps import Shade, Solid, maps_of, pack, write_vtu
 from PIL import Image
 
-#: A square of four quads, raised more and more.
 PLACES = np.array([(x, y) for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
 QUADS = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
 HEIGHTS = [k * (2.0 - (PLACES**2).sum(axis=1)) for k in (1.0, 2.0)]
@@ -69,8 +68,6 @@ def full_report():
 
 
 class Tags(HTMLParser):
-    """Checks that tags close in order, and collects links and labels."""
-
     def __init__(self):
         super().__init__()
         self.open, self.links, self.pictures = [], [], []
@@ -89,7 +86,6 @@ class Tags(HTMLParser):
 
 
 def drawn(folder):
-    """A picture where the report has it."""
     path = folder / "figures" / "sorted optima.png"
     path.parent.mkdir()
     Image.new("RGB", (60, 60), "white").save(path)
@@ -98,7 +94,6 @@ def drawn(folder):
 
 @pytest.fixture(scope="module")
 def full(tmp_path_factory):
-    """The folder of a full report."""
     folder = tmp_path_factory.mktemp("full")
     drawn(folder)
     return write_report(folder, full_report()).parent
@@ -114,13 +109,11 @@ def test_page_is_well_formed_and_loads_nothing(full, tmp_path):
         outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
         assert "@import" not in outside and not re.search(r"url\((?!#)", outside)
         assert len(text) < 5_000_000
-        # Whoever does not see a figure reads what it shows.
         assert all(own.get("alt") or own.get("aria-label") for own in tags.pictures)
         assert len(tags.pictures) == pictures
 
 
 def test_page_runs_nothing_but_its_own_script(full):
-    """A hash of the very bytes between the tags; everything else is forbidden."""
     text = (full / "report.html").read_text(encoding="utf-8")
     rules = re.search(r'Security-Policy" content="(.*?)"', text)
     allowed = dict(rule.split(" ", 1) for rule in rules[1].replace("&#39;", "'").split("; "))
@@ -181,7 +174,6 @@ def test_data_that_are_no_page(tmp_path, content, said):
 
 
 def test_data_are_strict_json(tmp_path):
-    """What is no number is missing, in curves and in tables alike."""
     chart = Chart("a", "x", "y", [line("b", [0, 1, np.nan], [np.inf, 2, 3])])
     table = Table("t", ["a"], [[np.float64("nan")], [np.int64(3)]])
     report = Report("x", sections=[Section("s", [Charts("c", [chart], ""), table])])

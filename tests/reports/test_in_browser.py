@@ -11,7 +11,6 @@ from .. import needs
 from ..browser import BROWSERS, browser
 from .test_html import PLACES, drawn, full_report
 
-#: Words of the axes of the first chart, in the order of the alphabet; what is said beside it.
 TICKS = (
     "[...document.querySelectorAll('.charts .view')[0].querySelectorAll('.role-axis text')]"
     ".map(own => own.textContent).sort().join(' ')"
@@ -30,7 +29,6 @@ TEXTS = "Promise.all(kept.filter(one => one instanceof Blob).map(b => b.text()))
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    """A page with a part of every sort, alone in a folder."""
     folder = tmp_path_factory.mktemp("written")
     drawn(folder)
     alone = tmp_path_factory.mktemp("alone") / "mailed.html"
@@ -46,7 +44,6 @@ def opened(page, tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def no_complaint(opened):
-    """Nothing is complained of, and nothing asked for but the file itself."""
     yield
     assert opened.complaints == []
     urls = [url.partition(":")[0] for url in opened.requests]
@@ -95,7 +92,6 @@ def test_a_chart_tells_its_values_and_zooms(opened):
     assert opened.run(TICKS) != whole
     opened.press(".charts svg", "0")
     assert opened.run(TICKS) == whole and opened.run(SAID) == ""
-    # The value under the mouse, and a part dragged.
     opened.run("document.querySelector('.charts svg').scrollIntoView(), 1")
     x, y, wide, tall = opened.box(".charts svg")
     for kind, at in (("Moved", 0.5), ("Pressed", 0.4), ("Moved", 0.6), ("Released", 0.6)):

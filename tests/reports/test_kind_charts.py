@@ -58,7 +58,6 @@ def test_cuts(points):
 
 @pytest.mark.parametrize(("lift", "bottom"), [(5.0, 0.0), (-50.0, -52.0)])
 def test_cuts_stand_on_the_sheet(lift, bottom):
-    """The axis begins with height zero, or below where a frame hangs lower; some are drawn."""
     many = cut_charts("b", np.linspace(0.01, 0.3, 20), FULL, np.array([cap(FULL, 9.0)] * 20))
     assert len(many.charts[0].series) == bubbles.MOST == 8 and "Of 20 pressures 8" in many.caption
     hung = cut_charts("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
@@ -95,7 +94,6 @@ def test_heights_are_drawn_against_each_other():
 
 
 def sheet(count):
-    """(count, 2) mm, evenly over the disk."""
     place = np.arange(count) + 0.5
     r, t = 99.0 * np.sqrt(place / count), 2.4 * place
     return np.column_stack([r * np.cos(t), r * np.sin(t)])
@@ -113,7 +111,6 @@ def test_registration(count, step):
         np.testing.assert_allclose(lines(chart, "rim")[0].T, EDGE, rtol=1e-5, atol=1e-9)
         assert chart.equal and f"{chart.title}, {chart.scale}" == title
         assert shown(chart)[:2] == ("x, mm", "y, mm")
-        # From the centre half way to the rim.
         assert lines(chart, "warp")[0].tolist() == [[0, 50], [0, 0]]
         assert lines(chart, "fill")[0].tolist() == [[0, 0], [0, 50]]
 
@@ -194,7 +191,6 @@ ROWS = np.vstack(
 
 
 def still(points):
-    """Risen by 1 mm for every mm of x, not moved aside."""
     return np.column_stack([0 * points, points[:, 0]])
 
 
@@ -218,7 +214,6 @@ def test_points_of_a_cut(points, used):
 
 @pytest.mark.parametrize(("on", "taken"), [(5, 5), (4, 81)])
 def test_five_nodes_on_the_axis_are_its_profile(on, taken):
-    """Of fewer, the mesh is cut at as many places from end to end."""
     x = np.linspace(0.0, 80.0, on)
     beside = np.column_stack([np.repeat([0.0, 80.0], 2), np.tile([-10.0, 10.0], 2)])
     points = np.vstack([np.column_stack([x, 0 * x]), beside])
@@ -234,7 +229,6 @@ def test_five_nodes_on_the_axis_are_its_profile(on, taken):
 
 @pytest.mark.parametrize("cut", [node_cut, point_cut])
 def test_heights_at_rest_do_not_count(cut):
-    """Points of a measured sheet have three coordinates: places are told by x and y."""
     draw = np.random.default_rng(2)
     flat = draw.uniform(-50, 50, (200, 2))
     moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
@@ -281,7 +275,6 @@ def test_loads_and_what_the_cards_miss():
 
 
 def test_bands_of_the_solver_and_of_the_card():
-    """The other end stops before; the axes hold both."""
     own = replace(SOFT, other=(WAY[:7], 9 * WAY[:7]), off=0.5 * WAY)
     charts = bending_charts([BendPanel("one", [own, STIFF], spread="95 % by the card")])
     check_charts(charts)
@@ -302,19 +295,16 @@ def test_all_cases_with_the_same_loads_in_a_row():
         assert axis_ends(chart)[0] == pytest.approx((0.0, 1.06 * 40.0))
         assert axis_ends(chart)[1] == pytest.approx((0.0, 1.06 * 200.0))
     assert lost.title == "lost" and not lost.series and not (free.title or free.series)
-    # The page leaves out what has no curve.
     assert [c.title for c in bending_charts(panels).charts] == ["one: RMS error 3.11 N", "two"]
     with pytest.raises(ValueError, match="no cases to draw"):
         bending_charts([BendPanel("none")])
 
 
 def test_readings_beyond_the_cards_are_seen():
-    """Load and deflection go as far as what was measured where that is more."""
     short = BendLine("short", 0, WAY[:3], WAY[:3])
     long = replace(MEASURED, readings=[(WAY[:7], 4.1 * WAY[:7])])
     charts = bending_charts([BendPanel("one", [short], long)], misses=True)
     check_charts(charts)
-    # Where the card does not go nothing is known of it.
     off = lines(charts.charts[1], "short")[0][1]
     assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
 
@@ -352,7 +342,6 @@ def test_the_side_is_the_half_that_is_seen():
         assert shown(chart) == ("z, mm", "y, mm", title)
     tall = 100.0 + 4 * 12.0
     for chart, ends in (
-        # The supports' feet below, the collar's wall above, and room.
         (whole, ((-618.0, 618.0), (-220.0, 142.0))),
         (close, ((-176.0, 176.0), (10.0 - tall, 10.0 + tall))),
     ):
@@ -368,7 +357,6 @@ def test_the_side_is_the_half_that_is_seen():
 
 
 def test_what_is_nearer_hides_what_is_behind():
-    """Quads on the half that is seen, its middle included, from the far to the near."""
     x = np.array([40.0, -40.0, 0.0, 80.0])
     side = np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]])  # z, y
     points = np.array([[at, y, z + at] for at in x for z, y in side])
@@ -389,7 +377,6 @@ def test_what_is_nearer_hides_what_is_behind():
     ],
 )
 def test_the_lowest_and_the_highest(supports, collar, rises, ends):
-    """Of the beam now and before, of collar and supports, with 20 mm of room."""
     axes = ((-500.0, supports), (500.0, supports))
     bodies = replace(BODIES, supports=axes, collar_height=collar)
     now = POINTS + np.array([0.0, min(rises, 0.0), 0.0])
@@ -405,7 +392,6 @@ def test_the_lowest_and_the_highest(supports, collar, rises, ends):
      ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (0.0, 1.0))],
 )  # fmt: skip
 def test_colours_of_wrinkles(strain, ends):
-    """All of them one colour."""
     charts = beam_charts(POINTS, QUADS, np.array(strain), OUTLINE, RING, BODIES)
     assert scale_ends(charts.charts[0]) == pytest.approx(ends)
 
@@ -443,7 +429,6 @@ def test_loads_and_what_the_models_miss():
     assert shown(low)[:2] == ("gauge elongation, mm", "difference, N")
     names = ["load polynomial", "measured", "Table 3.2", "bubble", "scatter of specimens (±)"]
     assert legend(charts) == names
-    # A model has one colour in all charts.
     other = strip(models=[("bubble", U, 95 * U)], rms=())
     drawn = load_charts("l", [strip(), other]).charts
     assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
@@ -462,7 +447,6 @@ def test_without_a_polynomial_the_points_are_the_target():
 
 @pytest.mark.parametrize("least", [40.0, -40.0])
 def test_loads_stand_on_zero_and_all_are_seen(least):
-    """The axis begins at no load, or below where a machine recorded less."""
     pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
     low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
     assert (low == 0.0 if least > 0 else low < least) and high > 200.0
@@ -547,7 +531,6 @@ def test_orders():
     assert lines(left, "RMSE of the fit")[0].tolist() == [orders, rmse]
     assert lines(left, "leave-one-out error")[0][1, -1] == 800.0
     assert lines(left, "chosen order")[0].tolist() == [[4, 4], [21.0, 23.0]]
-    # Leaving out the one point that an order hangs on has no finite error.
     lost = [np.nan] * 5
     for left_out, first in ((lost, lost), ([*rmse[:4], np.inf], rmse)):
         check_charts(order_charts([OrderErrors("warp", orders, first, left_out, 4)]))

@@ -21,7 +21,6 @@ PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
      ([np.nan], "1 start, 1 without a result"), ([3], "1 start: best 3, median 3, worst 3")],
 )  # fmt: skip
 def test_optima(values, said):
-    """Every start that ended, worst first; a line at every published value."""
     ended = sorted((v for v in values if np.isfinite(v)), reverse=True)
     for references in (PUBLISHED, {}):
         charts = studies.optima_chart(values, "Words", "RMS, mm", references)
@@ -62,7 +61,6 @@ def test_laws():
 
 
 def test_profiles():
-    """One end is not closed: then there is no line at it."""
     panel = ProfilePanel(
         "E1 at 1 %", [90.0, 100.0, 120.0], [5.0, 0.0, 2.0], 100.0, 5.0, (92.5, None), (90.0, 110.0)
     )
@@ -98,7 +96,6 @@ def test_nu12():
 
 
 def test_weights():
-    """Errors in percent; a bar of one standard deviation where the weight is as written."""
     moduli = {"E1": {0.0: [90.0, 100.0, 110.0], 0.05: [50.0, 60.0, 70.0]}, "G12": {0.0: [1, 2, 3]}}
     sigma = {"E1": [0.1, 0.05], "G12": None}
     relative = {"one": [0.01, 0.02, 0.03]}
@@ -113,7 +110,6 @@ def test_weights():
 
 
 def test_names_stand_where_numbers_would():
-    """Aslant where there is no room."""
     names = ["one", "two & a name that is far too long for its place in the row", *"abcd"]
     sigma = {"E1": [1.0, 20.0, 100.0, 3, 4, 5], "G12": [2.0] * 6}
     (chart,) = studies.plan_charts(names, sigma, "c").charts
@@ -122,7 +118,6 @@ def test_names_stand_where_numbers_would():
     assert words["values"] == [1, 2, 3, 4, 5, 6] and words["labelAngle"] == -28
     assert chart.series[0].y == [1, 20, None, 3, 4, 5]
     assert np.round(chart.series[1].x).tolist() == [1, 2, 3, 4, 5, 6]
-    # What is not known is a ring at the end of the axis.
     ring = named(chart)["E1, not known"]
     assert ring.hollow and ring.y == [100.0] and np.round(ring.x).tolist() == [3]
 
@@ -151,7 +146,6 @@ def test_moduli(fits, known):
         assert [s.faint for s in top.series] == [False, *[True] * (fits - 1), *[False] * known]
     for below in charts.charts[3:]:
         off = [line[1] for line in data(below)]
-        # Percent; the best is the known one itself, and is not drawn below what is seen.
         assert off[0] == pytest.approx(np.full(20, off[0][0])) and off[0][0] <= 1e-7
         assert [y[0] for y in off[1:]] == pytest.approx([0.1 * i for i in range(1, fits)])
         assert below.alt == "best: at most 1e-10 %" and below.log_y
@@ -200,7 +194,6 @@ def test_the_three_moduli_together():
 
 
 def test_what_each_test_determines():
-    """Above 1000 %, or not finite, a triangle; what is known is a line."""
     lost = np.full((3, 20), 30.0)
     lost[2] = np.inf
     charts = pinned_charts(STRAINS, {"bubble": lost, "both": np.full((3, 20), 1.0)}, "c")

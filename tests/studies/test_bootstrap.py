@@ -58,12 +58,10 @@ def drawn_again(project):
 
 
 def at_rest(done, name):
-    """(samples,) MPa."""
     return np.array(done.moduli[name][:, 0])
 
 
 def commanded(folder, card, *command):
-    """Run a command beside the card of a fit: its words, result.json, page and folder."""
     constant_strips(folder)
     (folder / "out" / folder.name).mkdir(parents=True)
     write_card(card, folder / "out" / folder.name / "material.toml")
@@ -89,7 +87,6 @@ def test_specimens_drawn_again(drawn_again):
         np.testing.assert_allclose(done.bands[name][:, 0], [low, high], rtol=1e-4)
     assert all(1 <= s.analyses <= MOST or s.counts == [[1, 1], [1, 1]] for s in done.samples)
     assert done.analyses == done.before + sum(s.analyses for s in done.samples)
-    # Two specimens and eight samples are few.
     few = [(FEW_UNITS, of) for of in ("one: warp", "one: fill", "")]
     assert [(n.kind, n.of) for n in done.notes] == few
     correlations = done.coefficients()
@@ -138,7 +135,6 @@ def test_frames_drawn_again(tmp_path):
     factors = module.factors_of(problem, [group], [[2, 0, 1]])
     weighted = problem.blocks.value(factors * found.point.residual)
     assert weighted == pytest.approx(2 * norms[0] + norms[2])
-    # As of a fit to the rest, which is not given the frame at all.
     (part,) = [p for p in module.parts_of(found.setup, "frames") if p.name == "40 kPa"]
     y = problem.unknowns.at(np.array([80.0, 390.0, 790.0]))
     rest = found.setup.problem(part.masks).evaluate(y, False)
@@ -166,7 +162,6 @@ def test_a_bootstrap_goes_on_where_it_was(project, drawn_again, tmp_path, monkey
     assert fitted == [0, 1, 2, 3]
     assert [s.counts for s in done.samples] == [s.counts for s in drawn_again.samples[:4]]
     np.testing.assert_allclose(done.unknowns, drawn_again.unknowns[:4], rtol=1e-6)
-    # Samples of other draws are others.
     bootstrap(project, "specimens", 2, **given, resume=True, seed=8)
     assert fitted == [0, 1, 2, 3, 0, 1]
 
@@ -207,7 +202,6 @@ PLANNED_ENDS = (0.1, 0.1, 0.05)
 
 @pytest.fixture
 def few(monkeypatch):
-    """Coarse models of candidates."""
     monkeypatch.setattr(bubbles, "ELEMENTS", 32)
     monkeypatch.setattr(bubbles, "ANGLES", ())
     monkeypatch.setattr(strips, "ANGLES", ())
@@ -227,7 +221,6 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
         off = np.concatenate([20 * (m - 330.0) * strain for m in MODULI[test]["warp"]])
         scatter = project.tests[test].strips["warp"].scatter
         noise.append(max(float(np.sqrt(np.mean(off**2))), scatter))
-        # One of two is taken up by their mean.
         each.append(np.mean((20 * strain) ** 2) / noise[-1] ** 2)
     assert made.now.summary["E1"] == pytest.approx(sum(each) ** -0.5 / 330, rel=2e-3)
     assert made.now.summary["G12"] == pytest.approx(10.0)  # nothing is known of it
@@ -240,13 +233,11 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
     assert more.summary["E1"] == pytest.approx((sum(each) + added) ** -0.5 / 330, rel=2e-3)
     assert more.summary["E2"] == pytest.approx(made.now.summary["E2"], rel=1e-9)
     assert more.noise == f"{value:.3g} N at 4 values (that of one)"
-    # Only what shears the sheet says anything of G12.
     sheared = [p.name for p in made.candidates if p.summary["G12"] < 1]
     others = {name for name in sheared if not name.startswith("bubble")}
     assert others == {"strip at 45 degrees"} and "bubble, elliptic rim at 45 degrees" in sheared
     worst = [max(p.summary.values()) for p in made.candidates]
     assert worst == sorted(worst) and made.candidates[0].name in sheared
-    # By E1 alone a strip across the yarns is no good.
     by_warp = plan(project, CARD, strain=PLANNED_ENDS, rank="E1")
     values = [p.summary["E1"] for p in by_warp.candidates]
     assert values == sorted(values) and by_warp.criterion.startswith("1 sigma of E1,")
@@ -309,9 +300,7 @@ def test_what_cannot_be_computed_is_left_out_and_named(project, few, monkeypatch
 
 def test_strains_at_which_moduli_are_asked_for(project, few):
     limited = replace(CARD, law=replace(CARD.law, strain_range=np.array([0.09, 0.2, 0.03])))
-    # The card's valid range, but no further than the law of the project goes.
     np.testing.assert_allclose(plan(project, limited).ends, [0.09, 0.14, 0.03])
-    # A card without one: as far as the present tests are strained.
     reached = plan(project, CARD).ends
     np.testing.assert_allclose(reached[:2], np.log([22.9 / 20] * 2), rtol=1e-3)
 
@@ -484,7 +473,6 @@ def without_pages(monkeypatch):
 
 
 def test_moduli_and_errors_follow_the_weight(tmp_path):
-    """E1 at every weight of "two", whose weight in the project is 0.5, and the error of a test."""
     constant_strips(tmp_path, ("weight = 3.0", "weight = 0.5"))
     command = ("validate", "project.toml", "--weights", "two", "--starts", "1", "--quiet")
     done = in_process(*command, "--out", "out", cwd=tmp_path)
@@ -492,7 +480,6 @@ def test_moduli_and_errors_follow_the_weight(tmp_path):
     assert table["weight_times"].to_list() == pytest.approx(COUNTS)
     (column,) = {name for name in table if name.startswith("E1_MPa at 0.0")} - {"E1_MPa at 0"}
     expected = [best_warp(1, 0.5 * count) for count in COUNTS]
-    # It matters: from near the mean of one to near the mean of the other.
     assert expected[-1] - expected[0] > 25
     assert table[column].to_numpy() == pytest.approx(expected, rel=2e-4)
     for test in ("one", "two"):

@@ -49,7 +49,6 @@ def off_by(modulus, true):
 def test_a_fold_errs_by_what_the_specimens_differ_by(project):
     setup = prepare_fit(project, project.chosen("one", fitted=True))
     found = [fold for fold in compare.validate(setup, 5, 1) if fold is not None]
-    # As many as specimens, whichever of two processes is first.
     assert sorted(fold.fold for fold in found) == [0, 1]
     expected = {f"one: {name}": off_by(*both)[0] for name, both in MODULI["one"].items()}
     for fold in found:
@@ -58,7 +57,6 @@ def test_a_fold_errs_by_what_the_specimens_differ_by(project):
 
 
 def setup_of(**specimens):
-    """As much of a fit as its folds look at."""
     return SimpleNamespace(
         tests=[SimpleNamespace(specimens=specimens)], options="options",
         project=SimpleNamespace(fit=SimpleNamespace(seed=3)),
@@ -136,7 +134,6 @@ files = ["points.csv"]
 seed = 3
 jobs = 1
 """
-#: mm at the last point of specimens a, b and c.
 ENDS = (2.9, 2.8, 3.0)
 LEFT_OUT = 2
 
@@ -160,7 +157,6 @@ def three_specimens(folder, factor=1.0, objective="N"):
 
 
 def without_the_last(setup):
-    """The masks of the fold that leaves the last specimen of both directions out."""
     specimens = compare.specimens_of(setup).items()
     return {name: np.array(whose) != LEFT_OUT for name, whose in specimens}
 
@@ -175,7 +171,6 @@ def test_a_fold_knows_nothing_of_what_it_leaves_out(tmp_path, objective):
     assert own.law.form.to_card() == other.law.form.to_card()
     np.testing.assert_array_equal(own.law.strain_range, other.law.strain_range)
     np.testing.assert_array_equal(unknowns, same)
-    # What is left out does change the fit of all points, and the breaks of its law.
     assert whole.law.form.to_card() != other_whole.law.form.to_card()
 
 
@@ -213,7 +208,6 @@ def test_strains_beyond_the_law_and_unstable_equilibria_with_their_part():
     for histories, words in (
         ((history(0.1181, 0.0), history(0.05, -0.25, ("2 mm",))),
          ["warp: warp strain 0.118", "fill: shear strain 0.250", "fill: unstable"]),
-        # Of the only comparison nothing else could be meant.
         ((history(0.1181, 0.0, ("2 mm",)),), ["one: warp strain 0.118", "one: unstable"]),
         ((history(0.1, -0.1),), []),
     ):  # fmt: skip
@@ -262,7 +256,6 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
     rms = float(np.sqrt(np.mean((20 * 370 * np.tile(STRAIN, 2) - loads) ** 2)))
     assert warp.rms == {"one: warp": pytest.approx(rms, rel=1e-3)}
     assert warp.error == pytest.approx(rms / loads.max(), rel=1e-3)
-    # As it is written, it is not fitted again; nor is that of another fit taken.
     record = tmp_path / "out" / "constant-without-directions.json"
     content = json.loads(record.read_text())
     content["parts"][0]["error"] = 0.5
@@ -311,7 +304,6 @@ def test_what_is_kept_of_a_bubble_is_as_in_the_whole(bubble):
         for masks, rows in ((part.alone, own), (part.masks, other)):
             (kept,) = test.comparisons(bubble.make_solver, Weighting(), masks)
             np.testing.assert_allclose(kept.objective.residual(history), rows, rtol=1e-12)
-    # A mask may also leave some of the points of a frame.
     some = np.arange(len(residual) // 3) % 3 > 0
     (kept,) = test.comparisons(bubble.make_solver, Weighting(), {"bubble": some})
     points = np.split(some, 2)
@@ -322,7 +314,6 @@ def test_what_is_kept_of_a_bubble_is_as_in_the_whole(bubble):
 
 
 def test_what_cannot_be_left_out_is_said_before_any_fit(bubble, tmp_path):
-    # A constant field is of all frames.
     (test,) = bubble.tests
     off = replace(test, test=replace(test.test, sheet=replace(test.test.sheet, constant=(0, 1))))
     with pytest.raises(InputError, match=r"--leave: no test has two or more frames .*: none, or"):
@@ -358,7 +349,6 @@ def test_what_a_fit_to_the_other_test_foretells(project, tmp_path, monkeypatch):
     assert two.predicted.rms == {"two: warp": pytest.approx(rms, rel=1e-4)}
     assert two.predicted.error == pytest.approx(relative, rel=1e-4)
     assert two.predicted.units == {"two: warp": "N"}
-    # Given the test itself, it is nearer to it: both tests' warp strips pull at E1.
     assert two.fitted is not None and two.fitted.error < two.predicted.error
     found.write(out)
     table = pd.read_csv(out / "validation.csv")
@@ -370,7 +360,6 @@ def test_what_a_fit_to_the_other_test_foretells(project, tmp_path, monkeypatch):
     assert mean == pytest.approx((one.predicted.error + relative) / 2, rel=1e-4)
     folders = ["constant-all", "constant-without-1", "constant-without-2"]
     assert pages == [out / name for name in folders] and all(page.is_dir() for page in pages)
-    # In the test's own words, too, as after a fit.
     own = two.predicted.rms["two: warp"]
     assert f"constant, two: RMS errors in N: warp {own:.4g}" in found.lines()
     assert two.predicted.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
@@ -485,7 +474,6 @@ def test_table_result_and_lines(tmp_path):
     assert "10 %" in lines[-3] and "6.5 %" in lines[-2]
 
 
-#: Numbers of each subject.
 COUNTS = {
     "bars": 4, "hencky": 7, "abaqus": 16, "marc bubble": 7, "strips": 5, "thin walls": 6,
     "bent tube": 3, "nu12": 5,
@@ -494,7 +482,6 @@ COUNTS = {
 
 @cache
 def ours():
-    """Of the embedded membrane."""
     return dict(numbers([subject for subject in SUBJECTS if subject != "calculix"]))
 
 
@@ -517,7 +504,6 @@ def test_theirs_are_the_published_ones():
     theirs = {one.what: one.theirs for some in ours().values() for one in some}
     assert {what: theirs[what] for what in printed} == pytest.approx(printed, abs=5e-5)
     assert verification.SOLUTION == tuple(TABLE_4_2)
-    # The apex of Marc's bubble is the highest node of each curve.
     apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in verification.PRESSURES]
     assert apex == pytest.approx([14.2, 20.05, 24.4, 28.1, 32.6, 36.5, 38.8], abs=0.2)
 
@@ -549,8 +535,6 @@ def test_a_number_further_off_than_allowed_is_missed(absolute):
 
 
 class Stiff(MembraneSolver):
-    """A solver whose loads are 0.02 % too high."""
-
     def run(self, *args, **options):
         history = super().run(*args, **options)
         return replace(history, load=1.0002 * np.asarray(history.load))
@@ -565,7 +549,6 @@ def test_the_command(monkeypatch, tmp_path):
     assert "MSC Marc; Jekel et al., Composite Structures 161 (2017)" in row
     assert "calculix: not here" in done.output
     assert done.output.endswith("all 4 numbers are met\n")
-    # A solver that is a little wrong is seen.
     subjects["bars"] = lambda: marc_bars(Stiff())
     done = in_process("verify", "--subject", "bars", cwd=tmp_path, code=1)
     assert done.output.count("   MISSED\n") == 4

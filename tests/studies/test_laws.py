@@ -24,8 +24,6 @@ PARTS = {"one: warp": "warp", "one: fill": "fill"}
 
 
 class Run:
-    """A comparison in a folder, what it told, and what was written of it without a picture."""
-
     def __init__(self, folder, patch):
         self.out, self.events, self.pages, self.drawn = folder / "out", [], [], []
         self.path = constant_strips(folder, ("starts = 2", "jobs = 1"))
@@ -138,7 +136,6 @@ def test_going_on_validates_nothing_twice(compared, run):
         run.compare()
     again = run.compare(resume=True)
     assert [form.folds for form in again.forms] == before and not run.judged
-    # Folds of another fit are made anew; cut off after its first fold, only the second is.
     path = run.out / "linear" / "validation.json"
     written = json.loads(path.read_text())
     assert path.read_text() == json.dumps(written, indent=1) + "\n" and len(written["folds"]) == 2
@@ -179,13 +176,10 @@ def test_rows_of_another_fit_are_not_taken(tmp_path):
 
 
 class Form(FormFit):
-    """A form whose fit to all points is made up."""
-
     coefficients, fitted, rms = 0, 3.0, {"warp": 2.0, "fill": 4.0}
 
 
 def form(name, coefficients, *folds):
-    """Its errors in the folds; by part a half and a quarter of them."""
     objective = SimpleNamespace(unit="N")
     parts = [SimpleNamespace(name=part, objective=objective) for part in ("warp", "fill", "b")]
     fit = SimpleNamespace(

@@ -32,7 +32,6 @@ def test_curves_are_compared_where_the_coarse_one_has_points():
     coarse = np.array([1.0, 2.0]), np.array([2.0, 4.0])
     fine = np.array([0.5, 1.0, 1.5, 2.0]), np.array([9.0, 2.5, 9.0, 4.5])
     assert refinement.rms_between(coarse, fine) == pytest.approx(0.5)
-    # The origin is part of a curve, and a run that stops early is compared up to there.
     assert refinement.rms_between((np.array([0.5]), np.array([1.0])), coarse) == pytest.approx(
         0.0, abs=1e-15
     )
@@ -190,7 +189,6 @@ def test_numbers():
         "order_one_coarser": None, "own_error": pytest.approx(0.05),
         "own_error_against": "limit", "remark": found[LOAD]["remark"],
     }  # fmt: skip
-    # The coarsest level did not come so far.
     assert found[LATE] == {
         "finest": 20.5, "order": None, "limit": None, "order_one_coarser": None,
         "own_error": pytest.approx(21.0 / 20.5 - 1), "own_error_against": "finest",
@@ -206,12 +204,10 @@ def test_the_order_of_a_curve():
     # The last change, 0.158 N of 10, is the noise; and two levels have but one change.
     for runs, noise in ((RUNS, 0.0159), (RUNS[1:], 1e-7)):
         assert told(runs, noise)["rms_N"]["order"] is None
-    # It is that of the finest levels.
     closer, farther = ([run(0.25, 6, 12.0, None, rise), *RUNS[:3]] for rise in (5.3001, 9.3))
     assert told(closer)["rms_N"]["to_next_finer"][0] < 2e-4
     for runs, noise in ((RUNS, 0.0157), (closer, 1e-7), (closer, 1e-3), (farther, 1e-7)):
         assert told(runs, noise)["rms_N"]["order"] == pytest.approx(1.0)
-    # One level is compared with nothing, and without curves there is nothing to compare.
     said = told([RUNS[0], RUNS[3]])
     assert said["quantities"] == {} and "rms_N" not in said and len(said["levels"]) == 2
     assert "rms_N" not in told([LevelRun(r.level, r.seconds, 1, r.values) for r in RUNS[:2]])
@@ -288,7 +284,6 @@ def test_a_second_term_makes_the_order_move_and_is_said():
         # One order exactly, then twice: the order one level coarser is known.
         ([8.0, 4.0, 2.0, 1.0], 0.0, (1.0, 0.0, 1.0, "")),
         ([40.64, 40.16, 40.04, 40.01], 0.0, (2.0, 40.0, 2.0, "")),
-        # It moved by less than a half, and by more.
         ([1.0 + 2**1.4 + 2, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, 1.4, "")),
         ([1.0 + 2**1.6 + 2, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, 1.6, "still moves (from 1.6)")),
         # What the coarser levels change is the solver's: only one order is known.

@@ -139,7 +139,6 @@ def folder(tmp_path, monkeypatch):
 
 @contextlib.contextmanager
 def killed_after(count):
-    """Of the analyses that are made, one more than `count` is the end; how many there were."""
     made, real = [0], analyses.Once.run
 
     def run(self, model, law, *given, **named):
@@ -162,7 +161,6 @@ def without(result, *names):
 
 
 def written(out):
-    """Result and tables without the seconds, which are those of the run."""
     tables = {path.name: pd.read_csv(path) for path in sorted(out.glob("*.csv"))}
     plain = {n: t.drop(columns="seconds", errors="ignore").to_csv() for n, t in tables.items()}
     return without(result_in(out), "seconds"), plain
@@ -203,7 +201,6 @@ def test_what_there_is_to_go_on_with(folder):
     in_process(*arguments, cwd=folder)
     assert "already holds a result" in in_process(*arguments, cwd=folder, code=2).output
     assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
-    # Another card: nothing of the first is taken.
     before = result_in(folder / "out")
     in_process(*other, "--resume", cwd=folder)
     after = result_in(folder / "out")
