@@ -93,14 +93,6 @@ def test_every_value_is_given_to_vega():
     assert (legend["domain"], legend["range"]) == (["a", "b"], ["stroke", "circle"])
 
 
-def test_one_legend_of_all_charts_where_names_have_one_look():
-    series = [line("a", [0, 1], [0, 1]), declared.band("b", [0], [0], [1])]
-    first = Chart("1", "x, mm", "y, N", series)
-    other = replace(first, series=[line("a", [0, 1], [0, 1], colour=2)])
-    assert list(declared.looks_of([first, first]) or ()) == ["a", "b"]
-    assert declared.looks_of([first, other]) is None
-
-
 def test_files(tmp_path):
     corners = np.array([[[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]])
     shape = Chart("s", "x, mm", "y, mm", [faces("", corners, [1, 2])], equal=True, scale="N")
@@ -131,6 +123,11 @@ def test_the_figure_of_the_page():
     style = vega.dark_style()
     for light in (*vega.PALETTE, *vega.RISING):
         assert f'svg [stroke="{light}"]' in style and vega.DARK[light] != light
+    series = [line("a", [0, 1], [0, 1]), declared.band("b", [0], [0], [1])]
+    first = Chart("1", "x, mm", "y, N", series)
+    other = replace(first, series=[line("a", [0, 1], [0, 1], colour=2)])
+    assert list(declared.looks_of([first, first]) or ()) == ["a", "b"]
+    assert declared.looks_of([first, other]) is None
 
 
 @pytest.mark.parametrize("bad", ["\x00", "\x1b", "\x01", "\ud800", "\uffff"])
@@ -147,15 +144,6 @@ def maps_at(places, one, two):
     return maps.maps_of("m", "p", ["1"], [places], rows, ("x", "y"), "Words.", "")
 
 
-def test_many_points_are_thinned():
-    every = np.arange(5 * declared.MOST_POINTS)
-    many = dots("a", every, every)
-    assert len(many.x) == declared.MOST_POINTS and many.x[1] == 5.0
-    places = np.random.default_rng(1).random((3 * maps.MOST_PLACES, 2))
-    found = maps_at(places, places[:, 0], places[:, 0])
-    assert found.counts == [maps.MOST_PLACES] and found.caption.endswith("one in 3 is shown.")
-
-
 def test_maps_of_a_row_share_their_colours():
     places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     found = maps_at(places, np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0]))
@@ -168,6 +156,12 @@ def test_maps_of_a_row_share_their_colours():
     np.testing.assert_allclose(np.transpose([spots.x, spots.y]), places, atol=1e-4)
     assert spots.values == pytest.approx([0, 1, 2], abs=1e-4)
     assert scale_ends(chart) == pytest.approx((-2, 2)) and chart.scale == "mm" and chart.equal
+    every = np.arange(5 * declared.MOST_POINTS)
+    many = dots("a", every, every)
+    assert len(many.x) == declared.MOST_POINTS and many.x[1] == 5.0
+    places = np.random.default_rng(1).random((3 * maps.MOST_PLACES, 2))
+    found = maps_at(places, places[:, 0], places[:, 0])
+    assert found.counts == [maps.MOST_PLACES] and found.caption.endswith("one in 3 is shown.")
 
 
 def test_a_surface_from_the_front_and_from_above():
@@ -182,9 +176,6 @@ def test_a_surface_from_the_front_and_from_above():
     shade = maps.Shade("s", "mm", pack([[1.0, np.nan]]))
     svg = maps.solid_svg(maps.Solid("n", ["1"], "p", pack(corners), pack(quads), [shade], "c"), 0)
     assert svg.count("Z") == 2 and 'fill="#999"' in svg
-
-
-def test_a_surface_is_whole_and_clear_of_its_colour_bar():
     turn = np.linspace(0, 2 * np.pi, 25)
     rim = np.column_stack([100 * np.cos(turn), 100 * np.sin(turn), 0 * turn])[None]
     reach = maps.scale_of(rim) * 100

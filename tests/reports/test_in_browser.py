@@ -58,6 +58,14 @@ def test_every_figure_is_there(opened):
     assert len(sizes) == 1 + 1 + 3 + 1 and all(min(size) > 50 for size in sizes)
     assert opened.run("document.querySelector('img').naturalWidth") > 0
     assert opened.run("document.querySelectorAll('.faces path').length") == 4
+    opened.call("Emulation.setEmulatedMedia", media="print")
+    hidden = opened.run(
+        "[...document.querySelectorAll('figure img, svg.chart, svg.solid, table')]"
+        ".filter(own => own.getBoundingClientRect().height === 0).length"
+    )
+    buttons = opened.run("document.querySelector('.tools').getBoundingClientRect().height")
+    opened.call("Emulation.setEmulatedMedia", media="")
+    assert (hidden, buttons) == (0, 0)
 
 
 def test_the_slider_changes_the_maps(opened):
@@ -72,9 +80,6 @@ def test_the_slider_changes_the_maps(opened):
     opened.press(".maps svg", "ArrowRight")
     said = opened.run("document.querySelector('.maps .tools output').textContent")
     assert said == "x −1; y −1; dz, measured 0.1 mm"
-
-
-def test_the_surface_turns(opened):
     faces = "document.querySelector('.faces').innerHTML"
     opened.run("document.querySelector('svg.solid').focus(), 1")
     before, places = opened.look("svg.solid"), opened.run(faces)
@@ -104,9 +109,6 @@ def test_a_chart_tells_its_values_and_zooms(opened):
     assert opened.run(TICKS) != whole
     opened.press(".charts svg", "0")
     assert opened.run(TICKS) == whole
-
-
-def test_saved_files(opened):
     opened.wait(CATCH)
     names = opened.run("kept.filter(one => typeof one === 'string')")
     assert sorted(names) == ["moduli-E1.csv", "moduli-E1.svg"]
@@ -129,17 +131,6 @@ def test_dark_is_dark_and_a_phone_is_wide_enough(opened):
     opened.call("Emulation.setDeviceMetricsOverride", **phone)
     assert opened.run("document.documentElement.scrollWidth") <= 360
     opened.call("Emulation.clearDeviceMetricsOverride")
-
-
-def test_on_paper_nothing_is_left_out(opened):
-    opened.call("Emulation.setEmulatedMedia", media="print")
-    hidden = opened.run(
-        "[...document.querySelectorAll('figure img, svg.chart, svg.solid, table')]"
-        ".filter(own => own.getBoundingClientRect().height === 0).length"
-    )
-    buttons = opened.run("document.querySelector('.tools').getBoundingClientRect().height")
-    opened.call("Emulation.setEmulatedMedia", media="")
-    assert (hidden, buttons) == (0, 0)
 
 
 def test_a_pdf(page, tmp_path):

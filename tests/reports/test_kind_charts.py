@@ -115,20 +115,6 @@ def test_registration(count, step):
         assert lines(chart, "fill")[0].tolist() == [[0, 0], [0, 50]]
 
 
-def test_disk():
-    places = np.vstack([sheet(400), EDGE[:-1]])
-    low = 0.02 * places[:, 0] - 0.5  # mm, from -2.5 to 1.5
-    charts = bubbles.disk_charts([("height, mm", places, low), ("none, mm", places, 0 * low)], EDGE)
-    check_charts(charts)
-    for chart, title, most in zip(charts.charts, ("height", "none"), (2.5, 1e-9), strict=True):
-        assert scale_ends(chart) == pytest.approx((-most, most)) and chart.equal
-        body = chart.series[0]
-        x = np.array(body.x, dtype=float).reshape(-1, 3).mean(axis=1)
-        wanted = 0.02 * x - 0.5 if most > 1 else 0 * x
-        np.testing.assert_allclose(body.values, wanted, atol=1e-4)
-        assert (*shown(chart), chart.scale) == ("x (warp), mm", "y (fill), mm", title, "mm")
-
-
 @pytest.mark.parametrize(("count", "step"), [(6000, 1), (24000, 3)])
 def test_the_first_spheres_in_one_scale(count, step):
     points, used = np.column_stack([sheet(count), np.zeros(count)]), np.arange(count) % 4 > 0
@@ -181,6 +167,17 @@ def test_pressures_and_heights_by_one_clock():
     assert lines(both, "taken")[0].tolist() == [[20.0], [4.0]] and named(both)["taken"].hollow
     assert shown(log) == ("time by the log's clock, s", "pressure, kPa", "pressure of the log")
     assert shown(both)[:2] == ("pressure, kPa", "height of the apex, mm")
+    places = np.vstack([sheet(400), EDGE[:-1]])
+    low = 0.02 * places[:, 0] - 0.5  # mm, from -2.5 to 1.5
+    charts = bubbles.disk_charts([("height, mm", places, low), ("none, mm", places, 0 * low)], EDGE)
+    check_charts(charts)
+    for chart, title, most in zip(charts.charts, ("height", "none"), (2.5, 1e-9), strict=True):
+        assert scale_ends(chart) == pytest.approx((-most, most)) and chart.equal
+        body = chart.series[0]
+        x = np.array(body.x, dtype=float).reshape(-1, 3).mean(axis=1)
+        wanted = 0.02 * x - 0.5 if most > 1 else 0 * x
+        np.testing.assert_allclose(body.values, wanted, atol=1e-4)
+        assert (*shown(chart), chart.scale) == ("x (warp), mm", "y (fill), mm", title, "mm")
 
 
 #: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
@@ -443,6 +440,14 @@ def test_without_a_polynomial_the_points_are_the_target():
     (chart,) = load_charts("l", [alone]).charts
     assert [s.name for s in chart.series] == ["Table 3.2", "bubble"]
     assert len(load_charts("l", [strip(), alone]).charts) == 3
+    x = np.array([0.0, 1.0, 2.0])
+    warp = [(f"specimen {i}", x, (i + 1) * x) for i in range(8)]
+    left, right = strips.specimen_charts({"warp": warp, "fill": [("", x, 5 * x)]}).charts
+    for i, curve in enumerate(data(left)):
+        np.testing.assert_array_equal(curve, [x, (i + 1) * x])
+    assert [s.name for s in left.series] == [*(f"specimen {i}" for i in range(6)), "", ""]
+    assert len(right.series) == 1
+    assert shown(left) == ("elongation of the gauge, mm", "load, N", "warp")
 
 
 @pytest.mark.parametrize("least", [40.0, -40.0])
@@ -469,17 +474,6 @@ def test_measured_loads(shared_data):
         curve = StripCurves(row["direction"], [("p", u, load)], (x, y), (u, load), scatter)
         off = lines(load_charts("l", [curve]).charts[1], "measured")[0][1]
         assert np.sqrt(np.mean(off**2)) == pytest.approx(scatter, rel=0.03)
-
-
-def test_six_specimens_of_a_direction_are_named():
-    x = np.array([0.0, 1.0, 2.0])
-    warp = [(f"specimen {i}", x, (i + 1) * x) for i in range(8)]
-    left, right = strips.specimen_charts({"warp": warp, "fill": [("", x, 5 * x)]}).charts
-    for i, curve in enumerate(data(left)):
-        np.testing.assert_array_equal(curve, [x, (i + 1) * x])
-    assert [s.name for s in left.series] == [*(f"specimen {i}" for i in range(6)), "", ""]
-    assert len(right.series) == 1
-    assert shown(left) == ("elongation of the gauge, mm", "load, N", "warp")
 
 
 def draw_strip(shear, grips=True):

@@ -77,14 +77,6 @@ def test_profiles():
     assert "92.5 MPa, upper end not closed" in chart.alt
 
 
-def test_nothing_changes():
-    panel = ConvergencePanel("warp", [0.2, 0.1], {"load": [0.0]}, [8, 32], [0.1, 0.3])
-    found = studies.convergence_charts([panel], "increments", "Title")
-    chart = found.charts[0]
-    assert [series.y for series in chart.series] == [[None]] and chart.alt.endswith(": none")
-    assert view(chart)["marks"] and "below 1e-05 %" in found.caption
-
-
 def test_nu12():
     lines = {f"at {k}": ([0.1, 0.24], [1.0 + 0.1 * k, 1.0]) for k in range(8)}
     models = {"a": lines, "b": {"one": ([0.1, 0.2], [np.nan, 1.0])}}
@@ -120,6 +112,11 @@ def test_names_stand_where_numbers_would():
     assert np.round(chart.series[1].x).tolist() == [1, 2, 3, 4, 5, 6]
     ring = named(chart)["E1, not known"]
     assert ring.hollow and ring.y == [100.0] and np.round(ring.x).tolist() == [3]
+    panel = ConvergencePanel("warp", [0.2, 0.1], {"load": [0.0]}, [8, 32], [0.1, 0.3])
+    found = studies.convergence_charts([panel], "increments", "Title")
+    chart = found.charts[0]
+    assert [series.y for series in chart.series] == [[None]] and chart.alt.endswith(": none")
+    assert view(chart)["marks"] and "below 1e-05 %" in found.caption
 
 
 STRAINS = np.linspace(0, [0.15, 0.2, 0.6], 20).T

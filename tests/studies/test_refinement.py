@@ -28,7 +28,11 @@ EXACT = 600.0 * np.log1p(STRETCH) * np.exp(-0.24 * np.log1p(STRETCH)) * 0.5 * WI
 END = "load at the end, N"
 
 
-def test_curves_are_compared_where_the_coarse_one_has_points():
+def test_edge_length():
+    assert refinement.edge_length(strip_mesh(20.0, 40.0, 4, 8)) == pytest.approx(5.0)
+    disk = disk_mesh(100.0, 800, "quarter")
+    area = refinement.edge_length(disk) ** 2 * len(disk.quads)
+    assert area == pytest.approx(0.25e4 * np.pi, rel=2e-3)
     coarse = np.array([1.0, 2.0]), np.array([2.0, 4.0])
     fine = np.array([0.5, 1.0, 1.5, 2.0]), np.array([9.0, 2.5, 9.0, 4.5])
     assert refinement.rms_between(coarse, fine) == pytest.approx(0.5)
@@ -37,13 +41,6 @@ def test_curves_are_compared_where_the_coarse_one_has_points():
     )
     x = np.array([1.0, 2.0, 3.0])
     assert refinement.rms_between((x, 2 * x), (x[:2], 2 * x[:2])) == pytest.approx(0.0, abs=1e-15)
-
-
-def test_edge_length():
-    assert refinement.edge_length(strip_mesh(20.0, 40.0, 4, 8)) == pytest.approx(5.0)
-    disk = disk_mesh(100.0, 800, "quarter")
-    area = refinement.edge_length(disk) ** 2 * len(disk.quads)
-    assert area == pytest.approx(0.25e4 * np.pi, rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -73,9 +70,6 @@ def test_order_and_limit_of_a_known_error(bars):
     assert steps[-1].done == steps[-1].increments == 4 and bars.progress is None
     assert (study.result["solver"], study.result["card"]) == ("bars", "soft")
     assert study.warnings == ()
-
-
-def test_increments_are_refined_where_they_are_asked_for(bars):
     study = refine(project_of(BarTest("a bar")), CARD, what="increments", levels=3)
     levels = [(r.level.part.increments, r.level.size) for r in study.runs["a bar"]]
     assert levels == [(4, 1 / 4), (8, 1 / 8), (16, 1 / 16)]

@@ -31,7 +31,7 @@ from ..projects import BUBBLE
 CARD = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
 
 
-def test_parts_are_called_by_what_tells_them_apart(bars):
+def test_parts_are_called_by_what_tells_them_apart(bars, monkeypatch):
     one, two = BarTest("one"), BarTest("two", ("warp", "fill"), elements=6, increments=3)
     project = project_of(one, two)
     assert list(parts_of(project, [one], 0.5)) == ["one"]
@@ -45,9 +45,22 @@ def test_parts_are_called_by_what_tells_them_apart(bars):
     finer = parts_of(project, [one], 0.5, factor=2.0)["one"]
     assert len(finer.model.mesh.quads) == 128 and finer.increments == 4
     assert part_name(two, "warp", 2, 1) == "warp" and part_name(two, "warp", 1, 2) == "two"
+    assert studied_tests(project) == studied_tests(project, []) == [one, two]
+    assert studied_tests(project, ["two"]) == [two]
+    monkeypatch.setattr(BarKind, "studied", None)
+    said = complaint(studied_tests, project)
+    assert said == "bars.toml: no study can run the tests of this project"
 
 
-def test_a_refinement_that_cannot_be_had(bars):
+def test_the_card_that_is_given(bars, tmp_path):
+    write_card(MaterialCard(CARD.law, 0.6, "filed"), tmp_path / "c.toml")
+    project = project_of(BarTest("one"), cards={"own": CARD})
+    assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
+    assert card_of(project, tmp_path / "c.toml").name == "filed"
+    assert tuple(map(module.card_words, (CARD, "own", Path("c")))) == ("soft", "own", "c")
+    assert thickness_notes(project, CARD) == []
+    (note,) = thickness_notes(project, MaterialCard(CARD.law, 0.6))
+    assert note.kind is THICKNESS and "0.6 mm" in note and "0.5 mm" in note
     test = BarTest("one")
     said = complaint(parts_of, project_of(test), [test], 0.5, "elements", 0.05)
     assert said.startswith("bars.toml: refinement by 0.05") and said.endswith("got 0")
@@ -57,27 +70,6 @@ def test_a_refinement_that_cannot_be_had(bars):
             raise InputError("mesh.inp", "line 3", "odd")
 
     assert complaint(parts_of, project_of(test), [Filed("x")], 0.5) == "mesh.inp: line 3: odd"
-
-
-def test_tests_that_no_study_can_run(bars, monkeypatch):
-    one, two = BarTest("one"), BarTest("two")
-    project = project_of(one, two)
-    assert studied_tests(project) == studied_tests(project, []) == [one, two]
-    assert studied_tests(project, ["two"]) == [two]
-    monkeypatch.setattr(BarKind, "studied", None)
-    said = complaint(studied_tests, project)
-    assert said == "bars.toml: no study can run the tests of this project"
-
-
-def test_the_card_that_is_given(tmp_path):
-    write_card(MaterialCard(CARD.law, 0.6, "filed"), tmp_path / "c.toml")
-    project = project_of(BarTest("one"), cards={"own": CARD})
-    assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
-    assert card_of(project, tmp_path / "c.toml").name == "filed"
-    assert tuple(map(module.card_words, (CARD, "own", Path("c")))) == ("soft", "own", "c")
-    assert thickness_notes(project, CARD) == []
-    (note,) = thickness_notes(project, MaterialCard(CARD.law, 0.6))
-    assert note.kind is THICKNESS and "0.6 mm" in note and "0.5 mm" in note
 
 
 def test_analyses_are_told_one_after_the_other(bars):
