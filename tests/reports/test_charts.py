@@ -27,12 +27,9 @@ def test_packed_numbers_come_back(values):
     back = packed.values
     np.testing.assert_array_equal(np.isnan(back), np.isnan(values))
     np.testing.assert_allclose(back, values, atol=0.5001 * packed.step, rtol=1e-9)
-
-
-@pytest.mark.parametrize("shape", [(2,), (4,), (2, 2)])
-def test_packed_numbers_of_another_shape(shape):
-    with pytest.raises(ValueError, match="expected"):
-        _ = replace(pack([1.0, 2.0, 3.0]), shape=shape).values
+    for shape in ((len(values) - 1,), (len(values) + 1,), (len(values), 2)):
+        with pytest.raises(ValueError, match="expected"):
+            _ = replace(packed, shape=shape).values
 
 
 def test_ends_of_the_axes():
@@ -130,13 +127,13 @@ def test_the_figure_of_the_page():
     assert declared.looks_of([first, other]) is None
 
 
-@pytest.mark.parametrize("bad", ["\x00", "\x1b", "\x01", "\ud800", "\uffff"])
-def test_characters_that_no_drawing_may_hold(tmp_path, bad):
-    words = f"a{bad}b"
-    series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
-    chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
-    assert "a\ufffdb" in figure(view(chart))
-    assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
+def test_characters_that_no_drawing_may_hold(tmp_path):
+    for bad in ("\x00", "\x1b", "\x01", "\ud800", "\uffff"):
+        words = f"a{bad}b"
+        series = [line(words, [0, 1], [0, 1]), line("b", [0, 1], [1, 0])]
+        chart = Chart(words, words, words, series, words, x_names=(words,), scale=words)
+        assert "a\ufffdb" in figure(view(chart))
+        assert save(tmp_path / "c.svg", Charts(words, [chart, chart], words)).stat().st_size > 1000
 
 
 def maps_at(places, one, two):

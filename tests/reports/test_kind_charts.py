@@ -144,15 +144,13 @@ def test_points_astray_do_not_make_the_ball_small():
     assert chart.scale == "beyond the sphere, mm"
 
 
-@pytest.mark.parametrize("least", [0.5, -3.0])
-def test_rises(least):
-    charts = bubbles.rise_charts([0.002, 0.02, 0.3], [least, 20.0, 39.0])
-    check_charts(charts)
-    (chart,) = charts.charts
-    np.testing.assert_allclose(data(chart)[0], [[2.0, 20.0, 300.0], [least, 20.0, 39.0]])
-    low = axis_ends(chart)[1][0]
-    assert low == 0.0 if least > 0 else low < -3.0
-    assert shown(chart)[:2] == ("pressure, kPa", "rise about the centre, mm")
+def test_rises():
+    for least in (0.5, -3.0):
+        (chart,) = bubbles.rise_charts([0.002, 0.02, 0.3], [least, 20.0, 39.0]).charts
+        np.testing.assert_allclose(data(chart)[0], [[2.0, 20.0, 300.0], [least, 20.0, 39.0]])
+        low = axis_ends(chart)[1][0]
+        assert low == 0.0 if least > 0 else low < -3.0
+        assert shown(chart)[:2] == ("pressure, kPa", "rise about the centre, mm")
 
 
 def test_pressures_and_heights_by_one_clock():

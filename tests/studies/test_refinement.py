@@ -246,19 +246,13 @@ def test_order_and_limit_of_pure_powers(order, limit, constant, first, second):
         assert observed_order(unit * sizes, np.diff(values)) == pytest.approx(order, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [(1.0, -0.25), (-1.0, 0.25), (1.0, 1.0), (1.0, 1.2), (1.0, 0.0), (0.0, 1.0), (1.0, np.nan),
-     (1.0, 2.0**-12.5)],
-)  # fmt: skip
-def test_changes_without_an_order(changes):
-    assert observed_order([4.0, 2.0, 1.0], changes) is None
-
-
-@pytest.mark.parametrize("sizes", [[1.0, 1.0, 0.5], [1.0, 2.0, 3.0], [1.0, 0.5, 0.0], [1.0, 0.5]])
-def test_sizes_must_fall(sizes):
-    with pytest.raises(ValueError, match="decreasing"):
-        observed_order(sizes, [1.0, 0.25])
+def test_changes_without_an_order_and_sizes_that_do_not_fall():
+    every = [(1.0, -0.25), (-1.0, 0.25), (1.0, 1.0), (1.0, 1.2), (1.0, 0.0), (0.0, 1.0)]
+    for changes in (*every, (1.0, np.nan), (1.0, 2.0**-12.5)):
+        assert observed_order([4.0, 2.0, 1.0], changes) is None, changes
+    for sizes in ([1.0, 1.0, 0.5], [1.0, 2.0, 3.0], [1.0, 0.5, 0.0], [1.0, 0.5]):
+        with pytest.raises(ValueError, match="decreasing"):
+            observed_order(sizes, [1.0, 0.25])
 
 
 def test_a_second_term_makes_the_order_move_and_is_said():
