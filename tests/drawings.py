@@ -88,7 +88,16 @@ def check_charts(charts):
             assert label and label == label.strip(), f"{where}: {label!r}"
             assert ", " in label or any(word in label for word in WITHOUT_UNIT) or len(label) <= 3
         for series in chart.series:
-            _check_series(series, f"{where}: {series.name!r}")
+            own = f"{where}: {series.name!r}"
+            if series.look == "faces":
+                count = len(series.x)
+                assert count == len(series.y) and count % len(series.values) == 0, own
+                continue
+            for values in (series.y, series.lower, series.upper, series.values):
+                assert len(values) in (0, len(series.x)), own
+            ends = list(zip(series.lower, series.upper, strict=True))
+            assert series.y or series.upper or not series.x, own
+            assert all(a <= b for a, b in ends if None not in (a, b)), f"{own}: upside down"
         x, y = axis_ends(chart)
         for (low, high), log in ((x, chart.log_x), (y, chart.log_y)):
             assert isfinite(low) and isfinite(high) and low < high and (low > 0 or not log), where
@@ -99,14 +108,3 @@ def check_charts(charts):
                 continue
             assert x[0] <= a <= x[1] or (chart.log_x and a <= 0), f"{where}: x = {a} is not seen"
             assert y[0] <= b <= y[1] or (chart.log_y and b <= 0), f"{where}: y = {b} is not seen"
-
-
-def _check_series(s, where):
-    if s.look == "faces":
-        assert len(s.x) == len(s.y) and len(s.x) % len(s.values) == 0, where
-        return
-    for own in (s.y, s.lower, s.upper, s.values):
-        assert len(own) in (0, len(s.x)), where
-    assert len(s.lower) == len(s.upper) and (s.y or s.upper or not s.x), where
-    known = [(a, b) for a, b in zip(s.lower, s.upper, strict=True) if None not in (a, b)]
-    assert all(a <= b for a, b in known), f"{where}: a band upside down"

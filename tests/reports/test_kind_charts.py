@@ -279,6 +279,12 @@ def test_bands_of_the_solver_and_of_the_card():
     np.testing.assert_allclose([first.lower, first.upper], [2.5 * WAY, 3.5 * WAY])
     assert named(chart)["soft, other end"].colour == first.colour
     assert "95 % by the card" in named(chart) and axis_ends(chart)[1][1] > 270.0
+    short = BendLine("short", 0, WAY[:3], WAY[:3])
+    long = replace(MEASURED, readings=[(WAY[:7], 4.1 * WAY[:7])])
+    charts = bending_charts([BendPanel("one", [short], long)], misses=True)
+    check_charts(charts)
+    off = lines(charts.charts[1], "short")[0][1]
+    assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
 
 
 def test_all_cases_with_the_same_loads_in_a_row():
@@ -293,15 +299,6 @@ def test_all_cases_with_the_same_loads_in_a_row():
     assert [c.title for c in bending_charts(panels).charts] == ["one: RMS error 3.11 N", "two"]
     with pytest.raises(ValueError, match="no cases to draw"):
         bending_charts([BendPanel("none")])
-
-
-def test_readings_beyond_the_cards_are_seen():
-    short = BendLine("short", 0, WAY[:3], WAY[:3])
-    long = replace(MEASURED, readings=[(WAY[:7], 4.1 * WAY[:7])])
-    charts = bending_charts([BendPanel("one", [short], long)], misses=True)
-    check_charts(charts)
-    off = lines(charts.charts[1], "short")[0][1]
-    assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
 
 
 def test_gas_in_kilopascal_and_litres():
@@ -526,9 +523,6 @@ def test_orders():
     lost = [np.nan] * 5
     for left_out, first in ((lost, lost), ([*rmse[:4], np.inf], rmse)):
         check_charts(order_charts([OrderErrors("warp", orders, first, left_out, 4)]))
-
-
-def test_biaxial_ratios():
     load, strain = np.array([0.0, 5.0, 10.0]), np.array([[0.0, 0.0], [1.0, -0.2], [2.0, -0.5]])
     panel = strips.BiaxialPanel("5:1", load, strain, [("m", load, 2 * strain)])
     charts = strips.biaxial_charts("b", [panel])

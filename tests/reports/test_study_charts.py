@@ -85,9 +85,6 @@ def test_nu12():
     assert chart.series[3].y == pytest.approx([1.3, 1.0]) and chart.level == 1.0
     assert "1 to 1.7" in chart.alt
     assert few.series[0].y == [None, 1.0] and few.series[0].rank is None
-
-
-def test_weights():
     moduli = {"E1": {0.0: [90.0, 100.0, 110.0], 0.05: [50.0, 60.0, 70.0]}, "G12": {0.0: [1, 2, 3]}}
     sigma = {"E1": [0.1, 0.05], "G12": None}
     relative = {"one": [0.01, 0.02, 0.03]}

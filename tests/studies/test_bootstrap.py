@@ -414,6 +414,16 @@ def test_ratios_leave_out_what_failed():
                         {"a": 2.0, "b": 4.0})  # fmt: skip
     assert early["a"].to_base == pytest.approx([0.5, 1.0, NAN], nan_ok=True)
     assert early["b"].to_base == pytest.approx([NAN, 0.25, NAN], nan_ok=True)
+    """Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps)."""
+    model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
+
+    def load(nu12):
+        law = HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=nu12)
+        return float(MembraneSolver().run(model, law).load[-1])
+
+    found = ratios([0.0, 0.4], [load(0.0), load(0.4)], load(0.24))
+    expected = np.exp(-(found.nu12 - 0.24) * np.log(1.1))
+    assert found.to_base == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_bar_in_closed_form(bars, tmp_path, drawn):
@@ -444,19 +454,6 @@ def test_a_value_that_fails_is_named(bars):
         vary_nu12(project, VARIED, [0.45])
     with pytest.raises(SolverFailure):  # the card as it is
         vary_nu12(project, replace(VARIED, law=replace(VARIED.law, nu12=0.41)))
-
-
-def test_a_straight_strip_in_closed_form():
-    """Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps)."""
-    model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
-
-    def load(nu12):
-        law = HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=nu12)
-        return float(MembraneSolver().run(model, law).load[-1])
-
-    found = ratios([0.0, 0.4], [load(0.0), load(0.4)], load(0.24))
-    expected = np.exp(-(found.nu12 - 0.24) * np.log(1.1))
-    assert found.to_base == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.fixture(autouse=True)

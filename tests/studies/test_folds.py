@@ -98,9 +98,6 @@ def test_the_best_start_of_a_fold_counts(monkeypatch):
     assert compare.best_of(setup_of(), problem, 3) == "of start 0 by options"
     ends[0] = None
     assert compare.best_of(setup_of(), problem, 3) is None
-
-
-def test_a_fold_without_a_fit_or_an_analysis(monkeypatch):
     part = SimpleNamespace(evaluate=lambda unknowns, jacobian, warm: None)
     parts = (SimpleNamespace(name="bubble"), SimpleNamespace(name="warp"))
     whole = SimpleNamespace(comparisons=parts, part=lambda numbers: {(1,): part}[tuple(numbers)])

@@ -192,9 +192,6 @@ def test_numbers():
         "to_next_finer": pytest.approx([0.2 * ROOT, 0.1 * ROOT]), "largest_load": 10.0,
         "order": pytest.approx(1.0),
     }  # fmt: skip
-
-
-def test_the_order_of_a_curve():
     # The last change, 0.158 N of 10, is the noise; and two levels have but one change.
     for runs, noise in ((RUNS, 0.0159), (RUNS[1:], 1e-7)):
         assert told(runs, noise)["rms_N"]["order"] is None
