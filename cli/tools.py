@@ -20,9 +20,8 @@ from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, Number, numbers
-from ..solvers.bars import diagnose
 from ..solvers.base import Diagnosis
-from ..solvers.registry import command_line, solver_names
+from ..solvers.registry import command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
 from .options import AS_JSON
 from .terminal import FILE, WORSE, command, show

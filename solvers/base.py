@@ -341,11 +341,9 @@ def pass_on(said: Announcement) -> None:
 
 
 def cell_blocks(
-    path: Path,
-    numbers: NDArray[np.int64],
-    elements: Iterable[tuple[int, NDArray[np.int64]]],
+    path: Path, numbers: NDArray[np.int64], elements: Iterable[tuple[int, NDArray[np.int64]]],
     names: Mapping[int, tuple[str, tuple[int, ...] | None]],
-) -> list[tuple[str, NDArray[Any]]]:
+) -> list[tuple[str, NDArray[Any]]]:  # fmt: skip
     """Return meshio's blocks of elements of one type, their nodes counted from 0.
 
     numbers : (n,) of the nodes in the file, increasing. names : by the file's type: meshio's name,

@@ -276,13 +276,9 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
     remarks = [(note.kind, str(note), note.of) for note in map(as_note, history.remarks)]
     unstable = None if history.unstable is None else list(map(str, history.unstable))
     words = {
-        "key": key,
-        "seconds": float(seconds),
-        "iterations": int(history.iterations),
-        "unstable": unstable,
-        "remarks": remarks,
-        "early": str(history.early),
-    }
+        "key": key, "seconds": float(seconds), "iterations": int(history.iterations),
+        "unstable": unstable, "remarks": remarks, "early": str(history.early),
+    }  # fmt: skip
     content = io.BytesIO()
     np.savez_compressed(content, words=np.array(json.dumps(words)), **arrays)
     whole = content.getvalue()

@@ -167,10 +167,9 @@ def licence_settings(
 class Offer:
     """A solver by name, made when it is called with its options.
 
-    name : in project files and of --solver. package : its folder, as a package: the class of the
-    solver is in the module `solver`, and the module `diagnosis` has `diagnose(named)`, a list of
-    `Diagnosis` (`named`: a program to look at, or None). solver : name of the class. settings :
-    schema of its table in a project.
+    name : in project files and of --solver. package : its folder, as a package, whose module
+    `solver` has the class and `diagnose(named)`, a list of `Diagnosis` (`named`: a program to look
+    at, or None). solver : name of the class. settings : schema of its table in a project.
     """
 
     name: str
@@ -191,6 +190,6 @@ class Offer:
 
     def diagnose(self, named: Path | str | None = None) -> list[Diagnosis]:
         """Diagnose every installation of it on this machine, each on the bars."""
-        module = importlib.import_module(f"{self.package}.diagnosis")
+        module = importlib.import_module(f"{self.package}.solver")
         found: list[Diagnosis] = module.diagnose(named)
         return found

@@ -23,8 +23,7 @@ from ...meshes.strip_models import WIDTH, UniaxialModel, bias_strip, straight_st
 from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import Solver
-from ...solvers.calculix.diagnosis import diagnose
-from ...solvers.calculix.solver import CalculixSolver
+from ...solvers.calculix.solver import CalculixSolver, diagnose
 from ...solvers.membrane.solver import MembraneSolver
 from .closed_forms import Number, bent_tubes, hencky_membranes, thin_walls
 

@@ -28,7 +28,7 @@ from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
 from ...meshes.mesh import enclosed_volume
-from .. import rigid
+from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..decks import render
 from .deck import MESH_FILE, Converged, Run, Setup, mesh_text
@@ -148,23 +148,18 @@ def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
 
 
 def cylinder_decks(
-    model: CylinderModel,
-    law: HypoelasticLaw,
-    solids: SolidMesh,
-    bending: Mapping[str, Any] | None = None,
-    folder: Path | None = None,
-) -> dict[str, str]:
+    model: CylinderModel, law: HypoelasticLaw, solids: SolidMesh,
+    bending: Mapping[str, Any] | None = None, folder: Path | None = None,
+) -> dict[str, str]:  # fmt: skip
     """Return the text of each input file by name; InputError: a template that cannot be used.
 
     bending : of `bending_context`; inflation alone unless given. folder : the user's templates.
     """
     mesh: dict[str, Any] = {
-        "element": ELEMENT,
-        "points": solids.points.tolist(),
-        "elements": (solids.elements + 1).tolist(),
-        "element_sets": _named(solids.element_sets),
+        "element": ELEMENT, "points": solids.points.tolist(),
+        "elements": (solids.elements + 1).tolist(), "element_sets": _named(solids.element_sets),
         "node_sets": _named(solids.node_sets),
-    }
+    }  # fmt: skip
     # The plane of the caps is xy, where the warp runs along x or y.
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
     angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
@@ -255,22 +250,20 @@ def bending_context(
     at, under = solids.points + inflated, solids.node_sets["support_bottom"]
     low = float(at[under, 1].min()) + INTO
     bodies = {
-        "SUPPORT_BODY": rigid.support_body(model.supports, radius, low),
-        "COLLAR_BODY": rigid.collar_body(model.collar, at, ABOVE),
+        "SUPPORT_BODY": prescribed.support_body(model.supports, radius, low),
+        "COLLAR_BODY": prescribed.collar_body(model.collar, at, ABOVE),
     }
     may_touch = _may_touch(model, radius)
     listed, node, element = [], len(solids.points), len(solids.elements)
     for name, body in bodies.items():
         listed.append(
             {
-                "name": name,
-                "points": body.points.tolist(),
-                "elements": (body.elements + 1 + node).tolist(),
-                "first_node": node,
+                "name": name, "points": body.points.tolist(),
+                "elements": (body.elements + 1 + node).tolist(), "first_node": node,
                 "first_element": element,
                 "fabric": (solids.element_sets["outside"][may_touch[name]] + 1).tolist(),
             }
-        )
+        )  # fmt: skip
         node, element = node + len(body.points), element + len(body.elements)
     way = ABOVE + model.deflections[-1]
     gas = gas or GasCurve(np.zeros(1), np.full(1, model.pressure))
@@ -279,22 +272,18 @@ def bending_context(
         if deflection > 0:  # before, the collar is not on the cylinder
             pressures.append((REST + ABOVE + float(deflection), float(pressure)))
     return {
-        "bodies": listed,
-        "stiffness": STIFFNESS,
-        "path": [[0.0, 0.0], [REST, 0.0], [REST + way, way]],
-        "pressures": pressures,
-        "first": FIRST_BENDING,
-        "least": LEAST_BENDING,
+        "bodies": listed, "stiffness": STIFFNESS,
+        "path": [[0.0, 0.0], [REST, 0.0], [REST + way, way]], "pressures": pressures,
+        "first": FIRST_BENDING, "least": LEAST_BENDING,
         "longest": min(LONGEST, float(np.diff(model.increments, prepend=0.0).max())),
-        "duration": REST + way,
-        "force_tolerance": TOLERANCES_BENDING[0],
+        "duration": REST + way, "force_tolerance": TOLERANCES_BENDING[0],
         "correction_tolerance": TOLERANCES_BENDING[1],
-    }
+    }  # fmt: skip
 
 
 def body_nodes(solids: int) -> tuple[slice, slice]:
     """Return the nodes of support and collar in a result, after those of the `solids` (count)."""
-    around, across = rigid.SUPPORT_COUNTS
+    around, across = prescribed.SUPPORT_COUNTS
     support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
 
@@ -330,14 +319,10 @@ def inflation_history(
     middle = np.ascontiguousarray(solids.middle(displacement))
     pressure = np.array(model.inflation)
     return History(
-        pressure,
-        middle,
-        *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
-        cavity_pressure=pressure,
-        cavity_volume=volumes(model, middle),
-        iterations=iterations,
+        pressure, middle, *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
+        cavity_pressure=pressure, cavity_volume=volumes(model, middle), iterations=iterations,
         path=middle,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,13 +345,9 @@ class BentCylinder:
 
 
 def bent_cylinder(
-    path: Path,
-    model: CylinderModel,
-    solids: SolidMesh,
-    iterations: int,
-    converged: Collection[tuple[int, int]] | None = None,
-    why: str = "",
-) -> BentCylinder:
+    path: Path, model: CylinderModel, solids: SolidMesh, iterations: int,
+    converged: Collection[tuple[int, int]] | None = None, why: str = "",
+) -> BentCylinder:  # fmt: skip
     """Read what the result file of a deck with both steps holds of bending.
 
     converged : steps and increments that converged, of a run that stopped early, and `why`; None:
@@ -429,17 +410,12 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         early = f"the run stopped early; the last increment is at {reached:.4g} mm"
         early += f": {bent.why}" if bent.why else ""
     return History(
-        -reactions["collar"][:, 1],
-        at(bent.displacement),
-        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)),
-        reactions,
-        cavity_pressure=gas.at(wanted),
-        cavity_volume=at(bent.volume),
-        iterations=bent.iterations,
-        path=bent.displacement,
-        remarks=(Note(EARLY, early),) if early else (),
+        -reactions["collar"][:, 1], at(bent.displacement),
+        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)), reactions,
+        cavity_pressure=gas.at(wanted), cavity_volume=at(bent.volume), iterations=bent.iterations,
+        path=bent.displacement, remarks=(Note(EARLY, early),) if early else (),
         early=early if len(wanted) <= len(model.deflections) else "",
-    )
+    )  # fmt: skip
 
 
 def _between(x: Array, values: Array, wanted: Array) -> Array:

@@ -81,14 +81,9 @@ TIME_INCREMENTATION = "8, 12, 9, 24, 20, 4, , 10\n0.5, 0.5, 0.75, 0.85, , , 4"
 
 
 def deck_files(
-    deck: str,
-    name: str,
-    shells: ShellMesh,
-    element: str,
-    tolerances: tuple[float, float],
-    context: Mapping[str, Any],
-    folder: Path | None = None,
-) -> dict[str, str]:
+    deck: str, name: str, shells: ShellMesh, element: str, tolerances: tuple[float, float],
+    context: Mapping[str, Any], folder: Path | None = None,
+) -> dict[str, str]:  # fmt: skip
     """Return the text of `job.inp`, of template `deck`, and of the mesh.
 
     name : of the test, for its title. tolerances : largest residual force over the mean force, and
@@ -104,17 +99,11 @@ def deck_files(
         },
     }
     common = {
-        "version": __version__,
-        "title": f"{name}, {len(shells.elements)} shells {element}",
-        "mesh_file": MESH_FILE,
-        "mesh": mesh,
-        "material": MATERIAL,
-        "state_variables": STATE_VARIABLES,
-        "element": element,
-        "force_tolerance": tolerances[0],
-        "correction_tolerance": tolerances[1],
-        "time_incrementation": TIME_INCREMENTATION,
-    }
+        "version": __version__, "title": f"{name}, {len(shells.elements)} shells {element}",
+        "mesh_file": MESH_FILE, "mesh": mesh, "material": MATERIAL,
+        "state_variables": STATE_VARIABLES, "element": element, "force_tolerance": tolerances[0],
+        "correction_tolerance": tolerances[1], "time_incrementation": TIME_INCREMENTATION,
+    }  # fmt: skip
     return {
         "job.inp": render("calculix", deck, {**common, **context}, folder),
         MESH_FILE: mesh_text(MESH, mesh, folder),
@@ -246,13 +235,12 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
         places += [places[-1], moved]
     return [
         {
-            "node": int(node) + 1,
-            "dof": axis + 1,
+            "node": int(node) + 1, "dof": axis + 1,
             "path": [(t, float(at[node, axis])) for t, at in zip(times, places, strict=True)],
         }
         for node in rim
         for axis in model.supports["rim"]
-    ]
+    ]  # fmt: skip
 
 
 def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:

@@ -9,10 +9,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from ...errors import InputError, SolverFailure
 from ...files import cache_folder
+from ...readers.sections import Positive
 from ..process import Outcome, disk_full, log_tail
+from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_CCX"
 #: Origins of a ccx that somebody chose: there has to be nothing wrong with these.
@@ -213,3 +218,29 @@ def collapsed(folder: Path, job: str, outcome: Outcome) -> bool:
     if outcome.timed_out or outcome.signal_name or disk_full(folder, text.splitlines(), outcome):
         return False
     return _GAVE_UP.search(text) is not None and _JACOBIAN.search(text) is None
+
+
+class CalculixSettings(ExternalSettings):
+    """The settings of CalculiX; `CalculixSolver` says what each key means."""
+
+    paths = ("templates", "scratch", "licence_folder")
+    programs = started = ("ccx",)
+    overrides = (
+        Override(
+            "ccx", "The CalculiX to run.", metavar="PATH",
+            look="A CalculiX to look at beside the ones found.",
+        ),
+        Override("templates", "Folder of your own input decks.", metavar="PATH", path=True),
+        Override("element", "Shell element", "S8R or S4"),
+    )  # fmt: skip
+
+    ccx: str | None = None
+    templates: str | None = None
+    element: Literal["S8R", "S4"] = "S8R"
+    timeout: Positive = 3600.0
+    scratch: str | None = None
+    keep: bool = False
+    threads: Annotated[int, Field(ge=1)] = 1
+
+
+OFFER = Offer("calculix", __package__, "CalculixSolver", CalculixSettings)

@@ -29,19 +29,12 @@ NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 
 
 #: meshio's name of each element type of the format, and its node order where it differs.
 CELLS: dict[int, tuple[str, tuple[int, ...] | None]] = {
-    1: ("hexahedron", None),
-    2: ("wedge", None),
-    3: ("tetra", None),
+    1: ("hexahedron", None), 2: ("wedge", None), 3: ("tetra", None),
     4: ("hexahedron20", (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)),
-    5: ("wedge15", (*range(9), 12, 13, 14, 9, 10, 11)),
-    6: ("tetra10", None),
-    7: ("triangle", None),
-    8: ("triangle6", None),
-    9: ("quad", None),
-    10: ("quad8", None),
-    11: ("line", None),
+    5: ("wedge15", (*range(9), 12, 13, 14, 9, 10, 11)), 6: ("tetra10", None), 7: ("triangle", None),
+    8: ("triangle6", None), 9: ("quad", None), 10: ("quad8", None), 11: ("line", None),
     12: ("line3", (0, 2, 1)),
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,6 @@ from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import piece_constants
 
-# The file that carries a law's moduli into the material library, whatever their number.
-#
-# A deck cannot: CalculiX copies the constants of a material into a field of 21 numbers (2.20; 2.21
-# makes it as long as it must be) and writes on beyond its end without a word.
-
 SUFFIX = ".law"
 #: First line of the file, before the law's number.
 TITLE = "bubblefit law"
@@ -75,14 +70,9 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-pthread")
 
 
 def constants(
-    law: HypoelasticLaw,
-    normal_modulus: float | None = None,
-    transverse_shear: float | None = None,
-    angle: float = 0.0,
-    normal_axis: int = 3,
-    whole_times: bool = False,
-    whole_until: int = 0,
-) -> tuple[float, ...]:
+    law: HypoelasticLaw, normal_modulus: float | None = None, transverse_shear: float | None = None,
+    angle: float = 0.0, normal_axis: int = 3, whole_times: bool = False, whole_until: int = 0,
+) -> tuple[float, ...]:  # fmt: skip
     """Return the constants (9,) of `*USER MATERIAL`, as `law.c` has them.
 
     nu12, area power, normal modulus (MPa), transverse shear modulus (MPa), angle (degrees), normal
@@ -90,13 +80,12 @@ def constants(
     which CalculiX reads one more line, and never above 21, of which it writes beyond a field.
 
     normal_modulus, transverse_shear : MPa; the larger of E1 and E2, and G12, at no strain unless
-        given. angle : from the first in-plane axis to the warp, degrees, turning about the normal.
+    given. angle : from the first in-plane axis to the warp, degrees, turning about the normal.
     normal_axis : 3 without `*ORIENTATION` (warp from global x, fill from y) or with a rectangular
-        one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is
-        axial and fill hoop at angle 0.
-    whole_times : commit strain and stress only where the total time is a whole number, so that the
-        law's increments are the deck's steps of length 1, whatever increments they took.
-    whole_until : instead: so up to this total time, and from there on at every increment.
+    one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is axial
+    and fill hoop at angle 0. whole_times : commit strain and stress only where the total time is a
+    whole number, so that the law's increments are the deck's steps of length 1, whatever increments
+    they took. whole_until : instead: so up to this total time, and then at every increment.
     """
     if normal_modulus is None:
         normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
@@ -169,28 +158,22 @@ def _compile(command: list[str]) -> None:
 
 def calculix(card: MaterialCard, options: NoOptions) -> Export:
     """Export *MATERIAL with *USER MATERIAL and *DEPVAR, the C source of its library, its moduli."""
-    says = Says(
-        carries=(
-            "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
-            "moduli hold, thickness constant or incompressible",
-        ),
-        loses=(
-            "the unsymmetric part of the tangent (CalculiX takes the symmetric one): more "
-            "iterations, the same result",
-            "through the thickness and in transverse shear the material is linear (constants 3 "
-            "and 4)",
-        ),
-        confirm=("that this ccx loads material libraries (Debian's does not): bubblefit doctor",),
+    carries = (
+        "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
+        "hold, thickness constant or incompressible"
     )
+    loses = (
+        "the unsymmetric part of the tangent (CalculiX takes the symmetric one): more iterations, "
+        "the same result",
+        "through the thickness and in transverse shear the material is linear (constants 3 and 4)",
+    )
+    confirm = "that this ccx loads material libraries (Debian's does not): bubblefit doctor"
+    says = Says(carries=(carries,), loses=loses, confirm=(confirm,))
     text = render(
-        "calculix/card.inp.j2",
-        head=heading(card, "CalculiX material", says, "**"),
-        material=MATERIAL,
-        constants=constants(card.law),
-        states=STATE_VARIABLES,
-        library=LIBRARY_FILE,
-        flags=" ".join(FLAGS),
-    )
+        "calculix/card.inp.j2", head=heading(card, "CalculiX material", says, "**"),
+        material=MATERIAL, constants=constants(card.law), states=STATE_VARIABLES,
+        library=LIBRARY_FILE, flags=" ".join(FLAGS),
+    )  # fmt: skip
     source = SOURCE.read_text(encoding="utf-8")
     return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
 

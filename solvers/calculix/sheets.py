@@ -22,7 +22,7 @@ from ...meshes.strip_models import (
     elongations,
 )
 from ..base import History, extremes, log_strain
-from ..pulls import at_elongations, grip_pulls
+from ..prescribed import at_elongations, grip_pulls
 from .deck import (
     FIRST_OF_STEP,
     Run,
@@ -96,12 +96,9 @@ def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: R
 
 
 def bubble_decks(
-    model: BubbleModel,
-    law: HypoelasticLaw,
-    shells: ShellMesh,
-    element: str,
+    model: BubbleModel, law: HypoelasticLaw, shells: ShellMesh, element: str,
     folder: Path | None = None,
-) -> dict[str, str]:
+) -> dict[str, str]:  # fmt: skip
     """Return the text of `job.inp` and the mesh, of shells on the model's reference surface.
 
     `folder` has the user's templates; InputError: one that cannot be used.
@@ -194,13 +191,9 @@ def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: 
 
 
 def strip_decks(
-    model: UniaxialModel,
-    law: HypoelasticLaw,
-    shells: ShellMesh,
-    element: str,
-    pulls: Array,
+    model: UniaxialModel, law: HypoelasticLaw, shells: ShellMesh, element: str, pulls: Array,
     folder: Path | None = None,
-) -> dict[str, str]:
+) -> dict[str, str]:  # fmt: skip
     """Return the text of each input file; `pulls` (increments,) mm of the pulled end, along -y."""
     angle = math.degrees(math.atan2(model.warp[1], model.warp[0]))
     context = {

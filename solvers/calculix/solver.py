@@ -3,24 +3,40 @@
 from __future__ import annotations
 
 import logging
+import os
+import re
+import subprocess
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import BubblefitError, InputError, SolverFailure
+from ...errors import BubblefitError, InputError, OutputError, SolverFailure
+from ...files import render
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import PatchModel, UniaxialModel
-from ..base import History, Progress, SolverCheck, analysis_of
+from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
+from ..base import Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
 from ..scratch import run_folder
 from . import cylinder, sheets
 from .deck import ELEMENTS, Reader, Rescue, Run, Setup, ShellMesh, shell_mesh
-from .executable import ADVICE, Executable, collapsed, find_ccx, increments, reason
-from .library import law_files, material_library
+from .executable import (
+    ADVICE,
+    FOUND,
+    NAMED,
+    Executable,
+    collapsed,
+    every_ccx,
+    find_ccx,
+    increments,
+    reason,
+)
+from .library import MATERIAL, STATE_VARIABLES, constants, law_files, material_library
 
 log = logging.getLogger(__name__)
 
@@ -29,46 +45,30 @@ TIMEOUT_S = 3600.0
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
-    BubbleModel: sheets.analyse_bubble,
-    UniaxialModel: sheets.analyse_strip,
-    CylinderModel: cylinder.analyse,
-    PatchModel: sheets.analyse_patch,
-}
+    BubbleModel: sheets.analyse_bubble, UniaxialModel: sheets.analyse_strip,
+    CylinderModel: cylinder.analyse, PatchModel: sheets.analyse_patch,
+}  # fmt: skip
 
 
 class CalculixSolver:
     """CalculiX as a subprocess.
 
-    Parameters
-    ----------
-    ccx : the program; found by `find_ccx` unless given.
-    templates : the user's own folder of templates, see docs/how-to/calculix.md.
-    element : "S8R" or "S4".
-    timeout : s, of one run, unless `run` is given another.
-    scratch : folder for scratch folders; memory, else the temporary folder, unless given.
-    keep : keep scratch folders of runs that end well, too.
-    threads : of one run; starts run side by side already.
-    progress : called with every increment that converged while a run is under way.
-
-    Raises
-    ------
-    InputError : an element there is not, a template folder that is not there.
+    ccx : the program; found by `find_ccx` unless given. templates : the user's own folder of
+    templates. element : "S8R" or "S4". timeout : s, of one run, unless `run` is given another.
+    scratch : folder for scratch folders; memory, else the temporary folder, unless given. keep :
+    also those of runs that end well. threads : of one run; starts run side by side already.
+    progress : called with every increment that converged. Raises InputError : an element there is
+    not, a template folder that is not there.
     """
 
     name = "calculix"
     external = True
 
     def __init__(
-        self,
-        ccx: Path | str | None = None,
-        templates: Path | None = None,
-        element: str = "S8R",
-        timeout: float = TIMEOUT_S,
-        scratch: Path | None = None,
-        keep: bool = False,
-        threads: int = 1,
-        progress: Callable[[Progress], None] | None = None,
-    ) -> None:
+        self, ccx: Path | str | None = None, templates: Path | None = None, element: str = "S8R",
+        timeout: float = TIMEOUT_S, scratch: Path | None = None, keep: bool = False,
+        threads: int = 1, progress: Callable[[Progress], None] | None = None,
+    ) -> None:  # fmt: skip
         if element not in ELEMENTS:
             problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
             raise InputError(None, "solver.calculix.element", problem)
@@ -111,12 +111,9 @@ class CalculixSolver:
         return self._found
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
 
         SolverFailure: it did not end well; the scratch folder is kept and named. InputError: a
@@ -132,13 +129,9 @@ class CalculixSolver:
         return analyse(model, law, Setup(self.element, self.templates, self._shell_mesh), run)
 
     def _once(
-        self,
-        files: Mapping[str, str],
-        read: Reader[T],
-        parent: Path | None,
-        timeout: float,
+        self, files: Mapping[str, str], read: Reader[T], parent: Path | None, timeout: float,
         rescue: Rescue[T] | None = None,
-    ) -> T:
+    ) -> T:  # fmt: skip
         """Run in a fresh scratch folder; return what `read`, or `rescue` of a bad end, makes."""
         program, library = self.executable().path, material_library()
         with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
@@ -172,3 +165,128 @@ class CalculixSolver:
         if self._shells is None or self._shells[0] is not mesh:
             self._shells = (mesh, shell_mesh(mesh, self.element))
         return self._shells[1]
+
+
+SECONDS = 120.0
+
+
+#: Corners of a bar, in the order of C3D8.
+NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+
+
+def bar_deck() -> str:
+    """Return the deck: every bar pulled along x, the fabric turned so that its direction lies
+    there."""
+    bars = [
+        {
+            "index": index,
+            "elongation": bar.elongation,
+            "constants": constants(
+                bar_law(bar.model), angle=0.0 if bar.direction == "warp" else -90.0
+            ),
+        }
+        for index, bar in enumerate(BARS)
+    ]
+    return render(
+        "calculix/bars.inp.j2", bars=bars, nodes=NODES, increments=INCREMENTS, material=MATERIAL,
+        states=STATE_VARIABLES,
+    )  # fmt: skip
+
+
+def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> tuple[float, ...]:
+    """Return the end stresses (MPa) of BARS by this ccx, each within TOLERANCE of Marc's.
+
+    SolverFailure: no compiler, ccx does not end well, or a stress is wrong. OutputError: no
+    temporary folder.
+    """
+    library = material_library() if library is None else library
+    try:
+        with tempfile.TemporaryDirectory(prefix="bubblefit-bars-") as folder:
+            stresses = _run(ccx, library, Path(folder), timeout)
+    except OSError as error:
+        problem = f"cannot be used: {error.strerror}; choose another TMPDIR"
+        raise OutputError(f"{tempfile.gettempdir()}: {problem}") from None
+    for bar, stress in zip(BARS, stresses, strict=True):
+        if not abs(stress / bar.stress - 1) < TOLERANCE:
+            problem = f"{bar.model} {bar.direction} bar: {stress:.4g} MPa, not {bar.stress}"
+            raise SolverFailure(f"{ccx} does not carry the law ({problem})", "calculix")
+    return stresses
+
+
+def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float, ...]:
+    files = {"bars.inp": bar_deck()}
+    for bar in BARS:
+        files |= law_files(bar_law(bar.model))
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    paths = [str(library.parent), os.environ.get("LD_LIBRARY_PATH", "")]
+    search = os.pathsep.join(path for path in paths if path)
+    variables = {**os.environ, "LD_LIBRARY_PATH": search, "OMP_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(
+            [ccx, "bars"], cwd=folder, env=variables, timeout=timeout, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise SolverFailure(f"{ccx}: four bars took more than {timeout:g} s", "calculix") from None
+    except OSError as error:
+        raise SolverFailure(f"{ccx} cannot be started: {error.strerror}", "calculix") from None
+    tail = "\n".join(done.stdout.decode(errors="replace").splitlines()[-25:])
+    printed = folder / "bars.dat"
+    if done.returncode != 0 or not printed.is_file():
+        problem = f"{ccx} did not end well on four bars"
+        raise SolverFailure(problem, "calculix", done.returncode, tail)
+    stresses = _end_stresses(printed.read_text(encoding="utf-8", errors="replace"))
+    if len(stresses) != len(BARS):
+        raise SolverFailure(f"{ccx} printed no end stresses", "calculix", done.returncode, tail)
+    return stresses
+
+
+def _end_stresses(text: str) -> tuple[float, ...]:
+    """Return sxx (MPa) of the bars from a .dat file at the end of the step; empty without it."""
+    found: dict[int, float] = {}
+    for block in re.split(r"(?m)^\s*stresses ", text)[1:]:
+        head, *rows = block.splitlines()
+        time = re.search(r"time\s+(\S+)", head)
+        if time is None or abs(float(time[1]) - 1) > 1e-6:
+            continue
+        for row in rows:
+            numbers = row.split()
+            # element, point, six components
+            if len(numbers) == 8:
+                found[int(numbers[0])] = float(numbers[2])
+    return tuple(found[element] for element in sorted(found))
+
+
+def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
+    """Return all there are (`named`: one more, by path).
+
+    One that is not there at all is an entry without a path, expected only if it was named.
+    """
+    try:
+        candidates = every_ccx(named)
+    except BubblefitError as error:
+        return [_absent(str(error), NAMED, True)]
+    if not candidates:
+        return [_absent(f"there is no ccx; {ADVICE}", "not found", False)]
+    return [_tried(candidate) for candidate in candidates]
+
+
+def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
+    return Diagnosis("calculix", "", None, origin, expected, None, False, advice=advice)
+
+
+def _tried(ccx: Executable) -> Diagnosis:
+    expected = ccx.origin != FOUND
+    usable, stresses, off, advice = False, None, None, ""
+    if ccx.external is False:
+        advice = f"cannot load material libraries; {ADVICE}"
+    else:
+        try:
+            stresses = prove(ccx.path)
+            usable, off = True, difference(stresses)
+        except BubblefitError as error:
+            advice = str(error).splitlines()[0]
+    carries = {True: "yes", False: "no", None: "cannot be seen"}[ccx.external]
+    return Diagnosis("calculix", ccx.version, ccx.path, ccx.origin, expected, ccx.external,
+                     usable, stresses, off, advice, f"external materials: {carries}")  # fmt: skip

@@ -14,7 +14,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import enclosed_volume
 from ..base import EARLY, History, extremes, log_strain
-from ..rigid import collar_body, support_body
+from ..prescribed import collar_body, support_body
 from .deck import (
     Run,
     deck_text,
@@ -99,11 +99,9 @@ def bending_deck(
 
 
 def _deck(
-    model: CylinderModel,
-    law: HypoelasticLaw,
-    settings: MarcSettings,
+    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings,
     bending: dict[str, Any] | None,
-) -> str:
+) -> str:  # fmt: skip
     mesh, filling, steps = model.mesh, len(model.inflation), len(model.increments)
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
@@ -183,17 +181,10 @@ def cylinder_history(
     gas = model.gas.closed_in(model.pressure, full)
     pressure = [gas.pressure(float(v)) for v in volume]
     return History(
-        -forces["collar"][:, 1],
-        u,
-        *extremes(log_strain(mesh, u, mesh.warp)),
-        forces,
-        cavity_pressure=np.array(pressure),
-        cavity_volume=volume,
-        iterations=iterations,
-        path=u,
-        remarks=tuple(remarks),
-        early=early,
-    )
+        -forces["collar"][:, 1], u, *extremes(log_strain(mesh, u, mesh.warp)), forces,
+        cavity_pressure=np.array(pressure), cavity_volume=volume, iterations=iterations, path=u,
+        remarks=tuple(remarks), early=early,
+    )  # fmt: skip
 
 
 def may_touch(model: CylinderModel) -> dict[str, Numbers]:
@@ -244,8 +235,7 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, r
     deck = inflation_deck(model, law, settings)
     shape = run(deck, filling, lambda t19, _: inflated(t19, model))
     return run(
-        bending_deck(model, law, settings, shape),
-        filling + APPROACH + bending,
+        bending_deck(model, law, settings, shape), filling + APPROACH + bending,
         lambda t19, n: cylinder_history(t19, model, n),
         lambda t19, n: cylinder_history(t19, model, n, ended=False),
-    )
+    )  # fmt: skip

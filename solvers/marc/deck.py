@@ -64,14 +64,12 @@ def schedule(
         "tolerance": TOLERANCE,
         "cases": [
             {
-                "name": n,
-                "increments": cuts * count,
-                "step": 1 / cuts,
+                "name": n, "increments": cuts * count, "step": 1 / cuts,
                 "conditions": list(conditions),
             }
             for n, count, conditions in cases
         ],
-    }
+    }  # fmt: skip
 
 
 def fixed(
@@ -80,12 +78,9 @@ def fixed(
     """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
     given = list(values) or [0.0] * len(dofs)
     return {
-        "name": name,
-        "set": members,
-        "dofs": [dof + 1 for dof in dofs],
-        "amounts": given,
+        "name": name, "set": members, "dofs": [dof + 1 for dof in dofs], "amounts": given,
         "tables": [table if value else 0 for value in given],
-    }
+    }  # fmt: skip
 
 
 def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
@@ -114,17 +109,10 @@ def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any
 
 
 def deck_text(
-    template: str,
-    title: str,
-    settings: MarcSettings,
-    law: HypoelasticLaw,
-    fabric: dict[str, Any],
-    sets: Sequence[dict[str, Any]],
-    cases: Sequence[tuple[str, int, Sequence[str]]],
-    tables: Sequence[dict[str, Any]],
-    held: Sequence[dict[str, Any]],
-    **context: Any,
-) -> str:
+    template: str, title: str, settings: MarcSettings, law: HypoelasticLaw, fabric: dict[str, Any],
+    sets: Sequence[dict[str, Any]], cases: Sequence[tuple[str, int, Sequence[str]]],
+    tables: Sequence[dict[str, Any]], held: Sequence[dict[str, Any]], **context: Any,
+) -> str:  # fmt: skip
     """Return the deck of a `fabric_context`, of node sets, load cases, tables over time, supports.
 
     All supports hold before the first increment, too. context : what only this deck's template is
@@ -133,19 +121,12 @@ def deck_text(
     whole = {
         "version": __version__,
         "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
-        "element": settings.element,
-        "shell": settings.element != MEMBRANE,
-        "follower": "pressure" in context,
-        "gas": None,
-        **fabric,
-        "sets": [*fabric["sets"], *sets],
-        **law_context(law, settings),
-        **schedule(settings, cases),
-        "time_tables": tables,
-        "fixed": held,
-        "start": {"name": "start", "conditions": [one["name"] for one in held]},
+        "element": settings.element, "shell": settings.element != MEMBRANE,
+        "follower": "pressure" in context, "gas": None, **fabric, "sets": [*fabric["sets"], *sets],
+        **law_context(law, settings), **schedule(settings, cases), "time_tables": tables,
+        "fixed": held, "start": {"name": "start", "conditions": [one["name"] for one in held]},
         **context,
-    }
+    }  # fmt: skip
     folder = Path(settings.templates) if settings.templates is not None else None
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
     return render("marc", template, whole, folder, instead)

@@ -281,14 +281,9 @@ class Job:
 
 
 def run_job(
-    job: Job,
-    settings: MarcSettings,
-    read: Reader[T],
-    rescue: Reader[T] | None = None,
-    parent: Path | None = None,
-    timeout: float | None = None,
-    tell: Tell | None = None,
-) -> tuple[T, Ending]:
+    job: Job, settings: MarcSettings, read: Reader[T], rescue: Reader[T] | None = None,
+    parent: Path | None = None, timeout: float | None = None, tell: Tell | None = None,
+) -> tuple[T, Ending]:  # fmt: skip
     """Run a job in a fresh scratch folder below `parent`; return what `read` makes of its results.
 
     rescue : of those of a run that stopped early. timeout : s; the settings' unless given. tell :
@@ -298,9 +293,8 @@ def run_job(
     """
     find_marc(settings)
     seconds, subroutine = (
-        timeout or settings.timeout,
-        None if job.subroutine is None else SUBROUTINE,
-    )
+        timeout or settings.timeout, None if job.subroutine is None else SUBROUTINE,
+    )  # fmt: skip
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
         sources = {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine}
         try:

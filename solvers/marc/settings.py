@@ -55,14 +55,12 @@ class MarcSettings(ExternalSettings):
     uncounted = ("timeout", "keep", "include")
     overrides = (
         Override(
-            "marc",
-            "The Marc to run: run_marc, or a site's .toml.",
-            metavar="PATH",
+            "marc", "The Marc to run: run_marc, or a site's .toml.", metavar="PATH",
             look="The Marc (run_marc, or a site's .toml) to look at.",
         ),
         Override("templates", "Folder of your own input decks.", metavar="PATH", path=True),
         Override("element", "Shell element", "139, 75 or 18"),
-    )
+    )  # fmt: skip
 
     executable: str = "run_marc"
     version: str = ""

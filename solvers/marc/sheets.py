@@ -14,7 +14,7 @@ from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import UniaxialModel
 from ..base import History, extremes, log_strain
-from ..pulls import at_elongations, grip_pulls
+from ..prescribed import at_elongations, grip_pulls
 from .deck import (
     MEMBRANE,
     Run,
@@ -182,14 +182,10 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
             if name in model.mesh.node_sets
         }
     return History(
-        np.array(model.increments)[keep],
-        u[keep],
-        *extremes(log_strain(model.mesh, u, model.mesh.warp)),
-        sums,
-        iterations=iterations,
-        path=u,
+        np.array(model.increments)[keep], u[keep],
+        *extremes(log_strain(model.mesh, u, model.mesh.warp)), sums, iterations=iterations, path=u,
         remarks=() if forces is not None else (Note(NO_REACTIONS, NO_FORCES),),
-    )
+    )  # fmt: skip
 
 
 def opened(path: Path, model: UniaxialModel, count: int) -> Array:
@@ -220,13 +216,10 @@ def strip_history(
         for name in (*model.supports, model.pulled)
     }
     return History(
-        -model.load_factor * sums[model.pulled][:, 1],
-        corners,
-        *extremes(log_strain(model.mesh, corners, model.warp)),
-        sums,
-        iterations=iterations,
+        -model.load_factor * sums[model.pulled][:, 1], corners,
+        *extremes(log_strain(model.mesh, corners, model.warp)), sums, iterations=iterations,
         path=corners,
-    )
+    )  # fmt: skip
 
 
 def _opened(u: Array, model: UniaxialModel) -> Array:

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import Note, NoteKind, SolverFailure
+import numpy as np
+
+from ...errors import BubblefitError, Note, NoteKind, SolverFailure
 from ...materials.exports.subroutines import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.strip_models import UniaxialModel
-from ..base import EARLY, History, Progress, SolverCheck, analysis_of
+from ..bars import BARS, TOLERANCE, Bar, bar_law, bar_model, difference, stress_of
+from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark
 from ..settings import KEYS
 from . import cylinder, sheets
 from .deck import Reader, Run
 from .job import Job, find_marc, run_job
-from .settings import MarcSettings, marc_settings
+from .settings import VARIABLE, MarcSettings, marc_settings
 
 #: Kinds of notes that are made here.
 REPEATED = NoteKind("repeated increments")
@@ -33,36 +37,26 @@ MATTERING = (
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
-    BubbleModel: sheets.analyse_bubble,
-    UniaxialModel: sheets.analyse_strip,
+    BubbleModel: sheets.analyse_bubble, UniaxialModel: sheets.analyse_strip,
     CylinderModel: cylinder.analyse,
-}
+}  # fmt: skip
 
 
 class MarcSolver:
     """A licensed MSC Marc as a subprocess.
 
-    Parameters
-    ----------
-    marc : run_marc, or a file of the site's settings (.toml); BUBBLEFIT_MARC, else run_marc on
-        the PATH, unless given.
-    progress : called with every increment that ended while a run is under way.
-    settings : those of `MarcSettings` by name; None: not given.
-
-    Raises
-    ------
-    InputError : a setting that cannot be used.
+    marc : run_marc, or a file of the site's settings (.toml); BUBBLEFIT_MARC, else run_marc on the
+    PATH, unless given. progress : called with every increment that ended. settings : those of
+    `MarcSettings` by name; None: not given. Raises InputError : a setting that cannot be used.
     """
 
     name = "marc"
     external = True
 
     def __init__(
-        self,
-        marc: Path | str | None = None,
-        progress: Callable[[Progress], None] | None = None,
+        self, marc: Path | str | None = None, progress: Callable[[Progress], None] | None = None,
         **settings: Any,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.settings: MarcSettings = marc_settings(settings, None if marc is None else str(marc))
         self.progress = progress
 
@@ -109,12 +103,9 @@ class MarcSolver:
         return SolverCheck(self.name, True, self.settings.version, True)
 
     def run(
-        self,
-        model: Any,
-        law: HypoelasticLaw,
-        scratch: Path | None = None,
+        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:
+    ) -> History:  # fmt: skip
         """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
 
         SolverFailure: it did not end well; the scratch folder is kept and named. LicenceDenied: it
@@ -148,3 +139,51 @@ class MarcSolver:
         if settings.law != "hypela2":
             return None
         return hypela2_source({1: law}, own_state=settings.own_state, symmetric=settings.symmetric)
+
+
+SECONDS = 600.0
+
+
+def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
+    """Return the end stresses (MPa) of BARS by this Marc, each within TOLERANCE of the published.
+
+    SolverFailure: a bar did not end well, or its stress is wrong.
+    """
+    stresses = tuple(end_stress(solver, bar, timeout) for bar in BARS)
+    for bar, stress in zip(BARS, stresses, strict=True):
+        if not abs(stress / bar.stress - 1) < TOLERANCE:
+            problem = f"{bar.model} {bar.direction} bar: {stress:.5g} MPa, not {bar.stress}"
+            raise SolverFailure(f"this Marc does not carry the law ({problem})", solver.name)
+    return stresses
+
+
+def end_stress(solver: MarcSolver, bar: Bar, timeout: float | None = None) -> float:
+    """Return the Cauchy stress (MPa) at the end of one bar."""
+    model, law = bar_model(bar), bar_law(bar.model)
+    # The table of the modulus ends with the bar: to the reach of a law without a range its points
+    # would lie so far apart that the warp bar is 2e-4 off.
+    end = float(np.log1p(bar.elongation))
+    history = solver.run(model, replace(law, strain_range=np.full(3, end)), timeout=timeout)
+    return stress_of(model, history)
+
+
+NAMED, FOUND = "named", "PATH"
+
+
+def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
+    """Return one entry (`named`: the one to look at), none if it is neither there nor was named."""
+    origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else FOUND
+    expected = origin != FOUND
+    path, stresses, off, advice, version = None, None, None, "", ""
+    try:
+        solver = MarcSolver(named)
+        version = solver.settings.version or "?"
+        path = find_marc(solver.settings)
+        stresses = prove(solver)
+        off = difference(stresses)
+    except BubblefitError as error:
+        if path is None and not expected:
+            return []
+        advice = str(error).splitlines()[0]
+    return [Diagnosis("marc", version, path, origin, expected, None, stresses is not None,
+                      stresses, off, advice)]  # fmt: skip

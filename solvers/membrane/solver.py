@@ -13,10 +13,12 @@ from threadpoolctl import ThreadpoolController
 from ...errors import InputError
 from ...files import __version__
 from ...materials.law import HypoelasticLaw
+from ...materials.responses import bar
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.strip_models import PatchModel, UniaxialModel
-from ..base import BandEnd, History, Progress, SolverCheck, analysis_of, parameters_of
+from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
+from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words
 from . import bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
@@ -140,3 +142,19 @@ class MembraneSolver:
         membrane.strain_old[:] = 0.0
         membrane.stress_old[:] = 0.0
         return membrane
+
+
+EMBEDDED = "embedded"
+
+
+def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
+    """Return one entry, with the bars in the solver's increments; there is no program to name."""
+    stresses = []
+    for one in BARS:
+        pulled = int(one.direction == "fill")
+        ends = np.log1p(one.elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
+        stresses.append(float(bar(bar_law(one.model), pulled, ends)[1][-1, pulled]))
+    off = difference(tuple(stresses))
+    advice = "the embedded law is broken; install bubblefit and numba again"
+    return [Diagnosis("membrane", __version__, None, EMBEDDED, True, None, off < TOLERANCE,
+                      tuple(stresses), off, "" if off < TOLERANCE else advice)]  # fmt: skip

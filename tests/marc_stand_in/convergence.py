@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,20 +14,14 @@ from bubblefit.solvers.membrane.newton import Membrane
 
 from .deck import Array, Content, Control, DeckError
 
-
-@dataclass
-class State:
-    """displacement (n, 3) mm, unbalance (n, 3) N: what supports take; contact (n, 3) N."""
-
-    displacement: Array
-    unbalance: Array
-    contact: Array | None
+#: displacement (n, 3) mm, unbalance (n, 3) N: what supports take; contact (n, 3) N, or None.
+State = namedtuple("State", "displacement unbalance contact")
 
 
 def control_of(content: Content) -> Control:
     """Return what all load cases ask for; DeckError where they differ, which Marc would run."""
     first, *others = [case.control for case in content.cases]
-    if first is None or any(other != first for other in others):
+    if any(other != first for other in others):
         raise DeckError("stand-in: one control for all load cases")
     return first
 
@@ -70,13 +64,12 @@ def converging(control: Control, found: Callable[[State], None] | None = None) -
     def full(original: Any) -> Any:
         def equilibrium(self: Any, u: Array, pressure: float) -> Array | None:
             self.tolerance = control.residual
-            tangent, last = self.tangent, np.inf
+            tangent, last = self.tangent, [np.inf]
             solve = tangent.solve
 
             def solved(rhs: Array) -> Array:
-                nonlocal last
                 answer = solve(rhs)
-                last = float(np.abs(answer).max())
+                last[0] = float(np.abs(answer).max())
                 return answer
 
             tangent.solve = solved
@@ -84,7 +77,7 @@ def converging(control: Control, found: Callable[[State], None] | None = None) -
                 end = original(self, u, pressure)
             finally:
                 del tangent.solve
-            return None if end is None else _corrected(self, end, pressure, last, control)
+            return None if end is None else _corrected(self, end, pressure, last[0], control)
 
         return equilibrium
 
@@ -98,11 +91,9 @@ def converging(control: Control, found: Callable[[State], None] | None = None) -
         closed.searched_equilibrium, newton.CHORD_BELOW = searched, chords
 
 
-def _corrected(
-    membrane: Any, u: Array, pressure: float, last: float, control: Control
-) -> Array | None:
+def _corrected(membrane: Any, u: Array, pressure: float, last: float, control: Any) -> Any:
     """Iterate from u (n, 3), whose residual is small, until the `last` correction (mm) is, too."""
-    u, free, before = u.copy(), membrane.free, np.inf
+    u, before = u.copy(), np.inf
     for _ in range(control.iterations):
         norm = membrane.unbalance(u, pressure, with_tangent=True)
         # A residual that is small and falls no further is rounding.
@@ -114,8 +105,8 @@ def _corrected(
             membrane.tangent.factor()
         except SingularTangent:
             return None
-        step = -membrane.tangent.solve(membrane.residual[free])
-        u.reshape(-1)[free] += step
+        step = -membrane.tangent.solve(membrane.residual[membrane.free])
+        u.reshape(-1)[membrane.free] += step
         last, before = float(np.abs(step).max()), norm
         if not np.isfinite(last):
             return None

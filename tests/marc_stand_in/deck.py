@@ -2,29 +2,34 @@
 
 Written from docs/reference/marc-deck.md and what public sources show of Marc. It shares no code
 with the adapter that writes the decks, on purpose: a mistake there must not cancel out here.
-In this order: plain data, columns of a line, parameters, model blocks, load cases, checks.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections import deque, namedtuple
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 #: Exit numbers: an error in the data (public lists of Marc's), an element inside out (from memory).
 DATA_ERROR, INSIDE_OUT = 13, 1005
-#: Columns of a line; of the names of sets, and of materials and bodies; items a line of a list.
-LONGEST, NAME, LABEL, ITEMS = 160, 32, 24, 8
-#: Variable types of tables.
-TIME, LOCAL_STRAIN = 1, 73
+#: Columns of a line, items a line of a set; variable types of tables.
+LONGEST, ITEMS, TIME, LOCAL_STRAIN = 160, 8, 1, 73
 #: Degrees of freedom of a node, and state variables of HYPELA2, by element type.
 DEGREES, STATES = {18: 3, 75: 6, 139: 6}, {18: 7, 75: 9, 139: 7}
+#: Layouts of parameters.
+PARAMETERS = {
+    "alloc": "t20 25", "elements": "t20 i", "version": "t20 14 1 0 1", "sizing": "t30 0 i i 0",
+    "table": "t20 0 0 2 1 1 0 0 1", "processor": "t20 1 1 1 0", "cavity": "t20 1",
+    "extended": "t20", "large stra": "t20 2 1 0*5", "follow for": "t20 1 0 0",
+    "shell sect": "t20 5 0 1", "state vars": "t20 i", "all points": "t20", "title": "t20 t140",
+}  # fmt: skip
+ALWAYS = {*PARAMETERS} - {"follow for", "shell sect", "state vars", "cavity"}
 
 
 class DeckError(Exception):
@@ -35,711 +40,412 @@ class DeckError(Exception):
         super().__init__(f"{problem} (line {line})" if line else problem)
 
 
-@dataclass
-class Parameters:
-    """The parameter section; `has` are its keywords."""
-
-    title: str = ""
-    elements: int = 0
-    nodes: int = 0
-    type: int = 0
-    states: int = 0
-    has: list[str] = field(default_factory=list)
-
-
-@dataclass
-class Table:
-    """A function, straight between its points."""
-
-    number: int
-    variable: int
-    x: Array
-    y: Array
-
-    def at(self, x: float) -> float:
-        return float(np.interp(x, self.x, self.y))
+#: A function, straight between its points: x, y.
+Table = namedtuple("Table", "variable x y")
+#: A boundary condition: kind is "fixed", "pressure" or "cavity"; table 0 is a constant. load: the
+#: load type of a pressure; of a cavity 1 for pressure, 2 for constant mass.
+Condition = namedtuple("Condition", "kind on values tables dofs load line")
+#: A contact body; a rigid one has patches (n, 4, 3) mm, and a direction and table of motion.
+Body = namedtuple("Body", "name rigid on patches table direction")
+#: Relative residual AND relative correction of a converged increment, and most iterations.
+Control = namedtuple("Control", "residual correction iterations")
+#: Increments of `step`, the conditions that hold in them, and when they have converged.
+LoadCase = namedtuple("LoadCase", "title line conditions control increments step")
 
 
-@dataclass
-class Condition:
-    """A boundary condition: kind is "fixed", "pressure" or "cavity"; table 0 is a constant.
+def level(table: Table, at: Any) -> Any:
+    return np.interp(at, table.x, table.y)
 
-    kind_number is the load type of a pressure; of a cavity 1 for pressure, 2 for constant mass.
+
+class Content:
+    """The whole deck: connectivity (elements, 4), coordinates (nodes, 3), numbers from 1.
+
+    law : "nlelast" (multipliers, and numbers of tables, of E1, E2, nu12, G12) or "hypoelastic".
     """
 
-    name: str
-    kind: str
-    on: str
-    values: list[float]
-    tables: list[int]
-    dofs: list[int] = field(default_factory=list)
-    kind_number: int = 0
-    line: int = 0
-
-
-@dataclass
-class Material:
-    """kind is "nlelast" (multipliers and tables of E1, E2, nu12, G12) or "hypoelastic"."""
-
-    kind: str
-    on: str
-    multipliers: list[float] = field(default_factory=list)
-    tables: list[int] = field(default_factory=list)
-
-
-@dataclass
-class Body:
-    """A contact body; a rigid one has patches (n, 4, 3) mm, and a direction and table of motion."""
-
-    name: str
-    rigid: bool
-    on: str = ""
-    patches: Array = field(default_factory=lambda: np.zeros((0, 4, 3)))
-    table: int = 0
-    direction: Array = field(default_factory=lambda: np.zeros(3))
-
-
-@dataclass
-class Control:
-    """Relative residual AND relative correction of a converged increment, and most iterations."""
-
-    residual: float
-    correction: float
-    iterations: int
-
-
-@dataclass
-class LoadCase:
-    """Increments of `step`, the conditions that hold in them, and when they have converged."""
-
-    title: str = ""
-    conditions: list[str] = field(default_factory=list)
-    increments: int = 0
-    step: float = 0.0
-    line: int = 0
-    control: Control | None = None
-
-
-@dataclass
-class Content:
-    """The whole deck: connectivity (elements, 4), coordinates (nodes, 3), numbers from 1."""
-
-    parameters: Parameters
-    connectivity: Integers = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
-    coordinates: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    node_sets: dict[str, Integers] = field(default_factory=dict)
-    element_sets: dict[str, Integers] = field(default_factory=dict)
-    tables: dict[int, Table] = field(default_factory=dict)
-    material: Material = field(default_factory=lambda: Material("", ""))
-    frames: list[tuple[str, Array, Array]] = field(default_factory=list)
-    thickness: list[tuple[float, str]] = field(default_factory=list)
-    conditions: dict[str, Condition] = field(default_factory=dict)
-    gas: tuple[float, float, float] | None = None
-    gas_on: str = ""
-    bodies: list[Body] = field(default_factory=list)
-    initial: list[str] = field(default_factory=list)
-    every: int = 0
-    cases: list[LoadCase] = field(default_factory=list)
-    has: list[str] = field(default_factory=list)
-
-
-def read_deck(path: Path) -> Content:
-    """Return everything in a deck; DeckError where Marc would refuse it."""
-    deck = Deck(path)
-    content = Content(_parameters(deck))
-    while (word := deck.next()[:20].rstrip()) != "end option":
-        if word not in BLOCKS:
-            raise deck.fail(f"unknown model option {deck.text.strip()!r}")
-        if word in content.has and word not in ("define", "table"):
-            raise deck.fail(f"{word} twice")
-        if word not in ("define", "table", "loadcase", "optimize"):
-            deck.nothing_after(20)
-        content.has.append(word)
-        BLOCKS[word](deck, content)
-    deck.nothing_after(20)
-    while not deck.ended:
-        content.cases.append(_case(deck))
-    _check(content)
-    return content
+    def __init__(self, size: dict[str, Any], has: list[str]) -> None:
+        (self.title,), self.parameters, self.has = size["title"], has, list[str]()
+        self.elements, self.nodes, self.type = size["sizing"] + size["elements"]
+        self.states = sum(size.get("state vars", []))
+        self.connectivity = np.zeros((self.elements, 4), dtype=np.int64)
+        self.coordinates = np.zeros((self.nodes, 3))
+        self.sets: dict[str, dict[str, NDArray[np.int64]]] = {"node": {}, "element": {}}
+        self.tables: dict[int, Table] = {}
+        self.law, self.law_on, self.multipliers, self.moduli = "", "", list[float](), list[int]()
+        self.frames: list[tuple[str, Array, Array]] = []
+        self.thickness: list[tuple[float, str]] = []
+        self.conditions: dict[str, Condition] = {}
+        self.gas, self.gas_on, self.bodies = list[float](), "", list[Body]()
+        self.every, self.initial, self.cases = 0, list[str](), list[LoadCase]()
 
 
 class Deck:
-    """The lines of a file that are no comments; the current one is cut into its columns."""
+    """The lines of a file that are no comments, taken apart by layouts.
 
-    # Fortran takes an exponent without its letter: 1.000000000000000-3.
-    _REAL = re.compile(r" *([+-]?(?:\d+\.\d*|\.\d+))(?:[EeDd]([+-]?\d+)|([+-]\d+))?\Z")
+    A layout names the fields of a line: `i` an integer in 10 columns, `r` a real in 20, a number
+    that has to be there (`8` in 10 columns, `0.` in 20), `t30` text in 30, `label` a name in 24,
+    `name` one of at most 32 at the end; `r*3` is three of them.
+    """
 
     def __init__(self, path: Path) -> None:
-        try:
-            lines = path.read_text(encoding="ascii").splitlines()
-        except UnicodeDecodeError as error:
-            raise DeckError(f"byte {error.start} is not ASCII") from None
-        for number, line in enumerate(lines, 1):
-            if "\t" in line:
-                raise DeckError("a tab", number)
+        text = path.read_bytes()
+        if not text.isascii() or b"\t" in text:
+            raise DeckError("a tab, or a byte that is not ASCII")
+        lines = list(enumerate(text.decode().splitlines(), 1))
+        for number, line in lines:
             if len(line) > LONGEST:
-                raise DeckError(f"{len(line)} columns, {LONGEST} at most", number)
-        self.rows = [(n, line) for n, line in enumerate(lines, 1) if not line.startswith("$")]
-        self.at, self.number, self.text = 0, 0, ""
+                raise DeckError(f"more than {LONGEST} columns", number)
+        self.lines = deque((n, line) for n, line in lines if not line.startswith("$"))
+        self.number, self.text = 0, ""
 
     def fail(self, problem: str) -> DeckError:
         return DeckError(problem, self.number)
 
     @property
-    def ended(self) -> bool:
-        return self.at >= len(self.rows)
-
-    @property
-    def goes_on(self) -> bool:
-        """The next line begins with a field, and not with a keyword."""
-        return not self.ended and self.rows[self.at][1][:1] == " "
+    def coming(self) -> str:
+        """The next line; empty at the end of the file."""
+        return self.lines[0][1] if self.lines else ""
 
     def next(self) -> str:
-        if self.ended:
+        if not self.lines:
             raise self.fail("the file ends here, and a block is not finished")
-        self.number, self.text = self.rows[self.at]
-        self.at += 1
+        self.number, self.text = self.lines.popleft()
         return self.text
 
-    def blank(self) -> None:
-        if self.next().strip():
-            raise self.fail(f"expected an empty line, found {self.text.strip()!r}")
-
-    def integer(self, end: int) -> int:
-        """Return the i10 that ends in column `end`; an empty field is 0, as in Fortran."""
-        text = self.text[end - 10 : end]
-        if not text.strip():
-            return 0
-        if len(text) < 10 or not re.match(r" *[+-]?\d+\Z", text):
-            raise self.fail(f"columns {end - 9} to {end}: {text!r} is not an integer in its place")
-        return int(text)
-
-    def real(self, end: int) -> float:
-        """Return the e20 that ends in column `end`."""
-        text = self.text[end - 20 : end]
-        found = self._REAL.match(text)
-        if len(text) < 20 or not found:
-            raise self.fail(f"columns {end - 19} to {end}: {text!r} is not a real in its place")
-        mantissa, lettered, bare = found.groups()
-        return float(f"{mantissa}e{lettered or bare or 0}")
-
-    def name(self, start: int = 0, width: int = NAME) -> str:
-        """Return the name in `width` columns from `start` + 1, the last field of the line."""
-        name = self.text[start : start + width].rstrip()
-        if not re.match(r"[a-z0-9_]{1,32}\Z", name):
-            raise self.fail(f"columns {start + 1} on: {name!r} is not a name of a-z, 0-9 and _")
-        return name
-
-    def nothing_after(self, column: int) -> None:
-        if self.text[column:].strip():
-            raise self.fail(f"unexpected beyond column {column}: {self.text[column:].strip()!r}")
-
-    def fields(self, *expected: int | None, first: int = 10) -> list[int]:
-        """Return the i10 of the current line from the one that ends in column `first`."""
-        values = [self.integer(first + 10 * i) for i in range(len(expected))]
-        return self.expect(values, expected)
-
-    def expect(self, values: list[int], expected: tuple[int | None, ...]) -> list[int]:
-        for i, (value, wanted) in enumerate(zip(values, expected, strict=True), 1):
-            if wanted is not None and value != wanted:
-                raise self.fail(f"field {i} is {value}, expected {wanted}")
-        return values
-
-    def integers(self, *expected: int | None) -> list[int]:
-        """Return the i10 of the next line, which has exactly these fields (None: any value)."""
-        if len(self.next()) < 10 * len(expected):
-            raise self.fail(f"ends in column {len(self.text)}, expected {10 * len(expected)}")
-        values = [self.integer(10 * (i + 1)) for i in range(len(expected))]
-        self.nothing_after(10 * len(expected))
-        return self.expect(values, expected)
-
-    def reals(self, count: int) -> list[float]:
-        """Return the e20 of the next line, which has exactly `count`."""
+    def row(self, layout: str) -> list[Any]:
+        """Return the fields of the next line that the layout does not fix."""
         self.next()
-        values = [self.real(20 * (i + 1)) for i in range(count)]
-        self.nothing_after(20 * count)
-        return values
+        return self.fields(layout)
 
-    def alone(self) -> str:
-        """Return the name that is alone on the next line."""
-        self.next()
-        self.nothing_after(NAME)
-        return self.name()
+    def rows(self, block: str, count: int, layout: str) -> Iterator[list[Any]]:
+        for i in range(count):
+            if self.coming[:1].isalpha():
+                raise self.fail(f"{block} ends after {i} of {count}")
+            yield self.row(layout)
 
-    def row(self, block: str, i: int, count: int) -> None:
-        """Go to row `i` of `count` rows of a block."""
-        if self.next()[:1].isalpha():
-            raise self.fail(f"{block} ends after {i} of {count}")
+    def fields(self, layout: str) -> list[Any]:
+        """Return the fields of this line that the layout does not fix."""
+        found, end = [], 0
+        for kind, times in re.findall(r"(\S+?)(?:\*(\d+))?(?= |$)", layout):
+            for _ in range(int(times or 1)):
+                start = end
+                width = {"name": 32, "label": 24}.get(
+                    kind, 20 if kind == "r" or "." in kind else 10
+                )
+                end += int(kind[1:]) if kind[0] == "t" else width
+                value = self._value(kind, self.text[start:end], end - start)
+                if value is None or not (kind[0].isalpha() or value == float(kind)):
+                    seen = self.text[start:end]
+                    raise self.fail(f"columns {start + 1} to {end}: {seen!r}, expected {kind}")
+                if kind[0].isalpha():
+                    found.append(value)
+        if self.text[end:].strip():
+            raise self.fail(f"unexpected beyond column {end}: {self.text[end:].strip()!r}")
+        return found
+
+    @staticmethod
+    def _value(kind: str, text: str, width: int) -> Any:
+        """Return what a field holds; None where that is not of its kind."""
+        if kind[0] == "t":
+            return text.rstrip()
+        if kind in ("name", "label"):
+            return text.rstrip() if re.match(r"[a-z0-9_]{1,32} *\Z", text) else None
+        if len(text) < width:
+            return None
+        if width == 10:
+            return int(text.strip() or 0) if re.match(r" *([+-]?\d+)?\Z", text) else None
+        # Fortran takes an exponent without its letter: 1.000000000000000-3.
+        real = r" *([+-]?(?:\d+\.\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?\Z"
+        if not (match := re.match(real, text)):
+            return None
+        return float(f"{match[1]}e{match[2] or match[3] or 0}")
+
+    def members(self, where: str, members: list[int], most: int) -> None:
+        if len(set(members)) < len(members) or not 1 <= min(members) <= max(members) <= most:
+            raise self.fail(f"{where} has a member twice, or one that does not exist: {members}")
 
 
-#: Fields of a parameter, in columns 30, 40, ... (sizing: from 40); None where any integer will do.
-FIXED: dict[str, tuple[int | None, ...]] = {
-    "alloc": (25,), "elements": (None,), "version": (14, 1, 0, 1), "sizing": (0, None, None, 0),
-    "table": (0, 0, 2, 1, 1, 0, 0, 1), "processor": (1, 1, 1, 0), "cavity": (1,), "extended": (),
-    "large stra": (2, 1, 0, 0, 0, 0, 0), "follow for": (1, 0, 0), "shell sect": (5, 0, 1),
-    "state vars": (None,), "all points": (),
-}  # fmt: skip
-ALWAYS = {"title", *FIXED} - {"follow for", "shell sect", "state vars", "cavity"}
+def read_deck(path: Path) -> Content:
+    """Return everything in a deck; DeckError where Marc would refuse it."""
+    deck = Deck(path)
+    content = _parameters(deck)
+    while (word := deck.next()[:20].rstrip()) != "end option":
+        if word in content.has and word not in ("define", "table"):
+            raise deck.fail(f"{word} twice")
+        content.has.append(word)
+        _block(deck, content, word)
+    while deck.coming:
+        content.cases.append(_case(deck))
+    _check(content)
+    return content
 
 
-def _parameters(deck: Deck) -> Parameters:
-    found = Parameters()
+def _parameters(deck: Deck) -> Content:
+    found: dict[str, Any] = {}
     while (word := deck.next()[:10].rstrip()) != "end":
-        if word in found.has:
-            raise deck.fail(f"parameter {word!r} twice")
-        if word not in ("title", "extended") and "extended" not in found.has:
+        if word in found or word not in PARAMETERS:
+            raise deck.fail(f"unknown parameter, or twice: {deck.text.strip()!r}")
+        if word not in ("title", "extended") and "extended" not in found:
             raise deck.fail("extended has to come before anything that has columns")
-        found.has.append(word)
-        if word == "title":
-            found.title = deck.text[20:].strip()
-            continue
-        if word not in FIXED:
-            raise deck.fail(f"unknown parameter {deck.text.strip()!r}")
-        first, count = 40 if word == "sizing" else 30, len(FIXED[word])
-        if deck.text[len(word) : first - 10].strip():
-            raise deck.fail(f"columns {len(word) + 1} to {first - 10} have to be empty")
-        deck.nothing_after(first - 10 + 10 * count)
-        if count and len(deck.text.rstrip()) < first - 10 + 10 * count:
-            raise deck.fail(f"{word}: fewer than {count} fields")
-        values = deck.fields(*FIXED[word], first=first)
-        if word == "sizing":
-            found.elements, found.nodes = values[1:3]
-            if min(values[1:3]) < 1:
-                raise deck.fail("sizing without elements or nodes")
-        elif word == "state vars":
-            (found.states,) = values
-        elif word == "elements":
-            (found.type,) = values
-            if found.type not in DEGREES:
-                raise deck.fail(f"element type {found.type} is none of {tuple(DEGREES)}")
-    deck.nothing_after(10)
-    for word in sorted(ALWAYS - {*found.has}):
-        raise DeckError(f"no parameter {word!r}")
-    if (found.type != 18) != ("shell sect" in found.has):
-        raise DeckError(f"shell sect is for shells, and elements are {found.type}")
-    return found
+        keyword, *found[word] = deck.fields(PARAMETERS[word])
+        if keyword != word:
+            raise deck.fail(f"columns behind {word!r} have to be empty")
+    deck.fields("t10")
+    if missing := sorted(ALWAYS - {*found}):
+        raise DeckError(f"no parameter {missing}")
+    (kind,), sizes = found["elements"], found["sizing"]
+    if kind not in DEGREES or min(sizes) < 1 or (kind != 18) != ("shell sect" in found):
+        raise DeckError(f"type {kind} is none of {tuple(DEGREES)}, or of no size, or shell sect")
+    return Content(found, list(found))
 
 
-def _solver(deck: Deck, content: Content) -> None:
-    deck.integers(8, *[0] * 15)
+def _block(deck: Deck, content: Content, word: str) -> None:
+    """Read a model block, whose keyword is in this line."""
+    p, more = content, {"define": "t20 t20 name", "table": "name", "loadcase": "name"}
+    head = deck.fields(f"t20 {'11' if word == 'optimize' else more.get(word, '')}")[1:]
+    match word:
+        case "optimize" | "no print":
+            pass
+        case "solver":
+            deck.row("8 0*15")
+        case "connectivity":
+            deck.row("0 0 1 0*6")
+            for n, (number, kind, *nodes) in enumerate(deck.rows(word, p.elements, "i*6"), 1):
+                if (number, kind) != (n, p.type):
+                    raise deck.fail(f"element {number} of type {kind}, expected {n} of {p.type}")
+                deck.members(f"element {number}", nodes, p.nodes)
+                p.connectivity[n - 1] = nodes
+        case "coordinates":
+            deck.row(f"3 {p.nodes} 0 1")
+            for n, (number, *point) in enumerate(deck.rows(word, p.nodes, "i r*3"), 1):
+                if number != n:
+                    raise deck.fail(f"node {number}, expected {n}")
+                p.coordinates[n - 1] = point
+        case "define":
+            kind, what, name = head
+            if what != "set" or any(name in sets for sets in p.sets.values()):
+                raise deck.fail(f"define {what!r}, or set {name!r} is defined twice")
+            members = set_members(deck)
+            most = {"node": p.nodes, "element": p.elements}[kind]
+            deck.members(f"set {name!r}", members, most)
+            p.sets[kind][name] = np.array(sorted(members), dtype=np.int64)
+        case "table":
+            (number,) = deck.row("i 1 0 0 2")
+            variable, count = deck.row("i i 2 0 0 2 0 0 2 0 0 2")
+            if number in p.tables or variable not in (TIME, LOCAL_STRAIN) or count < 2:
+                raise deck.fail(f"table {number} is defined twice, or has no points or variable")
+            x, y = np.array(list(deck.rows(f"table {number}", count, "r r"))).T
+            if not (np.diff(x) > 0).all():
+                raise deck.fail(f"table {number} does not increase")
+            p.tables[number] = Table(variable, x, y)
+        case "loadcase":
+            p.initial = _names(deck)
+        case "nlelast" | "hypoelastic":
+            deck.row("")
+            if p.law:
+                raise deck.fail("a second material")
+            if word == "nlelast":
+                deck.row("1 2 0 0 0 label 0")
+                p.multipliers, p.moduli = deck.row("r*4"), deck.row("i*4")
+            else:
+                for layout in ("1 0 1 0 1 label 0", "1. 0.*6", "0*7"):
+                    deck.row(layout)
+            p.law, p.law_on = word, *deck.row("name")
+        case "orientation":
+            for _ in range(*deck.row("i")):
+                kind, *values = deck.row("t10 0. r*6")
+                warp, fill = np.reshape(values, (2, 3))
+                off = max(abs(np.linalg.norm(v) - 1.0) for v in (warp, fill))
+                if kind != "3d aniso" or off > 1e-9 or abs(warp @ fill) > 1e-6:
+                    raise deck.fail("expected 3d aniso and two unit vectors at right angles")
+                p.frames.append((*deck.row("name"), warp, fill))
+        case "geometry":
+            deck.row("0 0 2")
+            # The count is nowhere: a thickness begins with an integer, a block with a keyword.
+            while deck.coming[:1] == " ":
+                deck.row(f"{len(p.thickness) + 1} 8 1 230 0 0")
+                deck.row("name")
+                p.thickness.append((*deck.row("r 0.*6"), *deck.row("name")))
+                if not p.thickness[-1][0] > 0:
+                    raise deck.fail("expected a thickness above 0")
+        case "fixed disp":
+            for name, line in _each_condition(deck, p, "1 0 0 0 1 0 name"):
+                count = len(deck.coming.rstrip()) // 20
+                values, tables, dofs = (deck.row(f"{kind}*{count}") for kind in "rii")
+                if not dofs or dofs != [n for n in range(1, DEGREES[p.type] + 1) if n in dofs]:
+                    raise deck.fail(f"element {p.type} has no degrees of freedom {dofs}")
+                deck.row("2")
+                (on,) = deck.row("name")
+                p.conditions[name] = Condition("fixed", on, values, tables, dofs, 0, line)
+        case "dist loads":
+            for name, line in _each_condition(deck, p, "1 0*5 name"):
+                values, tables, (load,) = deck.row("r 0. 0."), deck.row("i 0 0"), deck.row("i")
+                deck.row("1")
+                (on,) = deck.row("name")
+                p.conditions[name] = Condition("pressure", on, values, tables, [], load, line)
+        case "post":
+            (p.every,) = deck.row("0 16 17 1 0 19 20 0 i 0*7")
+        case "cavity":
+            deck.row("1")
+            deck.row("1 1 1")
+            p.gas, (p.gas_on,) = deck.row("r*3"), deck.row("name")
+            if not min(p.gas) > 0:
+                raise deck.fail("a gas needs a pressure, a temperature and a density above 0")
+        case "cavity load":
+            for name, line in _each_condition(deck, p, "1 0*5 name"):
+                table, kind = deck.row("1. i i 1")
+                p.conditions[name] = Condition("cavity", p.gas_on, [1.0], [table], [], kind, line)
+        case "contact":
+            (count,) = deck.row("i 0*11")
+            deck.row("0.*3")  # no friction, default distances
+            for i in range(1, count + 1):
+                rigid, patches, name = deck.row(f"{i} i i label")
+                on, table, direction = "", 0, [1.0, 0.0, 0.0]
+                if rigid:
+                    table, *direction = deck.row("i r*3")
+                else:
+                    (on,) = deck.row("name")
+                if bool(patches) != rigid or abs(np.linalg.norm(direction) - 1.0) > 1e-9:
+                    raise deck.fail(f"body of kind {rigid}, {patches} patches along {direction}")
+                patches = np.reshape([deck.row("r*6") for _ in range(2 * patches)], (-1, 4, 3))
+                p.bodies.append(Body(name, bool(rigid), on, patches, table, np.array(direction)))
+        case _:
+            raise deck.fail(f"unknown model option {deck.text.strip()!r}")
 
 
-def _optimize(deck: Deck, content: Content) -> None:
-    deck.fields(11, first=30)
-    deck.nothing_after(30)
-
-
-def _connectivity(deck: Deck, content: Content) -> None:
-    deck.integers(0, 0, 1, *[0] * 6)
-    count, rows = content.parameters.elements, []
-    for i in range(count):
-        deck.row("connectivity", i, count)
-        deck.at -= 1
-        number, type_, *nodes = deck.integers(*[None] * 6)
-        if number != i + 1:
-            raise deck.fail(f"element {number}, expected {i + 1}")
-        if type_ != content.parameters.type:
-            kind = content.parameters.type
-            raise deck.fail(f"element {number} is of type {type_}; elements says {kind}")
-        if len(set(nodes)) < 4:
-            raise deck.fail(f"element {number} has a node twice")
-        _exist(deck, f"element {number}", "node", nodes, content.parameters.nodes)
-        rows.append(nodes)
-    content.connectivity = np.array(rows, dtype=np.int64)
-
-
-def _exist(deck: Deck, where: str, kind: str, members: list[int], most: int) -> None:
-    for member in members:
-        if not 1 <= member <= most:
-            raise deck.fail(f"{where} has {kind} {member}, which does not exist")
-
-
-def _coordinates(deck: Deck, content: Content) -> None:
-    count, rows = content.parameters.nodes, []
-    deck.integers(3, count, 0, 1)
-    for i in range(count):
-        deck.row("coordinates", i, count)
-        if deck.integer(10) != i + 1:
-            raise deck.fail(f"node {deck.integer(10)}, expected {i + 1}")
-        rows.append([deck.real(end) for end in (30, 50, 70)])
-        deck.nothing_after(70)
-    content.coordinates = np.array(rows)
-
-
-def _define(deck: Deck, content: Content) -> None:
-    kind, word = deck.text[20:40].rstrip(), deck.text[40:60].rstrip()
-    if word != "set" or kind not in ("node", "element"):
-        raise deck.fail(f"define {kind!r} {word!r}, expected node or element, set")
-    name = deck.name(60)
-    deck.nothing_after(60 + NAME)
-    if name in content.node_sets or name in content.element_sets:
-        raise deck.fail(f"set {name!r} is defined twice")
+def set_members(deck: Deck) -> list[int]:
+    """Return numbers and runs `a to b`, at most eight a line; a line that goes on ends in c."""
     members: list[int] = []
     more = True
     while more:
-        words = deck.next().split()
-        more = words[-1:] == ["c"]
-        _members(deck, words[:-1] if more else words, members)
-    p = content.parameters
-    _exist(deck, f"set {name!r}", kind, members, p.nodes if kind == "node" else p.elements)
-    if len(set(members)) < len(members):
-        raise deck.fail(f"set {name!r} has a member twice")
-    sets = content.node_sets if kind == "node" else content.element_sets
-    sets[name] = np.array(sorted(members), dtype=np.int64)
+        more = deck.next().split()[-1:] == ["c"]
+        items = re.findall(r"(\d+)(?: +to +(\d+))?(?= |$)", deck.text)
+        whole = re.match(r"(?: *\d+(?: +to +\d+)?)+(?: +c)? *\Z", deck.text)
+        if not whole or len(items) > ITEMS or any(b and int(b) <= int(a) for a, b in items):
+            raise deck.fail(f"expected 1 to {ITEMS} members of a set, found {deck.text.strip()!r}")
+        members.extend(n for a, b in items for n in range(int(a), int(b or a) + 1))
+    return members
 
 
-def _members(deck: Deck, words: list[str], members: list[int]) -> None:
-    """Add numbers, and runs `a to b`, of which at most eight make a line."""
-    i = items = 0
-    if not words:
-        raise deck.fail("a set without members, or its last line ends in c")
-    while i < len(words):
-        run = words[i : i + 3]
-        if not run[0].isdigit():
-            raise deck.fail(f"{run[0]!r} is no member of a set")
-        first = last = int(run[0])
-        if run[1:2] == ["to"]:
-            if len(run) < 3 or not run[2].isdigit() or int(run[2]) <= first:
-                raise deck.fail(f"{' '.join(run)!r} is not a run")
-            last = int(run[2])
-            i += 2
-        members.extend(range(first, last + 1))
-        i, items = i + 1, items + 1
-    if items > ITEMS:
-        raise deck.fail(f"{items} items, {ITEMS} a line at most")
-
-
-def _table(deck: Deck, content: Content) -> None:
-    deck.name(20)
-    deck.nothing_after(20 + NAME)
-    number = deck.integers(None, 1, 0, 0, 2)[0]
-    if number in content.tables or number < 1:
-        raise deck.fail(f"table {number} is defined twice, or has no number")
-    variable, count = deck.integers(None, None, 2, *[0, 0, 2] * 3)[:2]
-    if variable not in (TIME, LOCAL_STRAIN):
-        raise deck.fail(f"table {number}: unknown variable type {variable}")
-    if count < 2:
-        raise deck.fail(f"table {number} of {count} points")
-    points = np.zeros((count, 2))
-    for i in range(count):
-        deck.row(f"table {number}", i, count)
-        deck.at -= 1
-        points[i] = deck.reals(2)
-        if i and not points[i, 0] > points[i - 1, 0]:
-            raise deck.fail(f"table {number}: {points[i, 0]:g} does not increase")
-    content.tables[number] = Table(number, variable, points[:, 0], points[:, 1])
-
-
-def _loadcase(deck: Deck) -> list[str]:
+def _names(deck: Deck) -> list[str]:
     """Return the conditions that a load case names."""
-    deck.name(20)
-    deck.nothing_after(20 + NAME)
-    names: list[str] = []
-    for _ in range(deck.integers(None)[0]):
-        name = deck.alone()
-        if name in names:
-            raise deck.fail(f"condition {name!r} twice in a load case")
-        names.append(name)
+    names = [deck.row("name")[0] for _ in range(*deck.row("i"))]
+    if len(set(names)) < len(names):
+        raise deck.fail("a condition twice in a load case")
     return names
 
 
-def _initial(deck: Deck, content: Content) -> None:
-    content.initial = _loadcase(deck)
-
-
-def _nlelast(deck: Deck, content: Content) -> None:
-    _material_head(deck, content, 1, 2, 0, 0, 0)
-    multipliers, tables = deck.reals(4), deck.integers(*[None] * 4)
-    content.material = Material("nlelast", deck.alone(), multipliers, tables)
-
-
-def _hypoelastic(deck: Deck, content: Content) -> None:
-    _material_head(deck, content, 1, 0, 1, 0, 1)
-    if deck.reals(7) != [1.0, *[0.0] * 6]:
-        raise deck.fail("expected 1 and six zeros")
-    deck.integers(*[0] * 7)
-    content.material = Material("hypoelastic", deck.alone())
-
-
-def _material_head(deck: Deck, content: Content, *expected: int) -> None:
-    if content.material.kind:
-        raise deck.fail("a second material")
-    deck.blank()
-    deck.next()
-    deck.fields(*expected)
-    deck.name(50, LABEL)
-    if deck.integer(84) != 0:
-        raise deck.fail("the field after the name has to be 0")
-    deck.nothing_after(84)
-
-
-def _orientation(deck: Deck, content: Content) -> None:
-    for _ in range(deck.integers(None)[0]):
-        if deck.next()[:10].strip() != "3d aniso":
-            raise deck.fail(f"unknown kind of orientation {deck.text[:10]!r}")
-        angle, *values = [deck.real(30 + 20 * i) for i in range(7)]
-        deck.nothing_after(150)
-        if angle != 0.0:
-            raise deck.fail("the angle has to be 0")
-        warp, fill = np.array(values[:3]), np.array(values[3:])
-        if max(abs(np.linalg.norm(vector) - 1.0) for vector in (warp, fill)) > 1e-9:
-            raise deck.fail("directions have to be unit vectors")
-        if abs(warp @ fill) > 1e-6:
-            raise deck.fail("warp and fill are not at right angles")
-        content.frames.append((deck.alone(), warp, fill))
-
-
-def _geometry(deck: Deck, content: Content) -> None:
-    deck.integers(0, 0, 2)
-    # The count is nowhere: a thickness begins with an integer, the next block with a keyword.
-    while deck.goes_on:
-        deck.integers(len(content.thickness) + 1, 8, 1, 230, 0, 0)
-        deck.alone()
-        thickness, *rest = deck.reals(7)
-        if not thickness > 0 or any(rest):
-            raise deck.fail("expected a thickness above 0 and six zeros")
-        content.thickness.append((thickness, deck.alone()))
-    if not content.thickness:
-        raise deck.fail("geometry without a thickness")
-
-
-def _condition_head(deck: Deck, content: Content, *expected: int) -> tuple[str, int]:
-    """Return name and line of a condition."""
-    deck.next()
-    deck.fields(*expected)
-    name = deck.name(60)
-    deck.nothing_after(60 + NAME)
-    if name in content.conditions:
-        raise deck.fail(f"condition {name!r} is defined twice")
-    return name, deck.number
-
-
-def _fixed_disp(deck: Deck, content: Content) -> None:
-    deck.blank()
-    most = DEGREES[content.parameters.type]
-    while deck.goes_on:
-        name, line = _condition_head(deck, content, 1, 0, 0, 0, 1, 0)
-        count = len(deck.next().rstrip()) // 20
-        if not 1 <= count <= 6:
-            raise deck.fail("expected one to six values of 20 columns")
-        deck.at -= 1
-        values, tables = deck.reals(count), deck.integers(*[None] * count)
-        dofs = deck.integers(*[None] * count)
-        for dof in dofs:
-            if not 1 <= dof <= most:
-                kind = content.parameters.type
-                raise deck.fail(f"element {kind} has no degree of freedom {dof}")
-        if sorted(set(dofs)) != dofs:
-            raise deck.fail("degrees of freedom have to increase")
-        deck.integers(2)
-        content.conditions[name] = Condition(
-            name, "fixed", deck.alone(), values, tables, dofs, line=line
-        )
-
-
-def _dist_loads(deck: Deck, content: Content) -> None:
-    deck.blank()
-    while deck.goes_on:
-        name, line = _condition_head(deck, content, 1, 0, 0, 0, 0, 0)
-        magnitude, *rest = deck.reals(3)
-        if any(rest):
-            raise deck.fail("expected the magnitude and two zeros")
-        table, (kind,) = deck.integers(None, 0, 0)[0], deck.integers(None)
-        deck.integers(1)
-        content.conditions[name] = Condition(
-            name, "pressure", deck.alone(), [magnitude], [table], [], kind, line
-        )
-
-
-def _post(deck: Deck, content: Content) -> None:
-    content.every = deck.integers(0, 16, 17, 1, 0, 19, 20, 0, None, *[0] * 7)[8]
-    if content.every < 1:
-        raise deck.fail("post every 0 increments")
-
-
-def _cavity(deck: Deck, content: Content) -> None:
-    deck.integers(1)
-    deck.integers(1, 1, 1)
-    pressure, temperature, density = deck.reals(3)
-    if not min(pressure, temperature, density) > 0:
-        raise deck.fail("a gas needs a pressure, a temperature and a density above 0")
-    content.gas, content.gas_on = (pressure, temperature, density), deck.alone()
-
-
-def _cavity_load(deck: Deck, content: Content) -> None:
-    if content.gas is None:
-        raise deck.fail("cavity load without cavity")
-    deck.blank()
-    while deck.goes_on:
-        name, line = _condition_head(deck, content, 1, 0, 0, 0, 0, 0)
-        deck.next()
-        table, kind, cavity = deck.fields(None, None, None, first=30)
-        deck.nothing_after(50)
-        if deck.real(20) != 1.0 or kind not in (1, 2) or cavity != 1:
-            raise deck.fail("expected 1, a table, 1 (pressure) or 2 (mass), cavity 1")
-        content.conditions[name] = Condition(
-            name, "cavity", content.gas_on, [1.0], [table], [], kind, line
-        )
-
-
-def _contact(deck: Deck, content: Content) -> None:
-    count = deck.integers(None, *[0] * 11)[0]
-    if any(deck.reals(3)):
-        raise deck.fail("expected three zeros: no friction, default distances")
-    for i in range(count):
-        deck.next()
-        number, kind, patches = deck.fields(None, None, None)
-        name = deck.name(30, LABEL)
-        deck.nothing_after(30 + LABEL)
-        if number != i + 1 or kind not in (0, 1):
-            raise deck.fail(f"body {number} of kind {kind}, expected {i + 1} of kind 0 or 1")
-        if kind == 0:
-            if patches:
-                raise deck.fail("a deformable body with patches")
-            content.bodies.append(Body(name, False, deck.alone()))
-            continue
-        deck.next()
-        table, direction = deck.integer(10), np.array([deck.real(30 + 20 * k) for k in range(3)])
-        deck.nothing_after(70)
-        if abs(np.linalg.norm(direction) - 1.0) > 1e-9:
-            raise deck.fail("the path's direction is not a unit vector")
-        corners = np.reshape([v for _ in range(2 * patches) for v in deck.reals(6)], (-1, 4, 3))
-        content.bodies.append(Body(name, True, "", corners, table, direction))
-
-
-BLOCKS: dict[str, Callable[[Deck, Content], None]] = {
-    "solver": _solver, "optimize": _optimize, "connectivity": _connectivity, "table": _table,
-    "coordinates": _coordinates, "define": _define, "loadcase": _initial, "nlelast": _nlelast,
-    "hypoelastic": _hypoelastic, "orientation": _orientation, "geometry": _geometry,
-    "fixed disp": _fixed_disp, "dist loads": _dist_loads, "post": _post, "cavity": _cavity,
-    "cavity load": _cavity_load, "contact": _contact, "no print": lambda deck, content: None,
-}  # fmt: skip
+def _each_condition(deck: Deck, content: Content, head: str) -> Iterator[tuple[str, int]]:
+    """Yield name and line of each condition of a block."""
+    deck.row("")
+    while deck.coming[:1] == " ":
+        (name,) = deck.row(head)
+        if name in content.conditions:
+            raise deck.fail(f"condition {name!r} is defined twice")
+        yield name, deck.number
 
 
 def _case(deck: Deck) -> LoadCase:
     """Return a load case, which ends with `continue`."""
-    case, has = LoadCase(), set()
-    while True:
-        text = deck.next()
-        word = "title" if text[:6] == "title " else text[:20].rstrip()
-        if word == "continue":
-            break
-        if word in has:
+    found: dict[str, Any] = {"title": ""}
+    while (word := deck.next()[:20].rstrip()) != "continue":
+        word = "title" if word.startswith("title ") else word
+        if found.get(word):
             raise deck.fail(f"{word} twice in a load case: is a continue missing?")
-        has.add(word)
-        if word == "title":
-            case.title = text[20:].strip()
-        elif word == "loadcase":
-            case.line, case.conditions = deck.number, _loadcase(deck)
-        elif word == "control":
-            # Convergence is judged by residual AND displacement (5), full Newton-Raphson (1).
-            increments, most, *_ = deck.integers(None, None, 0, 5, 0, 1, 0, 0, 1, *[0] * 7)
-            if min(increments, most) < 1:
-                raise deck.fail("control without increments or iterations")
-            tolerances = []
-            for _ in range(2):
-                tolerance, *rest = deck.reals(8)
-                if not 0 < tolerance < 1 or any(rest):
-                    raise deck.fail("expected a tolerance between 0 and 1, and seven zeros")
-                tolerances.append(tolerance)
-            case.control = Control(*tolerances, iterations=most)
-        elif word == "auto load":
-            case.increments = deck.integers(None, 0, 10, 0, 0)[0]
-            if case.increments < 1:
-                raise deck.fail("auto load of no increments")
-        elif word == "time step":
-            (case.step,) = deck.reals(1)
-            if not case.step > 0:
-                raise deck.fail("a time step has to be above 0")
-        else:
-            raise deck.fail(f"unknown history option {text.strip()!r}")
-    deck.nothing_after(20)
-    for word in ("loadcase", "control", "auto load", "time step"):
-        if word not in has:
-            raise deck.fail(f"a load case without {word}")
-    return case
+        match word:
+            case "title":
+                found[word] = deck.text[20:].strip()
+            case "loadcase":
+                deck.fields("t20 name")
+                found[word] = deck.number, _names(deck)
+            case "control":
+                # Convergence is judged by residual AND displacement (5), full Newton-Raphson (1).
+                increments, most = deck.row("i i 0 5 0 1 0 0 1 0*7")
+                found[word] = Control(*deck.row("r 0.*7"), *deck.row("r 0.*7"), most)
+                if min(increments, most) < 1 or not all(0 < t < 1 for t in found[word][:2]):
+                    raise deck.fail("control without increments, iterations or tolerances")
+            case "auto load" | "time step":
+                (found[word],) = deck.row("i 0 10 0 0" if word == "auto load" else "r")
+                if not found[word] > 0:
+                    raise deck.fail(f"no increments, or {word} not above 0")
+            case _:
+                raise deck.fail(f"unknown history option {deck.text.strip()!r}")
+    deck.fields("t20")
+    if missing := {"loadcase", "control", "auto load", "time step"} - {*found}:
+        raise deck.fail(f"a load case without {missing}")
+    rest = found["control"], found["auto load"], found["time step"]
+    return LoadCase(found["title"], *found["loadcase"], *rest)
 
 
 def _check(content: Content) -> None:
     """Raise DeckError for what no block can know alone, and Marc stops at."""
-    needed = "solver connectivity coordinates geometry loadcase post".split()
-    for word in [*needed, "fixed disp"]:
+    for word in ("solver", "connectivity", "coordinates", "geometry", "loadcase", "post"):
         if word not in content.has:
             raise DeckError(f"no {word}")
-    if not content.material.kind:
-        raise DeckError("no material")
-    if not content.cases:
-        raise DeckError("no load case after end option")
+    if not (content.law and content.cases and "fixed disp" in content.has and content.every > 0):
+        raise DeckError(
+            "no material, no load case after end option, no fixed disp, or post every 0"
+        )
     _check_references(content)
     _check_load_cases(content)
-    has, material = content.parameters.has, content.material
+    has = content.parameters
     if any(c.kind != "fixed" for c in content.conditions.values()) != ("follow for" in has):
         raise DeckError("follow for is for decks with pressure, and only for those")
-    if (content.gas is not None) != ("cavity" in has):
+    if bool(content.gas) != ("cavity" in has):
         raise DeckError("cavity has to be in the parameters and in the model, or in neither")
-    wanted = STATES[content.parameters.type] if material.kind == "hypoelastic" else 0
-    if content.parameters.states != wanted:
-        raise DeckError(f"state vars {content.parameters.states}, expected {wanted}")
+    wanted = STATES[content.type] if content.law == "hypoelastic" else 0
+    if content.states != wanted:
+        raise DeckError(f"state vars {content.states}, expected {wanted}")
     _check_elements(content)
 
 
 def _check_references(content: Content) -> None:
-    """Sets and tables that are named are there."""
-    material, conditions = content.material, content.conditions.values()
-    uses = [("element", material.on, material.kind)]
-    uses += [("element", name, "orientation") for name, *_ in content.frames]
-    uses += [("element", name, "geometry") for _, name in content.thickness]
-    uses += [("element", body.on, f"body {body.name}") for body in content.bodies if not body.rigid]
-    uses += [("element", content.gas_on, "cavity")] if content.gas else []
-    for c in conditions:
-        uses.append(("node" if c.kind == "fixed" else "element", c.on, f"condition {c.name}"))
+    """Raise DeckError unless sets and tables that are named are there."""
+    on = [content.law_on, *(f[0] for f in content.frames), *(t[1] for t in content.thickness)]
+    on += [body.on for body in content.bodies if not body.rigid]
+    uses = [("element", name, content.law) for name in on + [content.gas_on] * bool(content.gas)]
+    tables = [(body.table, TIME, f"body {body.name}") for body in content.bodies if body.rigid]
+    tables += [(number, LOCAL_STRAIN, "nlelast") for number in content.moduli]
+    for name, c in content.conditions.items():
+        uses.append(("node" if c.kind == "fixed" else "element", c.on, f"condition {name}"))
+        tables += [(number, TIME, f"condition {name}") for number in c.tables]
     for kind, name, where in uses:
-        if name not in (content.node_sets if kind == "node" else content.element_sets):
+        if name not in content.sets[kind]:
             raise DeckError(f"{where}: there is no {kind} set {name!r}")
-    tables = [(number, TIME, f"condition {c.name}") for c in conditions for number in c.tables]
-    tables += [(body.table, TIME, f"body {body.name}") for body in content.bodies if body.rigid]
-    tables += [(number, LOCAL_STRAIN, "nlelast") for number in material.tables]
     for number, variable, where in tables:
-        if number and number not in content.tables:
-            raise DeckError(f"{where}: there is no table {number}")
-        if number and content.tables[number].variable != variable:
-            raise DeckError(f"{where}: table {number} is not of variable type {variable}")
+        if number and getattr(content.tables.get(number), "variable", None) != variable:
+            raise DeckError(f"{where}: there is no table {number} of variable type {variable}")
 
 
 def _check_load_cases(content: Content) -> None:
-    """Conditions that are named are there, and two hold a degree of freedom alike."""
+    """Raise DeckError unless named conditions are there, and two hold a degree of freedom alike."""
     named = [("before end option", 0, content.initial)]
     for title, line, names in named + [(c.title, c.line, c.conditions) for c in content.cases]:
-        for name in names:
-            if name not in content.conditions:
-                problem = f"load case {title!r} names the boundary condition {name!r}"
-                raise DeckError(f"{problem}, which is not defined", line)
-    for name in content.initial:
-        if content.conditions[name].kind != "fixed" or any(content.conditions[name].values):
-            raise DeckError(f"condition {name!r} is not zero, and holds before the first increment")
-    for case in content.cases:
+        if unknown := {*names} - {*content.conditions}:
+            raise DeckError(f"load case {title!r} names {unknown}, which is not defined", line)
         said: dict[tuple[int, int], tuple[float, int]] = {}
-        for c in (content.conditions[name] for name in case.conditions):
+        for name in names:
+            c = content.conditions[name]
+            if line == 0 and (c.kind != "fixed" or any(c.values)):
+                raise DeckError(f"condition {name!r} is not zero, and holds from the beginning")
             for dof, *value in zip(c.dofs, c.values, c.tables, strict=True) if c.dofs else ():
-                for node in content.node_sets[c.on].tolist():
+                for node in content.sets["node"][c.on].tolist():
                     if said.setdefault((node, dof), tuple(value)) != tuple(value):
                         problem = f"node {node}, degree of freedom {dof} has two values"
-                        raise DeckError(f"{problem}, one of them by {c.name!r}", c.line)
+                        raise DeckError(f"{problem}, one of them by {name!r}", c.line)
 
 
 def _check_elements(content: Content) -> None:
-    """Each has one thickness, frame and material, is not folded, and its frame lies in it."""
+    """Raise DeckError unless each has one thickness, frame and material, and lies flat in both."""
+    sets = content.sets["element"]
     for what, names in (
         ("thickness", [name for _, name in content.thickness]),
         ("orientation", [name for name, *_ in content.frames]),
-        ("material", [content.material.on]),
+        ("material", [content.law_on]),
     ):
-        times = np.zeros(content.parameters.elements, dtype=int)
-        for name in names:
-            times[content.element_sets[name] - 1] += 1
-        if (times != 1).any():
-            bad = int(np.argmax(times != 1))
-            raise DeckError(f"element {bad + 1} has its {what} {times[bad]} times, expected once")
+        times = sum(np.bincount(sets[n], minlength=content.elements + 1) for n in names)
+        if (np.atleast_1d(times)[1:] != 1).any() or not names:
+            raise DeckError(f"an element has its {what} not once")
     corner = content.coordinates[content.connectivity - 1]
     along = np.roll(corner, -1, axis=1) - corner
     turns = np.cross(along, np.roll(along, -1, axis=1))
@@ -749,5 +455,5 @@ def _check_elements(content: Content) -> None:
         raise DeckError(f"element {np.argmax(inside_out) + 1} is inside out", number=INSIDE_OUT)
     unit = normal / np.linalg.norm(normal, axis=1)[:, None]
     for name, warp, fill in content.frames:
-        if (unit[content.element_sets[name] - 1] @ np.cross(warp, fill) < 0.9).any():
+        if (unit[sets[name] - 1] @ np.cross(warp, fill) < 0.9).any():
             raise DeckError(f"orientation {name!r}: the fill is not a quarter turn from the warp")

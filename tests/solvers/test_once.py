@@ -54,31 +54,23 @@ def cache(tmp_path):
 
 
 def test_a_second_run_of_the_same_is_no_run(cache):
-    solver = Counting()
+    solver, heard = Counting(), []
+    run = solver.run
+    solver.run = lambda model, law, **given: heard.append(given) or run(model, law)
     once = with_cache(solver, cache, {"element": 4})
     assert isinstance(once, Solver) and once.name == "counting" and once.external
     assert once.identity == "counting 1" and once.check().version == "1"
-    first, second = once.run(MODEL, LAW), once.run(MODEL, LAW)
+    once.progress = print
+    assert solver.progress is print and once.progress is print
+    first, second = once.run(MODEL, LAW, Path("here"), 5.0), once.run(MODEL, LAW)
     assert solver.runs == 1 and (first.load, second.load) == (1.0, 1.0)
     assert (first.from_cache, second.from_cache) == (False, True)
+    # Where and how long it may run reaches the solver and changes no result.
+    assert heard == [{"scratch": Path("here"), "timeout": 5.0}]
     # Another process, another machine: a new solver, the same folder.
     other = Counting()
     third = with_cache(other, RunCache(cache.folder), {"element": 4}).run(MODEL, LAW)
     assert other.runs == 0 and third.load == 1.0
-    solver = Counting()
-    once = with_cache(solver, cache, {})
-    once.progress = print
-    assert solver.progress is print and once.progress is print
-
-
-def test_where_and_how_long_it_may_run_reaches_the_solver_and_changes_no_result(cache):
-    solver, heard = Counting(), []
-    run = solver.run
-    solver.run = lambda model, law, **given: heard.append(given) or run(model, law)
-    once = with_cache(solver, cache, {})
-    once.run(MODEL, LAW, Path("here"), 5.0)
-    assert once.run(MODEL, LAW).from_cache
-    assert heard == [{"scratch": Path("here"), "timeout": 5.0}]
 
 
 mesh = strip_mesh(20.0, 40.0, 2, 4)

@@ -84,10 +84,6 @@ def test_numbers_alone_come_back_to_the_last_digit(cache):
     assert cache.read(KEY.replace(KEY[0], "f" if KEY[0] != "f" else "0")) is None
 
 
-def damaged(content, at):
-    return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
-
-
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 1.0])
 @pytest.mark.parametrize("how", ["cut", "changed"])
 def test_a_damaged_run_is_dropped_and_told(cache, caplog, share, how):
@@ -95,48 +91,46 @@ def test_a_damaged_run_is_dropped_and_told(cache, caplog, share, how):
     (entry,) = cache.entries()
     whole = entry.path.read_bytes()
     at = int(share * (len(whole) - 1))
-    entry.path.write_bytes(whole[:at] if how == "cut" else damaged(whole, at))
+    changed = whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
+    entry.path.write_bytes(whole[:at] if how == "cut" else changed)
     with caplog.at_level(logging.WARNING):
         assert cache.read(KEY) is None
     (said,) = caplog.messages
-    assert said.startswith(f"{entry.path} is dropped from the cache of runs and run again: it")
+    assert said.startswith(f"{entry.path} is dropped from the cache of runs and run again")
     assert not entry.path.exists()
     cache.write(KEY, history(), 1.0)
     assert cache.read(KEY) is not None
 
 
-def with_checksum(whole):
-    return TITLE + hashlib.sha256(whole).digest() + whole
-
-
-def test_nothing_is_unpickled(tmp_path):
-    """Not where somebody has written the right checksum either."""
+def test_another_run_layout_or_result_is_refused(tmp_path):
+    """Nothing is unpickled, not where somebody has written the right checksum either."""
     mark = tmp_path / "unpickled"
 
     class Trap:
         def __reduce__(self):
             return os.mkdir, (str(mark),)
 
-    content = io.BytesIO()
-    trap = np.empty(1, dtype=object)
+    content, trap = io.BytesIO(), np.empty(1, dtype=object)
     trap[0] = Trap()
     np.savez_compressed(content, words=np.array(json.dumps({"key": KEY})), load=trap)
-    with pytest.raises(Damaged):
-        from_bytes(with_checksum(content.getvalue()), KEY)
+    whole, spoiled = (
+        to_bytes(history(), KEY, 1.0),
+        [
+            TITLE + hashlib.sha256(text).digest() + text
+            for text in (content.getvalue(), b"no archive")
+        ],
+    )
+    for given, key, words in (
+        (whole, "0" * 64, "of another run"),
+        (whole.replace(b"run 1", b"run 2", 1), KEY, "another version"),
+        *((one, KEY, "") for one in spoiled),
+    ):
+        with pytest.raises(Damaged, match=words):
+            from_bytes(given, key)
     assert not mark.exists()
-
-
-def test_another_run_layout_or_result_is_refused():
-    whole = to_bytes(history(), KEY, 1.0)
-    with pytest.raises(Damaged, match="of another run"):
-        from_bytes(whole, "0" * 64)
-    with pytest.raises(Damaged, match="another version"):
-        from_bytes(whole.replace(b"run 1", b"run 2", 1), KEY)
-    with pytest.raises(Damaged, match="cannot be read"):
-        from_bytes(with_checksum(b"no archive"), KEY)
     # What a plug-in gives back by mistake is left to those who read it.
     with pytest.raises(TypeError, match="HypoelasticLaw is not a History"):
-        to_bytes(HypoelasticLaw.linear(800.0, 400.0, 80.0), KEY, 1.0)  # type: ignore[arg-type]
+        to_bytes(HypoelasticLaw.linear(800.0, 400.0, 80.0), KEY, 1.0)
 
 
 def key(number):
@@ -163,7 +157,13 @@ def test_what_was_used_longest_ago_goes_first(cache):
     assert cache.read(key(0)) is not None  # used now
     gone = cache.prune(2 * size)
     assert there(cache, 5) == [0, 4] and len(gone) == 3
+    # What was cut off a day ago is swept.
+    old, fresh = (cache.entries()[0].path.parent / f".{name}.part" for name in ("old", "fresh"))
+    for path in (old, fresh):
+        path.write_bytes(b"cut")
+    os.utime(old, (1e9, 1e9))
     assert cache.prune(older=3600.0) and there(cache, 5) == [0]
+    assert not old.exists() and fresh.exists()
     assert cache.prune(0) and cache.entries() == []
 
 
@@ -179,16 +179,6 @@ def test_the_folder_never_holds_more_than_its_limit(cache):
         time.sleep(0.002)  # the clock of a file system
     left = there(cache, 12)
     assert 11 in left and 0 not in left and len(left) >= 4
-
-
-def test_what_was_cut_off_a_day_ago_is_swept(cache):
-    cache.write(KEY, history(), 1.0)
-    old, fresh = (cache.folder / KEY[:2] / f".{name}.part" for name in ("old", "fresh"))
-    for path in (old, fresh):
-        path.write_bytes(b"cut")
-    os.utime(old, (1e9, 1e9))
-    cache.prune(10**9)
-    assert not old.exists() and fresh.exists() and len(cache.entries()) == 1
 
 
 def write_many(folder, seed):
@@ -211,20 +201,16 @@ def test_many_may_write_at_once(cache, caplog):
     assert there(cache, 20) == list(range(20)) and not list(cache.folder.glob("*/.*"))
 
 
-def test_a_folder_that_cannot_be_written_is_told_once(tmp_path, caplog):
-    place = tmp_path / "file"
-    place.write_text("no folder")
-    cache = RunCache(place / "runs")
+def test_a_folder_that_cannot_be_written_is_told_once(cache, tmp_path, monkeypatch, caplog):
+    (tmp_path / "file").write_text("no folder")
+    blocked = RunCache(tmp_path / "file" / "runs")
     with caplog.at_level(logging.WARNING):
         for number in range(3):
-            cache.write(key(number), history(), 1.0)
-            assert cache.read(key(number)) is None
-    assert [m for m in caplog.messages if "runs cannot be kept there" in m] == [
-        f"{place / 'runs'}: runs cannot be kept there: Not a directory"
-    ]
+            blocked.write(key(number), history(), 1.0)
+            assert blocked.read(key(number)) is None
+    (said,) = [m for m in caplog.messages if "runs cannot be kept there" in m]
+    assert said.startswith(f"{tmp_path / 'file' / 'runs'}: ")
 
-
-def test_a_full_disk_leaves_nothing_half(cache, monkeypatch, caplog):
     def full(source, target):
         raise OSError(28, "No space left on device")
 
@@ -278,18 +264,13 @@ def test_the_command_shows_and_drops(cache, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "words"),
-    [
-        ("--prune", "much", "--prune: expected a size such as 500MB or 2GB, got 'much'"),
-        ("--prune", "-1GB", "expected a size"),
-        ("--limit", "2 K", "expected a size"),
-        ("--older", "30", "--older: expected an age such as 12h, 30d or 8w, got '30'"),
-    ],
+    ("option", "value"),
+    [("--prune", "much"), ("--prune", "-1GB"), ("--limit", "2 K"), ("--older", "30")],
 )
 def test_what_is_no_size_or_age_is_told_and_drops_nothing(
-    cache, monkeypatch, tmp_path, option, value, words
+    cache, monkeypatch, tmp_path, option, value
 ):
     monkeypatch.setenv(VARIABLE, str(cache.folder))
     filled(cache, 2)
     done = in_process("cache", option, value, cwd=tmp_path, code=2)
-    assert words in done.output and len(cache.entries()) == 2
+    assert f"{option}: " in done.output and len(cache.entries()) == 2

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.errors import SolverFailure
+from bubblefit.errors import OutputError, SolverFailure
 from bubblefit.solvers import process, scratch
 from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep, sweep_left
 
@@ -199,3 +199,23 @@ def test_the_usual_places_are_swept(tmp_path, monkeypatch):
     assert [folder.exists() for folder in folders] == [False, False, True]
     sweep_left(tmp_path / "own")
     assert not folders[2].exists()
+
+
+def test_failed_runs_leave_memory(monkeypatch, tmp_path):
+    monkeypatch.setattr(scratch, "MEMORY", tmp_path / "shm")
+    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))
+    (tmp_path / "shm").mkdir()
+    (tmp_path / "disk").mkdir()
+    assert scratch.default_parent() == tmp_path / "shm"
+    elsewhere = scratch.fresh_folder("ccx", tmp_path)
+    assert scratch.put_aside(elsewhere) == elsewhere
+    monkeypatch.setattr(scratch, "ROOM", 1 << 60)
+    assert scratch.default_parent() == tmp_path / "disk"
+    with pytest.raises(OutputError, match="no scratch folder"):
+        scratch.fresh_folder("ccx", Path("/proc/none"))
+
+
+def test_the_log_may_be_anything(tmp_path):
+    (tmp_path / "log").write_bytes(b"\xff\xfe\n" * 40 + b"x" * 100_000)
+    assert len(process.log_tail(tmp_path / "log").splitlines()) <= 25
+    assert process.log_tail(tmp_path / "none") == ""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.solvers.bars import diagnose
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import file_mark, templates_mark
@@ -17,6 +16,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import (
     SOLVERS,
     command_line,
+    diagnose,
     overridden,
     solver_named,
     solver_names,
@@ -69,22 +69,11 @@ def test_a_wrong_table_is_one_line_with_file_and_key(tables, words):
     assert complaint(solver_settings, PROJECT, tables).startswith(f"{PROJECT}: {words}")
 
 
-def test_a_usable_solver_names_the_file_and_the_key():
-    assert isinstance(usable_solver("membrane", {"bending_stiffness": 0.5}), MembraneSolver)
-    words = complaint(usable_solver, "nothing", {}, PROJECT, "run.solver")
-    assert words.startswith(f"{PROJECT}: run.solver (or --solver): 'nothing' is not one of: calc")
-    with pytest.raises(SolverFailure, match="no-such-marc"):
-        usable_solver("marc", {"executable": "no-such-marc"})
-
-
-def test_the_command_line_has_each_option_once():
-    options = {one.name: one for one in command_line()}
-    assert list(options) == ["ccx", "templates", "element", "marc"]
-    assert options["element"].what == "Shell element: S8R or S4 (calculix), 139, 75 or 18 (marc)."
-
-
 def test_the_command_line_takes_the_place_of_a_setting(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    named = {one.name: one for one in command_line()}
+    assert list(named) == ["ccx", "templates", "element", "marc"]
+    assert named["element"].what == "Shell element: S8R or S4 (calculix), 139, 75 or 18 (marc)."
     options = solver_settings(PROJECT, {"calculix": {"element": "S4", "threads": 3}})["calculix"]
     given = {"ccx": None, "marc": None, "element": "S8R"}
     settings = ("timeout=60", "scratch=runs", 'ccx = "my ccx"')
@@ -133,7 +122,7 @@ class AcmeSettings(SolverSettings):
 OFFER = Offer("acme", __package__, "AcmeSolver", AcmeSettings)
 """,
     "solver.py": """
-from bubblefit.solvers.base import SolverCheck
+from bubblefit.solvers.base import Diagnosis, SolverCheck
 
 class AcmeSolver:
     name, external, progress, identity = "acme", True, None, "acme 1"
@@ -141,9 +130,6 @@ class AcmeSolver:
         self.given = acme, deck, element
     def run(self, model, law, scratch=None, timeout=None): ...
     def check(self): return SolverCheck("acme", True, "1", True)
-""",
-    "diagnosis.py": """
-from bubblefit.solvers.base import Diagnosis
 
 def diagnose(named=None):
     return [Diagnosis("acme", "1", named, "named", named is not None, None, True)]
@@ -169,6 +155,10 @@ def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch):
     options = solver_settings(PROJECT, {"acme": {"deck": "d.inp", "acme": "bin/acme"}})["acme"]
     assert options["deck"] == Path("/somewhere/d.inp")
     options = overridden("acme", options, {"element": "A2", "ccx": None}, ("acme=other",))
+    words = complaint(usable_solver, "nothing", {}, PROJECT, "run.solver")
+    assert words.startswith(f"{PROJECT}: run.solver (or --solver): 'nothing' is not one of: acme")
+    with pytest.raises(SolverFailure, match="no-such-marc"):
+        usable_solver("marc", {"executable": "no-such-marc"})
     solver = usable_solver("acme", options, PROJECT)
     assert solver.given == ("other", Path("/somewhere/d.inp"), "A2")
     said = {one.name: one.what for one in command_line()}
@@ -176,7 +166,7 @@ def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch):
     assert said["element"].endswith("139, 75 or 18 (marc), A1 or A2 (acme).")
     assert "acme" in solver_names() and "acme" in solver_sections()
     for ours in ("calculix", "marc"):
-        monkeypatch.setattr(f"bubblefit.solvers.{ours}.diagnosis.diagnose", lambda named: [])
+        monkeypatch.setattr(f"bubblefit.solvers.{ours}.solver.diagnose", lambda named: [])
     assert [one.name for one in diagnose()] == ["membrane", "acme"]
     (found,) = [one for one in diagnose(acme="/opt/acme") if one.name == "acme"]
     assert found.expected and found.path == "/opt/acme"

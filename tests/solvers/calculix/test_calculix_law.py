@@ -168,21 +168,24 @@ def close(found, wanted, tolerance=1e-10):
     np.testing.assert_allclose(found, wanted, rtol=0, atol=tolerance * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("seed", range(5))
-def test_random_paths_give_the_stress_of_the_python_law(function, name, seed):
-    law = LAWS[name]
-    point = Point(function, constants(law, 300.0, 25.0))
-    for gradient in path(seed):
+def follow(point, law, axes, gradients):
+    """Along a path, stress, stiffness and state are those of the Python law."""
+    for gradient in gradients:
         before = point.committed[2, 1].copy()
         stress, stiffness, state, request = point.call(gradient)
-        s, c, end = expected(law, np.eye(3), gradient, before, 300.0, 25.0)
-        assert request == -1.0
+        s, c, end = expected(law, axes, gradient, before, 300.0, 25.0)
+        assert request == -1.0 and not state[6:].any()
         close(stress, s)
         close(stiffness, c)
         close(state[:6], end)
-        assert not state[6:].any()
         point.commit(state)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_random_paths_give_the_stress_of_the_python_law(function, name):
+    for seed in range(5):
+        point = Point(function, constants(LAWS[name], 300.0, 25.0))
+        follow(point, LAWS[name], np.eye(3), path(seed))
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -231,19 +234,9 @@ def test_the_material_frame_follows_angle_and_orientation(
 ):
     cylindrical = bool(orab) and orab[-1] < 0
     first, third = (np.asarray(v) / np.linalg.norm(v) for v in (warp, normal))
+    given = constants(LAWS["cubic"], 300.0, 25.0, angle, 1 if cylindrical else 3)
     axes = np.array([first, np.cross(third, first), third])
-    law = LAWS["cubic"]
-    point = Point(
-        function, constants(law, 300.0, 25.0, angle, 1 if cylindrical else 3), orab, position
-    )
-    for gradient in path(11):
-        before = point.committed[2, 1].copy()
-        stress, stiffness, state, _ = point.call(gradient)
-        s, c, end = expected(law, axes, gradient, before, 300.0, 25.0)
-        close(stress, s)
-        close(stiffness, c)
-        close(state[:6], end)
-        point.commit(state)
+    follow(Point(function, given, orab, position), LAWS["cubic"], axes, path(11))
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -267,29 +260,22 @@ def test_the_tangent_is_the_symmetric_part_of_finite_differences(function, name,
     close(stiffness, 0.5 * (slope + slope.T), 1e-7)
 
 
-def test_a_rotation_of_the_body_changes_nothing(function):
-    point = Point(function, constants(LAWS["cubic"], 300.0, 25.0, 20.0))
+def test_a_rotation_of_the_body_or_of_all_changes_nothing(function):
+    law, q = LAWS["cubic"], rotation((0, 0, 1), 45)
+    point = Point(function, constants(law, 300.0, 25.0, 20.0))
     *_, gradient = path(5)
-    stress, stiffness, state, _ = point.call(gradient)
+    found = point.call(gradient)
     for degrees in (10, 90, 180, 271):
         turned = point.call(rotation((1, 2, 3), degrees) @ gradient)
-        close(turned[0], stress)
-        close(turned[1], stiffness)
-        close(turned[2], state)
-
-
-def test_a_rotation_alone_makes_no_stress(function):
-    point = Point(function, constants(LAWS["cubic"]))
-    stress, *_ = point.call(rotation((3, 1, 2), 77))
-    assert np.abs(stress).max() < 1e-11
-
-
-def test_a_turned_material_is_the_material_in_a_turned_frame(function):
-    law, q = LAWS["cubic"], rotation((0, 0, 1), 45)
+        for now, before in zip(turned[:3], found, strict=False):
+            close(now, before)
+    assert np.abs(point.call(rotation((3, 1, 2), 77))[0]).max() < 1e-11
     straight, turned = (Point(function, constants(law, angle=a)) for a in (0.0, 45.0))
-    *_, gradient = path(8)
-    s, t = straight.call(gradient)[0], turned.call(q @ gradient @ q.T)[0]
-    close(t, voigt(q @ tensor(s) @ q.T))
+    close(turned.call(q @ gradient @ q.T)[0], voigt(q @ tensor(straight.call(gradient)[0]) @ q.T))
+    # Stress alone leaves the stiffness.
+    stress, stiffness, *_ = point.call(gradient, icmd=3)
+    assert (stiffness == 77.0).all()
+    close(stress, found[0])
 
 
 def test_a_uniaxial_bar_integrates_its_modulus_over_log_strain(function):
@@ -309,12 +295,10 @@ def test_a_uniaxial_bar_integrates_its_modulus_over_log_strain(function):
 
 BAD = {
     "modulus not positive": (np.diag([1.3, 1.0, 1.0]), np.r_[np.zeros(7), 100.0, 0, 0, -1e3, 100]),
-    "nan": (np.full((3, 3), np.nan), BETA),
-    "infinite": (np.diag([np.inf, 1.0, 1.0]), BETA),
-    "collapsed": (np.diag([1.0, 0.0, 1.0]), BETA),
-    "turned into itself": (np.ones((3, 3)), BETA),
+    "nan": (np.full((3, 3), np.nan), BETA), "infinite": (np.diag([np.inf, 1.0, 1.0]), BETA),
+    "collapsed": (np.diag([1.0, 0.0, 1.0]), BETA), "turned into itself": (np.ones((3, 3)), BETA),
     "nan through the thickness": (np.diag([1.0, 1.0, np.nan]), BETA),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", BAD)
@@ -332,21 +316,23 @@ def test_what_cannot_be_asks_for_a_smaller_increment(function, what):
     assert point.call(gradient, pnewdt=0.1)[3] == 0.1
 
 
-def test_stress_alone_leaves_the_stiffness(function):
-    point = Point(function, constants(LAWS["cubic"]))
-    *_, gradient = path(2)
-    stress, stiffness, *_ = point.call(gradient, icmd=3)
-    assert (stiffness == 77.0).all()
-    close(stress, point.call(gradient)[0])
-
-
 def test_constants_are_in_the_documented_order():
     law = LAWS["incompressible"]
     found = constants(law, 300.0, 25.0, 45.0, 1)
     assert found == (0.24, 0.0, 300.0, 25.0, 45.0, 1.0, 0.0, law_number(law), 3.0)
     assert constants(LAWS["linear"])[1:4] == (1.0, 800.0, 20.0)
+    assert constants(MANY)[-1] == 60
     # One line more would be read of a multiple of 8, and more than 21 written beyond a field.
     assert len(found) % 8 and len(found) <= 21
+    for given, name in (
+        ({"normal_axis": 2}, "normal_axis"),
+        ({"normal_modulus": 0.0}, "normal modulus"),
+        ({"transverse_shear": math.nan}, "shear modulus"),
+    ):
+        with pytest.raises(InputError, match=name):
+            constants(LAWS["linear"], **given)
+    # A law without stiffness is the analysis' business.
+    assert min(constants(HypoelasticLaw(np.zeros(12)))[2:4]) > 0
 
 
 def test_the_file_of_a_law_has_every_digit_and_no_piece_beyond_the_range():
@@ -403,49 +389,24 @@ def test_a_law_that_is_not_there_ends_the_job(function, folder, tmp_path, what):
     assert "*ERROR in HYPOELASTIC: no file *.law in the folder of the deck has" in done.stdout
 
 
-def test_a_trilinear_path_passes_its_breaks(function):
-    """Otherwise the comparison of random paths would say little."""
-    law = LAWS["tri-linear"]
-    breaks = law.form.breaks
-    straddled = 0
-    for seed in range(5):
-        point = Point(function, constants(law))
-        for gradient in path(seed):
-            before, state = point.committed[2, 1].copy(), point.call(gradient)[2]
-            regions = [np.searchsorted(b, [abs(before[i]), abs(state[i])])
-                       for i, b in enumerate(breaks)]  # fmt: skip
-            straddled += sum(a != b for a, b in regions)
-            point.commit(state)
-    assert straddled > 10
-
-
-def test_constants_that_cannot_be_are_refused():
-    with pytest.raises(InputError, match="normal_axis"):
-        constants(LAWS["linear"], normal_axis=2)
-    with pytest.raises(InputError, match="normal modulus"):
-        constants(LAWS["linear"], normal_modulus=0.0)
-    with pytest.raises(InputError, match="shear modulus"):
-        constants(LAWS["linear"], transverse_shear=math.nan)
-    # A law without stiffness is the analysis' business.
-    assert min(constants(HypoelasticLaw(np.zeros(12)))[2:4]) > 0
-
-
-def test_the_library_is_compiled_once(folder):
+def test_the_library_is_compiled_once_a_source(folder, tmp_path, monkeypatch):
     first = material_library(folder)
     stamp = first.stat().st_mtime_ns
     assert material_library(folder) == first and first.stat().st_mtime_ns == stamp
-    assert first.name == "libBUBBLEFIT.so"
-    assert [p.name for p in first.parent.iterdir()] == [first.name]
-
-
-def test_another_source_or_flag_is_another_library(folder, tmp_path, monkeypatch):
-    first = material_library(folder)
+    assert [p.name for p in first.parent.iterdir()] == [first.name] == ["libBUBBLEFIT.so"]
     monkeypatch.setattr(library, "FLAGS", (*library.FLAGS, "-DOTHER"))
     second = material_library(folder)
     source = tmp_path / "law.c"
     source.write_text(library.SOURCE.read_text() + "\n/* edited */\n")
     monkeypatch.setattr(library, "SOURCE", source)
     assert len({first, second, material_library(folder)}) == 3
+    source.write_text("#error broken on purpose\n")
+    with pytest.raises(SolverFailure, match="broken on purpose"):
+        material_library(tmp_path / "cache")
+    assert not list((tmp_path / "cache").rglob("*.so"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="BUBBLEFIT_CACHE"):
+        material_library(tmp_path / "file")
 
 
 def test_no_compiler_is_one_line_of_advice(tmp_path, monkeypatch):
@@ -458,43 +419,20 @@ def test_no_compiler_is_one_line_of_advice(tmp_path, monkeypatch):
         material_library(tmp_path)
 
 
-def test_a_source_that_does_not_compile_leaves_nothing(folder, tmp_path, monkeypatch):
-    source = tmp_path / "law.c"
-    source.write_text("#error broken on purpose\n")
-    monkeypatch.setattr(library, "SOURCE", source)
-    with pytest.raises(SolverFailure, match="broken on purpose"):
-        material_library(tmp_path / "cache")
-    assert not list((tmp_path / "cache").rglob("*.so"))
-
-
-def test_a_cache_that_cannot_be_written_says_so(folder, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="BUBBLEFIT_CACHE"):
-        material_library(Path(tmp_path / "file"))
-
-
 def test_whole_times_commit_only_at_the_end_of_a_step(function):
     stretch = np.diag([1.03, 1.02, 1.0])
-    always = Point(function, constants(LAWS["cubic"]))
+    stress, _, state, _ = Point(function, constants(LAWS["cubic"])).call(stretch)
     at_ends = Point(function, constants(LAWS["cubic"], whole_times=True))
-    stress, _, state, _ = always.call(stretch)
     inside, _, kept, _ = at_ends.call(stretch, time=0.4, begun=2.0)
     assert np.array_equal(inside, stress) and not kept.any()
     # Sums of increments end a step only nearly at a whole number.
     _, _, kept, _ = at_ends.call(stretch, time=1 - 1e-12, begun=2.0)
     assert np.array_equal(kept, state) and state[0] > 0
-
-
-def test_whole_times_may_end_with_a_step(function):
-    """Up to total time 3 as above, from there at every increment."""
-    stretch = np.diag([1.03, 1.02, 1.0])
-    until = Point(function, constants(LAWS["cubic"], whole_until=3))
-    _, _, kept, _ = until.call(stretch, time=0.4, begun=2.0)
-    assert not kept.any()
-    for time in (0.0, 1e-3, 0.4):
+    # Up to total time 3 alike, from there at every increment.
+    for begun, time in ((2.0, 0.4), (3.0, 0.0), (3.0, 1e-3), (3.0, 0.4)):
         point = Point(function, constants(LAWS["cubic"], whole_until=3))
-        _, _, kept, _ = point.call(stretch, time=time, begun=3.0)
-        assert kept[0] > 0
+        _, _, kept, _ = point.call(stretch, time=time, begun=begun)
+        assert kept[0] > 0 if begun == 3.0 else not kept.any()
 
 
 # A patch of 2 mm x 1 mm: nodes (x, y, z) and element of each type, in CalculiX's order.
@@ -515,87 +453,60 @@ ORIENTATIONS = {
 
 def patch_deck(element, law, gradient, increments, angle, orientation):
     """Every node is moved to F X in equal increments."""
-    nodes = PATCHES[element]
+    nodes, name, solid = PATCHES[element], library.MATERIAL, element == "C3D8I"
     moves = np.array(nodes) @ (gradient - np.eye(3)).T
-    solid = element == "C3D8I"
-    name = library.MATERIAL
-    lines = [
-        "*NODE, NSET=ALL",
-        *(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(nodes, 1)),
-        f"*ELEMENT, TYPE={element}, ELSET=PATCH",
-        ", ".join(map(str, [1, *range(1, len(nodes) + 1)])),
-        *orientation.splitlines(),
-        f"*MATERIAL, NAME={name}",
-    ]
     written = [f"{v:.12e}" for v in constants(law, angle=angle)]
-    lines.append(f"*USER MATERIAL, CONSTANTS={len(written)}")
-    lines += [", ".join(written[i : i + 8]) for i in range(0, len(written), 8)]
-    lines += ["*DEPVAR", str(STATE_VARIABLES)]
     section = f"*{'SOLID' if solid else 'SHELL'} SECTION, ELSET=PATCH, MATERIAL={name}"
-    lines.append(section + (", ORIENTATION=WARP" if orientation else ""))
-    lines += [] if solid else ["0.8"]
-    lines += ["*STEP, NLGEOM, INC=1000", "*STATIC, DIRECT", f"{1 / increments}, 1."]
-    lines.append("*BOUNDARY")
-    lines += [
-        f"{i}, {axis}, {axis}, {move[axis - 1]:.12e}"
-        for i, move in enumerate(moves, 1)
-        for axis in (1, 2, 3)
-    ]
+    lines = [
+        "*NODE, NSET=ALL", *(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(nodes, 1)),
+        f"*ELEMENT, TYPE={element}, ELSET=PATCH",
+        ", ".join(map(str, [1, *range(1, len(nodes) + 1)])), *orientation.splitlines(),
+        f"*MATERIAL, NAME={name}", f"*USER MATERIAL, CONSTANTS={len(written)}",
+        *(", ".join(written[i : i + 8]) for i in range(0, len(written), 8)),
+        *("*DEPVAR", str(STATE_VARIABLES)), section + (", ORIENTATION=WARP" if orientation else ""),
+        *([] if solid else ["0.8"]),
+        *("*STEP, NLGEOM, INC=1000", "*STATIC, DIRECT", f"{1 / increments}, 1.", "*BOUNDARY"),
+    ]  # fmt: skip
+    for i, move in enumerate(moves, 1):
+        lines += [f"{i}, {axis}, {axis}, {move[axis - 1]:.12e}" for axis in (1, 2, 3)]
     lines += [f"*EL PRINT, ELSET=PATCH, GLOBAL=YES, FREQUENCY={increments}", "S"]
     return "\n".join([*lines, "*END STEP", ""])
 
 
-@pytest.mark.parametrize("element", PATCHES)
-@pytest.mark.parametrize("how", ORIENTATIONS)
-def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element, how):
-    check_patch(ccx, tmp_path, element, how, LAWS["cubic"])
+# 60 pieces of four coefficients, where CalculiX has place for 21 constants.
+KNOTS = np.linspace(0, 0.13, 21)
+WAVES = np.concatenate([size * (1 + 0.3 * np.sin(40 * KNOTS)) for size in (20, 140, 800)])
+MANY = HypoelasticLaw(WAVES, strain_range=[0.13] * 3, form=Spline.at([KNOTS.tolist()] * 3))
 
 
-@pytest.mark.parametrize("element", PATCHES)
-def test_a_patch_in_ccx_under_a_trilinear_law(ccx, tmp_path, element):
-    check_patch(ccx, tmp_path, element, "angle", LAWS["tri-linear"])
-
-
-@pytest.mark.parametrize("element", PATCHES)
-@pytest.mark.parametrize("name", ["spline", "jumps and kinks"])
-def test_a_patch_in_ccx_under_any_piecewise_cubics(ccx, tmp_path, element, name):
-    check_patch(ccx, tmp_path, element, "angle", LAWS[name])
-
-
-def test_a_patch_in_ccx_under_a_law_of_many_pieces(ccx, tmp_path):
-    """60 pieces of four coefficients, where CalculiX has place for 21 constants."""
-    knots = np.linspace(0, 0.13, 21)
-    wave = 1 + 0.3 * np.sin(40 * knots)
-    values = np.concatenate([size * wave for size in (20, 140, 800)])
-    law = HypoelasticLaw(values, strain_range=[0.13] * 3, form=Spline.at([knots.tolist()] * 3))
-    assert constants(law)[-1] == 60
-    check_patch(ccx, tmp_path, "S8R", "angle", law)
-
-
-def check_patch(ccx, tmp_path, element, how, law, increments=10):
+@pytest.mark.parametrize(
+    ("element", "how", "law"),
+    [
+        *((element, how, LAWS["cubic"]) for element in PATCHES for how in ORIENTATIONS),
+        ("S4", "angle", LAWS["tri-linear"]),
+        ("C3D8I", "angle", LAWS["tri-linear"]),
+        ("S8R", "angle", LAWS["spline"]),
+        ("C3D8I", "angle", LAWS["jumps and kinks"]),
+        ("S8R", "angle", MANY),
+    ],
+)
+def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element, how, law):
     angle, orientation, warp_at = ORIENTATIONS[how]
-    gradient = np.eye(3)
+    gradient, increments = np.eye(3), 10
     gradient[:2, :2] = [[1.06, 0.03], [0.05, 1.04]]
     deck = patch_deck(element, law, gradient, increments, angle, orientation)
     (tmp_path / "patch.inp").write_text(deck)
-    done = subprocess.run(
-        [ccx.path, "patch"],
-        cwd=tmp_path,
-        env={**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    environment = {**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)}
+    done = subprocess.run([ccx.path, "patch"], cwd=tmp_path, env=environment, capture_output=True,
+                          text=True, timeout=60)  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:]
     printed = [line.split() for line in (tmp_path / "patch.dat").read_text().splitlines()]
     found = np.array([row[2:] for row in printed if len(row) == 8 and row[0] == "1"], float)
     assert len(found) >= 4
-    axes = rotation((0, 0, 1), warp_at).T
-    state = np.zeros(6)
+    axes, state = rotation((0, 0, 1), warp_at).T, np.zeros(6)
     for step in range(1, increments + 1):
         f = np.eye(3) + step / increments * (gradient - np.eye(3))
         s, _, state = expected(law, axes, f, state, 1.0, 1.0)
-    cauchy = f @ tensor(s) @ f.T / np.linalg.det(f)
-    wanted = voigt(cauchy)
+    wanted = voigt(f @ tensor(s) @ f.T / np.linalg.det(f))
     # Seven digits are printed.
     np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=2e-6 * wanted.max())

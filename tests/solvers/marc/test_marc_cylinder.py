@@ -18,15 +18,9 @@ from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.solver import MarcSolver
 
 from ...marc_files import sts_text, t19_text
-from ...solvers.marc.test_marc_deck import (
-    blocks_of,
-    conditions,
-    integers,
-    loadcases,
-    parameter,
-    reals,
-    table,
-)
+from .test_marc_deck import conditions, read
+
+__all__ = ["read"]
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
 ROUNDING = 5.1e-6
@@ -43,74 +37,60 @@ def grown(model):
     return model.mesh.points * [0.05, 0.05, 0.0]
 
 
-def test_inflation_needs_no_contact_and_no_cavity(model):
-    deck = inflation_deck(model, LAW, MarcSettings())
-    for word in ("cavity", "contact"):
-        assert not blocks_of(deck, word)
-    assert set(loadcases(deck)[-1]) == {"fix_symmetry_x", "fix_symmetry_z", "hold", "pressure"}
-    assert conditions(deck)["hold"] == ([2], [0.0], [0], "support_bottom")
+def test_inflation_needs_no_contact_and_no_cavity(read, model):
+    content = read(inflation_deck(model, LAW, MarcSettings()))
+    assert not content.gas and not content.bodies
+    names = {"fix_symmetry_x", "fix_symmetry_z", "hold", "pressure"}
+    assert set(content.cases[-1].conditions) == names
+    found = conditions(content)
+    assert found["hold"] == ([2], [0.0], [0], "support_bottom")
     # Shells do not turn about the axes in their plane of symmetry.
-    assert conditions(deck)["fix_symmetry_z"][0] == [3, 4, 5]
-    np.testing.assert_allclose(table(deck, "load")[2][:, 1], [0, *model.inflation])
-    (step,) = blocks_of(deck, "auto load")
-    assert integers(step[0])[0] == 100
+    assert found["fix_symmetry_z"][0] == [3, 4, 5]
+    np.testing.assert_allclose(content.tables[1].y, [0, *model.inflation])
+    assert content.cases[0].increments == 100
+    # Seam and caps have their own thickness.
+    assert sorted(t for t, _ in content.thickness) == pytest.approx([0.81, 2.43])
 
 
-def test_bending_is_a_cavity_that_is_filled_and_closed(model, grown):
-    deck = bending_deck(model, LAW, MarcSettings(increments=0), grown)
-    start, inflation, approach, bending = map(set, loadcases(deck))
+def test_bending_is_a_cavity_that_is_filled_and_closed(read, model, grown):
+    content = read(bending_deck(model, LAW, MarcSettings(increments=0), grown))
     guides = {"fix_symmetry_x", "fix_symmetry_z"}
-    assert start == guides | {"hold"}
-    assert inflation == guides | {"hold", "fill"}
-    assert approach == guides | {"hold", "closed"}
-    assert bending == guides | {"closed"}
-    counts = [integers(data[0])[0] for data in blocks_of(deck, "auto load")]
-    assert counts == [len(model.inflation), 1, 3]
-    assert parameter(deck, "cavity") == [1]
-    (gas,) = [data for data in blocks_of(deck, "cavity") if data[0].strip() == "1"]
-    assert reals(gas[2]) == pytest.approx([0.101, 300.0, 1.2041e-12])
-    (load,) = blocks_of(deck, "cavity load")
-    assert [load[1][60:], load[3][60:]] == ["fill", "closed"]
-    assert integers(load[2][20:]) == [1, 1, 1] and integers(load[4][20:]) == [0, 2, 1]
-    assert not blocks_of(deck, "dist loads")
-
-
-def test_paths_of_the_bodies(model, grown):
-    deck = bending_deck(model, LAW, MarcSettings(), grown)
+    assert set(content.initial) == guides | {"hold"}
+    cases = [set(case.conditions) for case in content.cases]
+    assert cases == [guides | {"hold", "fill"}, guides | {"hold", "closed"}, guides | {"closed"}]
+    assert [case.increments for case in content.cases] == [len(model.inflation), 1, 3]
+    assert content.gas == pytest.approx([0.101, 300.0, 1.2041e-12])
+    fill, closed = (content.conditions[name] for name in ("fill", "closed"))
+    assert (fill.tables, fill.load, closed.tables, closed.load) == ([1], 1, [0], 2)
+    assert not [c for c in content.conditions.values() if c.kind == "pressure"]
+    # Paths of the bodies.
     filled, last = len(model.inflation), len(model.inflation) + 1 + 3
-    _, _, support = table(deck, "support_path")
-    _, _, collar = table(deck, "collar_path")
-    _, _, load = table(deck, "load")
-    for points in (support, collar, load):
-        np.testing.assert_array_equal(points[:, 0], range(last + 1))
-    assert (support[: filled + 1, 1] == -BELOW).all() and (support[filled + 1 :, 1] == 0).all()
-    assert (collar[: filled + 2, 1] == 0).all()
-    np.testing.assert_allclose(collar[filled + 2 :, 1], [-(ABOVE + d) for d in (20, 60, 100)])
-    assert (load[filled:, 1] == model.pressure).all()
-
-
-def test_patches_face_the_fabric(model, grown):
-    deck = bending_deck(model, LAW, MarcSettings(), grown)
-    (data,) = blocks_of(deck, "contact")
-    assert integers(data[0])[0] == 3
-    assert data[2][30:].strip() == "cylinder" and data[3] == "fabric"
-    at = 4
-    for number, name, sign in ((2, "support", 1), (3, "collar", -1)):
-        body, kind, count = integers(data[at][:30])
-        assert (body, kind, data[at][30:].strip()) == (number, 1, name)
-        assert integers(data[at + 1][:10]) == [number]
-        assert reals(data[at + 1][10:]) == [0, 1, 0]
-        rows = [reals(line) for line in data[at + 2 : at + 2 + 2 * count]]
-        patches = np.reshape(rows, (count, 4, 3))
-        normal = np.cross(patches[:, 1] - patches[:, 0], patches[:, 3] - patches[:, 0])
-        # The support looks up, the inside of the collar down.
+    load, support, collar = (content.tables[number] for number in (1, 2, 3))
+    for table in (support, collar, load):
+        np.testing.assert_array_equal(table.x, range(last + 1))
+    assert (support.y[: filled + 1] == -BELOW).all() and (support.y[filled + 1 :] == 0).all()
+    assert (collar.y[: filled + 2] == 0).all() and (load.y[filled:] == model.pressure).all()
+    np.testing.assert_allclose(collar.y[filled + 2 :], [-(ABOVE + d) for d in (20, 60, 100)])
+    # Patches face the fabric: the support looks up, the inside of the collar down.
+    assert (content.bodies[0].name, content.bodies[0].on) == ("cylinder", "fabric")
+    for body, name, number, sign in zip(
+        content.bodies[1:], ("support", "collar"), (2, 3), (1, -1), strict=True
+    ):
+        assert (body.name, body.table, body.direction.tolist()) == (name, number, [0, 1, 0])
+        p = body.patches
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 3] - p[:, 0])
         level = np.abs(normal[:, 1]) > 0.9 * np.linalg.norm(normal, axis=1)
         assert level.any() and (sign * normal[level, 1] > 0).all()
-        at += 2 + 2 * count
-    assert data[at].startswith("loadcase")
 
 
 def test_bodies_are_where_they_touch(model, grown):
+    whole = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0], symmetry="full")
+    with pytest.raises(InputError, match="quarter"):
+        bending_deck(whole, LAW, MarcSettings(), np.zeros_like(whole.mesh.points))
+    touch = may_touch(model)
+    assert len(touch["collar"]) and len(touch["supports"])
+    assert not np.intersect1d(touch["collar"], touch["supports"]).size
+    assert (model.mesh.points[touch["collar"], 2] < 133).all()
     support, collar = contact_bodies(model, grown)
     # Corners of a polygon of the circle's area are a little outside of the circle.
     crown = 1.05 * np.hypot(*model.mesh.points[:, :2].T).max()
@@ -121,22 +101,6 @@ def test_bodies_are_where_they_touch(model, grown):
     # Its mouth is rounded; corners of flat faces lie outside the ring, here by 0.034 mm.
     top = points[points[:, 2] < 60, 1].max()
     assert crown + ABOVE < top < crown + ABOVE + 0.05
-
-
-def test_a_whole_cylinder_is_refused(grown):
-    whole = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0], symmetry="full")
-    with pytest.raises(InputError, match="quarter"):
-        bending_deck(whole, LAW, MarcSettings(), np.zeros_like(whole.mesh.points))
-
-
-def test_seam_and_caps_have_their_own(model):
-    deck = inflation_deck(model, LAW, MarcSettings())
-    (data,) = blocks_of(deck, "geometry")
-    thickness = {data[4 * i + 4]: reals(data[4 * i + 3])[0] for i in range(2)}
-    assert sorted(thickness.values()) == pytest.approx([0.81, 2.43])
-
-
-# Results
 
 
 def frames_of(model, grown, name="Contact Normal Force", last=3):
@@ -218,28 +182,15 @@ def test_a_collapse_is_reported_up_to_there(marc, model, grown):
     assert any("time step could not get smaller" in words for words in history.remarks)
 
 
-def test_a_collapse_before_bending_is_a_failure(marc, model, grown):
-    frames, _ = frames_of(model, grown, last=0)
-    with pytest.raises(SolverFailure, match="time step could not get smaller") as found:
-        marc(frames, 3015).run(model, LAW)
-    assert found.value.exit_number == 3015
-
-
-def test_a_frame_that_is_missing_is_a_failure(marc, model, grown):
-    frames, _ = frames_of(model, grown)
-    del frames[-2]
-    with pytest.raises(SolverFailure, match="holds 3 of 4 frames"):
-        marc(frames).run(model, LAW)
-
-
-def test_without_forces_it_says_what_to_ask_for(marc, model, grown):
-    frames, _ = frames_of(model, grown, "Something Else")
-    with pytest.raises(SolverFailure, match="Reaction Force"):
-        marc(frames).run(model, LAW)
-
-
-def test_what_may_touch_is_apart(model):
-    touch = may_touch(model)
-    assert len(touch["collar"]) and len(touch["supports"])
-    assert not np.intersect1d(touch["collar"], touch["supports"]).size
-    assert (model.mesh.points[touch["collar"], 2] < 133).all()
+@pytest.mark.parametrize("what", ["collapse", "missing", "forces"])
+def test_results_that_are_not_whole_are_failures(marc, model, grown, what):
+    name = "Something Else" if what == "forces" else "Contact Normal Force"
+    frames, _ = frames_of(model, grown, name, last=0 if what == "collapse" else 3)
+    if what == "missing":
+        del frames[-2]
+    number = 3015 if what == "collapse" else 3004
+    said = {"collapse": "time step could not get smaller", "missing": "holds 3 of 4 frames",
+            "forces": "Reaction Force"}  # fmt: skip
+    with pytest.raises(SolverFailure, match=said[what]) as found:
+        marc(frames, number).run(model, LAW)
+    assert found.value.exit_number == number

@@ -1,6 +1,7 @@
 """Every way in which the stand-in fails as Marc fails, and what the user is told of it."""
 
 import os
+import re
 
 import numpy as np
 import pytest
@@ -30,22 +31,21 @@ def failure(marc, fault, timeout=None, **settings):
 @pytest.mark.parametrize(
     ("fault", "number", "words"),
     [
-        ("3015", 3015, ["the time step could not get smaller", "after increment 2"]),
-        ("code0", 3015, ["the time step could not get smaller"]),
-        ("licence", None, ["no licence: ", "license server is down"]),
-        ("killed", None, ["killed by SIGKILL"]),
-        ("truncated", 3004, ["no usable results", "truncated"]),
-        ("inside out", 3004, ["an element was turned inside out", "(element 1)"]),
-        ("early", 3004, ["ended at time 2 of 4"]),
-        ("disk full", None, ["disk full after increment 2: ", "No space left on device"]),
-        ("silent", None, ["wrote no job.sts", "is this Marc?"]),
+        ("3015", 3015, "the time step could not get smaller.*after increment 2"),
+        ("code0", 3015, "the time step could not get smaller"),
+        ("licence", None, "no licence: .*license server is down"),
+        ("killed", None, "killed by SIGKILL"),
+        ("truncated", 3004, "no usable results.*truncated"),
+        ("inside out", 3004, r"an element was turned inside out.*\(element 1\)"),
+        ("early", 3004, "ended at time 2 of 4"),
+        ("disk full", None, "disk full after increment 2: .*No space left on device"),
+        ("silent", None, r"wrote no job\.sts"),
+        ("not compiled", 3, "compile or link"),
     ],
 )
 def test_a_failure_says_what_happened(marc, fault, number, words):
-    error = failure(marc, fault)
-    assert error.exit_number == number
-    for word in words:
-        assert word in error.reason
+    error = failure(marc, fault, **({"law": "hypela2"} if fault == "not compiled" else {}))
+    assert error.exit_number == number and re.search(words, error.reason)
     if number == 3015:
         assert error.log_tail == "*** error - unable to reduce time step below minimum"
 
@@ -54,24 +54,16 @@ def test_the_input_error_of_a_spoiled_deck_is_told(marc, tmp_path):
     block = tmp_path / "nlelast.dat"
     block.write_text("nlelast\n\n         1         2         0         0         0fabric\n")
     error = failure(marc, "none", include={"nlelast": str(block)})
-    assert error.exit_number == 13 and "did not end well" in error.reason
-    assert error.log_tail.startswith("*** error - ") and "of the input" in error.log_tail
+    assert error.exit_number == 13 and error.log_tail.startswith("*** error - ")
     lines = (error.scratch / "job.dat").read_text().splitlines()
     number = int(error.log_tail.split("in line ")[1].split()[0])
     assert "nlelast" in lines[number - 8 : number]  # the block that the site gave
 
 
-def test_a_subroutine_that_does_not_compile(marc):
-    error = failure(marc, "not compiled", law="hypela2")
-    assert error.exit_number == 3 and "compile or link" in error.reason
-
-
 def test_a_law_that_finds_no_equilibrium_ends_with_3015(marc):
-    marc.told("none")
-    soft = HypoelasticLaw.linear(800.0, 400.0, 1e-3)
     high = BubbleModel(MODEL.mesh, 0.81, (0.01, 20.0))
     with pytest.raises(SolverFailure) as found:
-        marc.solver().run(high, soft)
+        marc.solver().run(high, HypoelasticLaw.linear(800.0, 400.0, 1e-3))
     assert found.value.exit_number == 3015
 
 
@@ -82,13 +74,6 @@ def test_neither_return_code_nor_repeated_increments_spoil_a_good_run(marc):
         found = marc.solver().run(MODEL, LAW)
         np.testing.assert_allclose(found.displacement, expected.displacement, rtol=1e-5, atol=1e-9)
         assert any("repeated" in words for words in found.remarks) == (fault == "repeated")
-
-
-def test_a_licence_is_waited_for(marc):
-    marc.told("licence@1,2")
-    marc.solver(licence_wait=60.0, licence_retry=0.1).run(MODEL, LAW)
-    assert marc.runs == ["job licence", "job licence", "job none"]
-    assert not list((marc.folder / "scratch").iterdir())
 
 
 def test_a_job_that_hangs_is_ended_with_its_children(marc):
@@ -114,13 +99,3 @@ def test_files_of_an_earlier_job_are_not_its_results(marc):
         os.rename(kept / name, marc.folder / "stale" / name)
     error = failure(marc, "stale")
     assert error.exit_number is None and "no licence" in error.reason
-
-
-def test_a_scratch_folder_with_old_files_in_it_is_not_read(marc, tmp_path):
-    marc.told("none")
-    marc.solver(keep=True).run(MODEL, LAW)
-    (kept,) = (marc.folder / "scratch").iterdir()
-    marc.told("licence")
-    with pytest.raises(SolverFailure, match="no licence") as found:
-        marc.solver().run(MODEL, LAW, scratch=kept)
-    assert found.value.scratch != kept
