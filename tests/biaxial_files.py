@@ -1,7 +1,5 @@
 """Files of biaxial tests, computed with a law: cycles of each ratio, loaded and unloaded."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,13 +23,7 @@ def cycle(lowest: float = 2.0, highest: float = 30.0, rows: int = 30) -> np.ndar
     return np.concatenate([np.linspace(lowest, highest, rows), down])
 
 
-def rows_of(
-    law: HypoelasticLaw,
-    ratios: Sequence[str] = FIVE,
-    cycles: int = 1,
-    kept: float = 0.0,
-    **options: float,
-) -> list[tuple[str, float, float, float, float]]:
+def rows_of(law, ratios=FIVE, cycles=1, kept=0.0, **options):
     """Ratio, loads (kN/m), strains (%) row by row; kept : % of strain that every cycle leaves."""
     rows, count = [], 0
     for ratio in ratios:
@@ -50,9 +42,7 @@ def write_rows(path: Path, rows: Sequence[Sequence[object]], head: str = HEAD) -
     return path
 
 
-def biaxial_project(
-    folder: Path, test: str = "", form: str = "cubic", file: str = "test.csv"
-) -> Path:
+def biaxial_project(folder: Path, test="", form="cubic", file="test.csv") -> Path:
     """A project with one biaxial test of the file `test.csv`; test : lines of its section."""
     path = folder / "project.toml"
     path.write_text(

@@ -43,7 +43,7 @@ def caught(patch, module, *names):
     """
     calls = []
     for name in names:
-        patch.setattr(module, name, lambda *args, **_: args)
+        patch.setattr(f"{module.__name__}.{name}", lambda *args, **_: args)
     patch.setattr(module, "save", lambda path, args: calls.append((path, *args)))
     return calls
 

@@ -7,8 +7,7 @@ from pydantic import BaseModel
 from ...materials.law import HypoelasticLaw
 from ..kinds import Kind, MakeSolver, Predicted, Studied
 from .prepared import PreparedBiaxial, candidates
-from .section import BiaxialSection
-from .test import BiaxialTest, read
+from .test import BiaxialSection, BiaxialTest, read
 
 
 class Biaxial:

@@ -1,7 +1,6 @@
 """Data of biaxial tests: files with loads per width and strains along both yarns, their cycles.
 
-A cycle begins where the larger of the two loads turns from falling to rising and ends where it
-does so again. Turns that are small beside the range of the loads are noise or a hold.
+A cycle begins where the larger load turns from falling to rising. Small turns are noise or a hold.
 """
 
 from __future__ import annotations
@@ -18,14 +17,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...materials.designers import RATIOS, shares
+from ...readers import machine_tables as machine
 from ...readers.frames import FrameSource
-from ...readers.machine_tables import (
-    TableOptions,
-    column_of,
-    measured,
-    read_machine_table,
-    source_of,
-)
 from ...readers.tables import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 
 Array = NDArray[np.float64]
@@ -54,13 +47,9 @@ def nearest_ratio(loads: Sequence[float]) -> str:
     """
     warp, fill = (max(x, 0.0) for x in loads)
     own = math.degrees(math.atan2(fill, warp))
-
-    def off(name: str) -> float:
-        a, b = shares(name)
-        return abs(math.degrees(math.atan2(b, a)) - own)
-
-    best = min(KNOWN, key=off)
-    if off(best) <= NEAR or not max(warp, fill) > 0:
+    angles = {name: math.degrees(math.atan2(*shares(name)[::-1])) for name in KNOWN}
+    best = min(KNOWN, key=lambda name: abs(angles[name] - own))
+    if abs(angles[best] - own) <= NEAR or not max(warp, fill) > 0:
         return best
     larger = max(warp, fill)
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
@@ -68,18 +57,13 @@ def nearest_ratio(loads: Sequence[float]) -> str:
 
 LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
-
 #: What a table has to hold, and by which key of a project its column is named.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 
 @dataclass(frozen=True, eq=False)
 class BiaxialTable:
-    """The rows (n,) of a file in their order.
-
-    load : (n, 2) N/mm (kN/m) along warp and fill. strain : (n, 2) change of length over the first
-    length. ratio : (n,) names, None where the file has none. lines : (n,) in the file.
-    """
+    """The rows of a file: loads (n, 2) N/mm and strains (n, 2) along warp and fill, (n,) ratios."""
 
     path: Path
     load: Array
@@ -101,8 +85,8 @@ def read_biaxial_table(
 ) -> BiaxialTable:
     """Read a table; names, units, separator and decimal mark are found as for load curves.
 
-    columns : the file's own names of `warp_load`, `fill_load`, `warp_strain`, `fill_strain` and
-    `ratio`. load_unit, strain_unit : where the file names none.
+    columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
+    file names none.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
@@ -111,18 +95,18 @@ def read_biaxial_table(
         raise InputError(None, "columns", problem)
     asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
     wanted = tuple(QUANTITIES.values())
-    options = TableOptions(asked, wanted, comment, decimal)
-    found = read_machine_table(path, options, format)
-    column = {name: column_of(found, name, asked, wanted) for name in (*wanted, "ratio")}
+    options = machine.TableOptions(asked, wanted, comment, decimal)
+    found = machine.read_machine_table(path, options, format)
+    column = {name: machine.column_of(found, name, asked, wanted) for name in (*wanted, "ratio")}
     load, strain = (
-        np.column_stack([measured(found, column[f"{yarn} {kind}"], kind, units, unit)
+        np.column_stack([machine.measured(found, column[f"{yarn} {kind}"], kind, units, unit)
                          for yarn in ("warp", "fill")])
         for kind, units, unit in (
             ("load", WIDTH_LOAD_UNITS, load_unit), ("strain", STRAIN_UNITS, strain_unit),
         )
     )  # fmt: skip
     units_asked = {name: load_unit if name.endswith("load") else strain_unit for name in wanted}
-    source = source_of(found, column, units_asked, format, found.notes)
+    source = machine.source_of(found, column, units_asked, format, found.notes)
     ratio = None
     if column["ratio"]:
         cells, lines = found.table.text(column["ratio"]), found.table.lines
@@ -146,10 +130,9 @@ HOLD = 0.01
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle, by rows of the test; numbers are from 1.
+    """One cycle, `number` (from 1) of a phase of consecutive ones of its ratio, `count` of all.
 
-    phase : of consecutive cycles of one ratio. number : within its phase. count : in the whole
-    test. first, last : rows where the loading begins and is highest.
+    first, last : rows where the loading begins and is highest.
     """
 
     ratio: str
@@ -159,39 +142,26 @@ class Cycle:
     first: int
     last: int
 
-    @property
-    def rows(self) -> slice:
-        """Return the rows of the loading."""
-        return slice(self.first, self.last + 1)
-
 
 def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]:
-    """Return the cycles in their order.
-
-    load : (n, 2) along warp and fill. labels : (n,) the ratio of each row; else by the loads at the
-    top.
-    """
+    """Return the cycles in loads (n, 2) along warp and fill; their ratio by (n,) labels or tops."""
     larger = np.asarray(load).max(axis=1)
+    known: Sequence[str | None] = [None] * len(larger) if labels is None else list(labels)
+    turns = [i for i in range(1, len(known)) if known[i] != known[i - 1]]
     cycles: list[Cycle] = []
-    for label, start, stop in _stretches(len(larger), labels):
+    for start, stop in pairwise([0, *turns, len(larger)]):
+        label = known[start] if stop > start else None
         for first, last in _loadings(larger[start:stop]):
             # A prestress has no ratio of its own: what is below it does not count.
             own = np.asarray(load[start + first])
             ratio = label or nearest_ratio(load[start + last] - np.minimum(own, own.min()))
             phase, number = 1, 1
             if cycles:
-                same = cycles[-1].ratio == ratio
-                phase = cycles[-1].phase + (0 if same else 1)
-                number = cycles[-1].number + 1 if same else 1
+                old = cycles[-1]
+                same = old.phase, old.number + 1
+                phase, number = same if old.ratio == ratio else (old.phase + 1, 1)
             cycles.append(Cycle(ratio, phase, number, len(cycles) + 1, start + first, start + last))
     return cycles
-
-
-def _stretches(count: int, labels: Sequence[str] | None) -> list[tuple[str | None, int, int]]:
-    if labels is None:
-        return [(None, 0, count)]
-    turns = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
-    return [(labels[a], a, b) for a, b in pairwise([0, *turns, count])]
 
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
@@ -231,11 +201,7 @@ Which = int | Literal["last"]
 
 @dataclass(frozen=True, eq=False)
 class BiaxialPath:
-    """The loading of one cycle.
-
-    load : (n, 2) N/mm along warp and fill. strain : (n, 2) since the beginning of the file. cycles
-    : number in the phase.
-    """
+    """The loading (n, 2) N/mm, strains since the file's beginning, of one cycle of `cycles`."""
 
     table: BiaxialTable
     cycle: Cycle
@@ -307,8 +273,8 @@ def evaluated_paths(
 ) -> list[BiaxialPath]:
     """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
 
-    Of a ratio that comes several times, the first phase after the conditioning (cycles at the
-    beginning of each file) counts. ratios : those wanted; all unless given.
+    Of a ratio that comes several times, the first phase after the conditioning counts. conditioning
+    : cycles at the beginning of each file. ratios : those wanted; all unless given.
     """
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):
@@ -323,10 +289,9 @@ def evaluated_paths(
                 problem = f"ratio {ratio} has {len(same)} cycles, number {which} is asked for"
                 raise InputError(table.path, "", problem)
             chosen = same[-1] if which == "last" else same[which - 1]
-            rows = chosen.rows
-            found[ratio] = BiaxialPath(
-                table, chosen, len(same), table.load[rows], table.strain[rows]
-            )
+            rows = slice(chosen.first, chosen.last + 1)
+            load, strain = table.load[rows], table.strain[rows]
+            found[ratio] = BiaxialPath(table, chosen, len(same), load, strain)
     missing = [ratio for ratio in ratios or () if ratio not in found]
     if missing or not found:
         there = ", ".join(dict.fromkeys(c.ratio for own in cycles for c in own))

@@ -1,13 +1,11 @@
 """The linear evaluation of a biaxial test: designers' constants, their dependence on options.
 
-Residual strain, for which a cutting pattern is compensated, is the strain at the beginning of a
-loading, or after the last one, less that of the file's first row, where the test was under its
-prestress. It is known only where both loads are the same as there.
+Residual strain, for which a cutting pattern is compensated, is the strain before a loading, or
+after the last one, less that of the first row, under the prestress: known at the same loads only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -18,19 +16,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, Note, rows
 from ...inference.assessment import UNCERTAIN
-from ...materials.designers import (
-    POINTS,
-    USUAL,
-    Evaluation,
-    LinearPath,
-    Options,
-    evaluate,
-    evaluate_or_none,
-    evaluate_others,
-    line_of,
-    row_of,
-    spread_of,
-)
+from ...materials import designers
+from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
 from ..kinds import UNMATCHED, UNSTABLE
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
@@ -43,10 +30,9 @@ BACK = 0.01
 
 @dataclass(frozen=True, eq=False)
 class KeptStrain:
-    """Residual strains of one phase of cycles, (2,) along warp and fill, as shares.
+    """Residual strains (2,) before the first loading of a phase and after its last.
 
-    before, after : at the beginning of its first loading, and when the loads are back after its
-    last; None where they are not those of the first row, load (2,) kN/m.
+    None where the loads are not those of the first row, load (2,) kN/m.
     """
 
     file: str
@@ -87,10 +73,9 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "n
 
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
-    """Elastic constants of one test.
+    """Elastic constants of one test, by the options chosen and by others that the paths settle.
 
-    lines : regression lines of the paths. others : of other options that the paths settle. first,
-    last : with the first and the last cycle of each ratio, None where they do not settle it.
+    first, last : with the first and the last cycle of each ratio, None where these settle none.
     """
 
     test: str
@@ -126,39 +111,26 @@ class BiaxialEvaluation:
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
         """Return the least and largest of each constant over all options."""
-        ends = spread_of((self.chosen, *self.others))
+        ends = designers.spread_of((self.chosen, *self.others))
         return {NAMES[name]: pair for name, pair in ends.items()}
 
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
     """Return the constants of a test by some options, beside those of all others."""
     paths = test.data.paths
-    lines = linear_paths(paths)
+    lines = tuple(line_of(path.ratio, path.load, path.since) for path in paths)
     there = [line.ratio for line in lines]
     missing = [ratio for ratio in options.ratios if ratio not in there]
     if missing:
         problem = f"there is no ratio {', '.join(missing)}; the test has: {', '.join(there)}"
         raise test.place.error("ratios", problem)
     try:
-        chosen = evaluate(lines, options)
+        chosen = designers.evaluate(lines, options)
     except InputError as error:
         raise test.place.error("data", error.problem) from None
-    others = evaluate_others(lines, options)
-    return BiaxialEvaluation(
-        test.name,
-        paths,
-        lines,
-        chosen,
-        tuple(others),
-        _of_cycle(test, 1, options),
-        _of_cycle(test, "last", options),
-        kept_strains(test.data),
-    )
-
-
-def linear_paths(paths: Sequence[BiaxialPath]) -> tuple[LinearPath, ...]:
-    """Return the regression lines of paths."""
-    return tuple(line_of(path.ratio, path.load, path.since) for path in paths)
+    others, kept = tuple(designers.evaluate_others(lines, options)), kept_strains(test.data)
+    ends = _of_cycle(test, 1, options), _of_cycle(test, "last", options)
+    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, kept)
 
 
 def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
@@ -171,10 +143,10 @@ def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation |
             paths = [path.between(*section.range) for path in paths]
         except InputError:
             return None
-    return evaluate_or_none(linear_paths(paths), options)
+    lines = [line_of(path.ratio, path.load, path.since) for path in paths]
+    return designers.evaluate_or_none(lines, options)
 
 
-#: nu_warp and nu_fill in words.
 CONVENTION = (
     "nu_warp: contraction of the warp per strain of the fill when the fill is pulled (nu_xy beside "
     "E_x, x the warp); nu_fill: of the fill when the warp is pulled"
@@ -183,22 +155,18 @@ CONVENTION = (
 
 def in_words(options: Options) -> str:
     """Return a description of what was evaluated."""
-    of = "loads" if options.minimise == "load" else "strains"
     unloaded = "with" if options.unloaded else "without"
     reciprocal = "reciprocal" if options.reciprocal else "free"
     ratios = f", {' and '.join(options.ratios)} only" if options.ratios else ""
-    return f"least squares of {of}, {reciprocal}, {unloaded} unloaded yarns{ratios}"
+    return f"least squares of {options.minimise}s, {reciprocal}, {unloaded} unloaded yarns{ratios}"
 
 
 def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """Return a table of constants of both forms and squares of strain, by options.
-
-    Columns E in kN/m, A (direct form) in kN/m, squares in %^2 at `POINTS` points a path.
-    """
+    """Return constants E and A (direct form) in kN/m and squares of strain in %^2, by options."""
     named = [("chosen", found.chosen), *(("", one) for one in found.others)]
-    named += [(f"{which} cycle", one) for which, one in (("first", found.first),
-              ("last", found.last)) if one is not None]  # fmt: skip
-    return pd.DataFrame([{"what": what, **row_of(one)} for what, one in named])
+    ends = {"first cycle": found.first, "last cycle": found.last}
+    named += [(which, one) for which, one in ends.items() if one is not None]
+    return pd.DataFrame([{"what": what, **designers.row_of(one)} for what, one in named])
 
 
 def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
@@ -236,6 +204,11 @@ def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
     return pd.DataFrame(table)
 
 
+def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
+    """Return all tables by name."""
+    return {"constants": option_table(found), "lines": line_table(found), "kept": kept_table(found)}
+
+
 def lines_of(found: BiaxialEvaluation) -> list[str]:
     """Return the results as lines for the terminal."""
     c = found.chosen.constants
@@ -261,34 +234,31 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
             f"  first cycles: E warp {one.warp:.4g}, E fill {one.fill:.4g} kN/m; last cycles: "
             f"{two.warp:.4g}, {two.fill:.4g} kN/m"
         )
-    for kept in reversed(found.kept):
-        if kept.after is not None:
-            warp, fill = PERCENT * kept.after
-            said.append(
-                f"  strain kept after {kept.ratio}, the last that comes back to the loads of the "
-                f"beginning ({kept.load[0]:.3g} and {kept.load[1]:.3g} kN/m): warp {warp:.3g} %, "
-                f"fill {fill:.3g} %"
-            )
-            break
+    last = next((kept for kept in reversed(found.kept) if kept.after is not None), None)
+    if last is not None and last.after is not None:
+        warp, fill = PERCENT * last.after
+        said.append(
+            f"  strain kept after {last.ratio}, the last that comes back to the loads of the "
+            f"beginning ({last.load[0]:.3g} and {last.load[1]:.3g} kN/m): warp {warp:.3g} %, "
+            f"fill {fill:.3g} %"
+        )
     return said
 
 
 def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
     """Return the results for result.json."""
-
-    def plain(table: pd.DataFrame) -> list[dict[str, Any]]:
-        return [
+    plain = {
+        name: [
             {str(k): None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()}
             for row in table.to_dict("records")
         ]
-
+        for name, table in tables_of(found).items()
+    }
     return {
         "options": in_words(found.chosen.options),
         "convention": CONVENTION,
         "points_a_path": POINTS,
-        "constants": plain(option_table(found)),
-        "lines": plain(line_table(found)),
-        "kept": plain(kept_table(found)),
+        **plain,
         "spread": {name: list(ends) for name, ends in found.spread.items()},
         "notes": rows(found.notes),
     }

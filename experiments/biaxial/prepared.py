@@ -1,9 +1,9 @@
-"""Biaxial tests in a fit: residuals, comparisons, and tests that could be made next."""
+"""Biaxial tests in a fit: residuals, comparisons, doubts, and tests that could be made next."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,48 +19,42 @@ from ...materials.responses import biaxial_response, largest_load
 from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
 from ...solvers.base import History
-from ..kinds import (
-    Candidate,
-    DataFile,
-    Doubt,
-    Expected,
-    FittedTest,
-    MakeSolver,
-    Masks,
-    Planning,
-    Precision,
-    Reach,
-    Weighting,
-)
-from .data import BiaxialPath, BiaxialTable, Cycle
-from .doubts import doubts_of_biaxial
-from .section import BiaxialSection, TablesSection
-from .test import BiaxialData, BiaxialTest, reach_of
+from .. import kinds
+from ..kinds import Doubt, Expected, FittedTest, MakeSolver, Masks, Planning, Weighting
+from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
+from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
 
 Array = NDArray[np.float64]
-
 #: Of one measured strain: what an extensometer or a camera on a cruciform is good for.
 EXTENSOMETER = 1e-4
 PERCENT = 100.0
+#: Strains at the end of a path: no coated fabric ends below or above.
+LEAST_END, MOST_END = 5e-4, 0.5
+#: kN/m: a cruciform of a coated fabric is loaded by more, and by less.
+LEAST_LOAD, MOST_LOAD = 0.05, 500.0
+#: Degrees between the loads' direction and that of the ratio they are said to have.
+OFF = 6.0
+#: How much stiffer than the warp the fill must be to be taken for it.
+STIFFER = 1.15
+#: Beside the five of designers' constants.
+FURTHER = ("1:5", "5:1")
+#: Loads of a path; values of a strain's curve that are taken to be independent where the project
+#: has no biaxial test: an extensometer drifts, and errs alike along much of it.
+LOADS, INDEPENDENT = 20, 5
+#: Of the load at which a strain is at its end: where a path begins.
+PRESTRESS = 0.05
 
 
 class StrainObjective:
     """Residuals (model - measured) / (scale sqrt(n)) of n strains along warp, then fill.
 
-    Strains count from the first load of the path. load, strain : (n, 2) N/mm and shares. scale :
-    strain that counts as one. noise : of one measured strain; None: `EXTENSOMETER`.
+    Strains count from the first load of the path, (n, 2). scale : strain that counts as one.
     """
 
-    #: What the residuals are in after `scale`.
     unit = "%"
 
     def __init__(
-        self,
-        load: ArrayLike,
-        strain: ArrayLike,
-        scale: float = 1.0,
-        weight: float = 1.0,
-        noise: float | None = None,
+        self, load: ArrayLike, strain: ArrayLike, scale: float, weight: float, noise: float | None
     ) -> None:
         self.load, self.strain = np.asarray(load, float), np.asarray(strain, float)
         if len(self.strain) < 2:
@@ -163,14 +157,13 @@ class PreparedBiaxial:
         ratios = {p.ratio: {**whole, self.part(p.ratio): ~whole[self.part(p.ratio)]} for p in paths}
         return {"ratios": ratios} if len(paths) > 1 else {}
 
-    def reach(self, masks: Masks) -> Reach:
+    def reach(self, masks: Masks) -> kinds.Reach:
         """Return the reach of the ratios that masks leave."""
         return reach_of(self.kept(masks))
 
     def kept(self, masks: Masks | None) -> tuple[BiaxialPath, ...]:
         """Return the ratios that masks leave, which are matched whole."""
-        known = masks or {}
-        paths = self.test.data.paths
+        known, paths = masks or {}, self.test.data.paths
         return tuple(p for p in paths if known.get(self.part(p.ratio), np.True_).any())
 
     def part(self, ratio: str) -> str:
@@ -209,41 +202,57 @@ class PreparedBiaxial:
             found.append(FittedPath(path, comparison.objective, history))
         return tuple(found)
 
-    def data_files(self) -> Sequence[DataFile]:
+    def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files, with the number of rows on matched paths."""
         used = {id(table): 0 for table in self.test.data.tables}
         for path in self.test.data.paths:
             used[id(path.table)] += len(path.load)
-        return [
-            DataFile(
-                table.path, table.source, used[id(table)],
-                {"not of an evaluated loading": len(table.load) - used[id(table)]},
-            )
-            for table in self.test.data.tables
-        ]  # fmt: skip
+        files = []
+        for table in self.test.data.tables:
+            rows = used[id(table)]
+            dropped = {"not of an evaluated loading": len(table.load) - rows}
+            files.append(kinds.DataFile(table.path, table.source, rows, dropped))
+        return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the paths."""
-        return doubts_of_biaxial(self.test, expected)
+        paths = self.test.data.paths
+        found = [doubt for path in paths for doubt in _of_path(path)]
+        for path in paths if expected.moduli else ():
+            yarn = int(np.argmax(path.load[-1] - path.load[0]))
+            strain = float(path.since[-1, yarn])
+            if not strain > 0:
+                continue
+            load = float(path.load[-1, yarn] - path.load[0, yarn])
+            far = expected.outside(load / strain / self.test.place.fabric.thickness, ["E1", "E2"])
+            if far:
+                text = (
+                    f"ratio {path.ratio}: load over strain and thickness is about {far}: are loads "
+                    "and strains in the units that are said, and is the thickness right?"
+                )
+                found.append(Doubt("modulus", True, text))
+                break
+        ends = {path.ratio: path.since[-1] for path in paths}
+        for ratio, other in (("2:1", "1:2"), ("1:0", "0:1")):
+            if ratio not in ends or other not in ends:
+                continue
+            one, two = ends[ratio], ends[other]
+            if one[1] > STIFFER * one[0] and two[0] > STIFFER * two[1]:
+                text = (
+                    f"in ratios {ratio} and {other} the yarn that is pulled less stretches more: "
+                    "the strains of warp and fill seem to be swapped"
+                )
+                return [*found, Doubt("swapped", True, text)]
+        return found
 
 
-#: Beside the five of designers' constants.
-FURTHER = ("1:5", "5:1")
-#: Loads of a path; values of a strain's curve that are taken to be independent where the project
-#: has no biaxial test: an extensometer drifts, and errs alike along much of it.
-LOADS, INDEPENDENT = 20, 5
-#: Of the load at which a strain is at its end: where a path begins.
-PRESTRESS = 0.05
-
-
-def candidates(planning: Planning) -> Sequence[Candidate]:
+def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     """Return each ratio by itself, up to the strains that the law is known for."""
     own = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
     noise_is = "assumed" if not own else f"that of {own[0].test.name}"
-    if planning.noise is not None:
-        noise_is = "given"
+    noise_is = noise_is if planning.noise is None else "given"
     return [
-        Candidate(f"biaxial {ratio}", partial(_made, ratio, own, planning), noise_is)
+        kinds.Candidate(f"biaxial {ratio}", partial(_made, ratio, own, planning), noise_is)
         for ratio in (*RATIOS, *FURTHER)
     ]
 
@@ -261,14 +270,9 @@ def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> Pre
     )
     path = BiaxialPath(table, Cycle(ratio, 1, 1, 1, 0, LOADS - 1), 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))
-    test = BiaxialTest(
-        name=f"biaxial {ratio}",
-        place=planning.place,
-        weight=1.0,
-        data=BiaxialData((table,), (), (path,)),
-        section=section,
-        noise=_noise(own, planning) / PERCENT,
-    )
+    data, noise = BiaxialData((table,), (), (path,)), _noise(own, planning) / PERCENT
+    name, place = f"biaxial {ratio}", planning.place
+    test = BiaxialTest(name=name, place=place, weight=1.0, data=data, section=section, noise=noise)
     return PreparedBiaxial(test)
 
 
@@ -278,5 +282,31 @@ def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
         return planning.noise
     known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.data.paths]
     if not known:
-        return Precision(PERCENT * EXTENSOMETER, 1.0, INDEPENDENT).at(LOADS - 1)
+        return kinds.Precision(PERCENT * EXTENSOMETER, 1.0, INDEPENDENT).at(LOADS - 1)
     return max(one.at(LOADS - 1) for one in known)
+
+
+def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
+    """Yield doubts about the units of one path, and about its ratio."""
+    end, load = float(np.abs(path.since).max()), float(path.load.max())
+    if not LEAST_END < end < MOST_END:
+        text = (
+            f"ratio {path.ratio}: the strain changes by {100 * end:.3g} % along the path: are the "
+            "strains in the unit that is said?"
+        )
+        yield Doubt("strain-unit", True, text)
+    if not LEAST_LOAD < load < MOST_LOAD:
+        text = (
+            f"ratio {path.ratio}: the loads go up to {load:.3g} kN/m: are they per width, and in "
+            "the unit that is said?"
+        )
+        yield Doubt("load-unit", True, text)
+    warp, fill = (path.load[-1] - path.load[0]).tolist()
+    said = np.degrees(np.arctan2(*shares(path.ratio)[::-1]))
+    if abs(np.degrees(np.arctan2(fill, warp)) - said) > OFF:
+        seen = nearest_ratio([warp, fill])
+        text = (
+            f"ratio {path.ratio}: the loads change by {warp:.4g} and {fill:.4g} kN/m along warp "
+            f"and fill, which is {seen}: are the columns of warp and fill right?"
+        )
+        yield Doubt("ratio", seen == ":".join(path.ratio.split(":")[::-1]), text)

@@ -18,19 +18,10 @@ from ...meshes.strip_models import elongations
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
-from ..kinds import (
-    READING,
-    STRAINS,
-    UNMATCHED,
-    CardRun,
-    Findings,
-    FittedTest,
-    Output,
-    Simulation,
-    strains_of,
-)
+from .. import kinds
+from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from .data import BiaxialPath
-from .evaluation import BiaxialEvaluation, kept_table, line_table, option_table
+from .evaluation import BiaxialEvaluation, tables_of
 from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
@@ -79,18 +70,14 @@ def _warnings(test: BiaxialTest) -> list[Note]:
         f"{test.name} pulls along the yarns only: it says nothing of G12, which rests on other "
         "tests or stays where its fit began"
     )
-    notes = [Note(UNMATCHED, words)]
+    notes = [Note(kinds.UNMATCHED, words)]
     said = dict.fromkeys(note for table in test.data.tables for note in table.source.notes)
-    return notes + [Note(READING, words) for words in said]
+    return notes + [Note(kinds.READING, words) for words in said]
 
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """One card along one measured path.
-
-    larger, strain : (n,) kN/m, (n, 2) % of the loads shown. rms : (2,) % or None. reached : (3,)
-    strains.
-    """
+    """One card along one path: (n,) kN/m, (n, 2) % of the loads shown, (2,) %, (3,) strains."""
 
     path: BiaxialPath
     larger: Array
@@ -110,10 +97,7 @@ def simulate(
     out: Output,
     within_range: bool = False,
 ) -> Simulation:
-    """Write paths.csv and paths.png, also of failed analyses.
-
-    within_range : show each path only up to the card's valid range.
-    """
+    """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
     found: Loadings = {
         (name, path.ratio): _loading(path, card, runs[name, path.ratio], within_range)
         for path in test.data.paths
@@ -133,11 +117,12 @@ def _loading(
     if isinstance(run.outcome, SolverFailure):
         return run.outcome
     own = elongations(run.outcome.displacement)
-    shown = _within(card, own) if within_range else len(own)
+    beyond = (np.log1p(own) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
+    shown = int(np.argmax(beyond)) if within_range and beyond.any() else len(own)
     strain = PERCENT * (own - own[0])[:shown]
     off = strain - PERCENT * path.since[:shown]
     warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist() if shown else (None, None)
-    return Loading(path, path.larger[:shown], strain, (warp, fill), strains_of(run.outcome))
+    return Loading(path, path.larger[:shown], strain, (warp, fill), kinds.strains_of(run.outcome))
 
 
 def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
@@ -148,7 +133,7 @@ def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
         "rms_warp_percent": one.rms[0],
         "rms_fill_percent": one.rms[1],
         "shown_to_kN_per_m": float(one.larger[-1]) if len(one.larger) else 0.0,
-        "strain_reached": dict(zip(STRAINS, one.reached.tolist(), strict=True)),
+        "strain_reached": dict(zip(kinds.STRAINS, one.reached.tolist(), strict=True)),
     }
 
 
@@ -189,12 +174,6 @@ def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
     save(out.path("paths.png"), biaxial_charts("ratios", panels))
 
 
-def _within(card: MaterialCard, elongation: Array) -> int:
-    """Return the number of loads within the card's valid range."""
-    beyond = (np.log1p(elongation) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
-    return int(np.argmax(beyond)) if beyond.any() else len(elongation)
-
-
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
     paths, numbers = prepared.fitted_paths(fitted), {}
@@ -222,27 +201,20 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
     paths = prepared.fitted_paths(fitted)
     with replacing(out.path("paths.csv")) as path:
         path_table(paths).to_csv(path, index=False, float_format="%.9g")
-    panels = [
-        BiaxialPanel(
-            p.path.ratio,
-            p.path.larger,
-            PERCENT * p.objective.strain,
-            (("model", p.path.larger, PERCENT * p.objective.modelled(p.history)),),
-        )
-        for p in paths
-    ]
+    panels = []
+    for p in paths:
+        curve = ("model", p.path.larger, PERCENT * p.objective.modelled(p.history))
+        strain = PERCENT * p.objective.strain
+        panels.append(BiaxialPanel(p.path.ratio, p.path.larger, strain, (curve,)))
     caption = "Strain over the larger load: measured and modelled"
     charts = biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
     save(out.path("paths.png"), charts)
-    return Exhibit(
-        facts=[("ratios matched", ", ".join(p.path.ratio for p in paths))],
-        tables=[misfit_table(paths)],
-        files=[
-            (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
-            (out.name("paths.png"), "picture of the ratios"),
-        ],
-        parts=[charts],
-    )
+    facts = [("ratios matched", ", ".join(p.path.ratio for p in paths))]
+    files = [
+        (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
+        (out.name("paths.png"), "picture of the ratios"),
+    ]
+    return Exhibit(facts=facts, tables=[misfit_table(paths)], files=files, parts=[charts])
 
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
@@ -272,39 +244,27 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     parts = []
     for p in prepared.fitted_paths(fitted):
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
+        columns = {"measured": measured, "modelled": modelled, "difference": modelled - measured}
         for k, yarn in enumerate(YARNS):
             table = _columns(p.path.load[1:], "load_kN_per_m")
             table.insert(0, "part", p.path.ratio)
-            parts.append(
-                table.assign(
-                    quantity=f"{yarn}_strain",
-                    measured=measured[1:, k],
-                    modelled=modelled[1:, k],
-                    difference=(modelled - measured)[1:, k],
-                    unit="%",
-                )
-            )
+            own = {name: values[1:, k] for name, values in columns.items()}
+            parts.append(table.assign(quantity=f"{yarn}_strain", **own, unit="%"))
     return pd.concat(parts, ignore_index=True)
 
 
 def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
     """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
     written = []
-    for name, table in (
-        ("constants.csv", option_table(found)),
-        ("lines.csv", line_table(found)),
-        ("kept.csv", kept_table(found)),
-    ):
-        with replacing(folder / (prefix + name)) as path:
+    for name, table in tables_of(found).items():
+        written.append(folder / f"{prefix}{name}.csv")
+        with replacing(written[-1]) as path:
             table.to_csv(path, index=False, float_format="%.9g")
-        written.append(folder / (prefix + name))
     panels = []
     for measured in found.paths:
         load = measured.load
         strain = PERCENT * found.chosen.constants.strain(load - load[0])
-        curves = (("constants", measured.larger, strain),)
-        panels.append(
-            BiaxialPanel(measured.ratio, measured.larger, PERCENT * measured.since, curves)
-        )
+        curves, seen = (("constants", measured.larger, strain),), PERCENT * measured.since
+        panels.append(BiaxialPanel(measured.ratio, measured.larger, seen, curves))
     written.append(save(folder / f"{prefix}constants.png", biaxial_charts("ratios", panels)))
     return written

@@ -5,25 +5,78 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
 from ...files import is_file
 from ...meshes.strip_models import PatchModel
-from ...readers.sections import beside
+from ...readers.sections import Name, Number, Positive, Section, beside
 from ..keys import named_format
 from ..kinds import Place, Reach, Refined
 from .data import (
     BiaxialPath,
     BiaxialTable,
     Cycle,
+    LoadUnit,
+    StrainUnit,
     cycles_of,
     evaluated_paths,
     plain_ratio,
     read_biaxial_table,
 )
-from .section import BiaxialSection, TablesSection
+
+FileNames = Annotated[list[str], Field(min_length=1)]
+ByRatio = Annotated[dict[str, FileNames], Field(min_length=1)]
+
+
+def _files(given: Any) -> Any:
+    # Either form is checked here and not as a union: complaints then name the key, not the form.
+    kind: Any = ByRatio if isinstance(given, dict) else FileNames
+    return TypeAdapter(kind).validate_python(given, strict=True)
+
+
+class ColumnsSection(Section):
+    """Section [biaxial.data.columns]: the files' own column names."""
+
+    warp_load: str | None = None
+    fill_load: str | None = None
+    warp_strain: str | None = None
+    fill_strain: str | None = None
+    ratio: str | None = None
+
+
+class TablesSection(Section):
+    """Section [biaxial.data]: the files, in any order, or those of each ratio."""
+
+    files: Annotated[list[str] | dict[str, list[str]], BeforeValidator(_files)]
+    folder: str = ""
+    format: str | None = None
+    columns: ColumnsSection = ColumnsSection()
+    load_unit: LoadUnit | None = None
+    strain_unit: StrainUnit | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str = "#"
+
+
+class BiaxialSection(Section):
+    """Section [[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
+
+    range : kN/m of the larger load. cycle : of each ratio. conditioning : cycles at the beginning
+    of each file that count for nothing. noise : of one measured strain, in %.
+    """
+
+    name: Name | None = None
+    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    ratios: Annotated[list[str], Field(min_length=1)] | None = None
+    range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    cycle: Literal["last"] | Annotated[int, Field(ge=1)] = "last"
+    conditioning: Annotated[int, Field(ge=0)] = 0
+    points: Annotated[int, Field(ge=2, le=10000)] = 50
+    noise: Positive | None = None
+    data: TablesSection
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +90,10 @@ class BiaxialData:
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
     """Read the data of a section; none where a file is missing and not needed."""
-    data = section.data
-    folder = place.data_folder
+    data, folder = section.data, place.data_folder
     if folder is None:
         folder = beside(place.path.parent, data.folder)
+    columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
     tables, named = [], []
     for path, field, ratio in _listed(place, data, folder):
         if not is_file(path):
@@ -50,7 +103,7 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
         tables.append(
             read_biaxial_table(
                 path,
-                columns={k: v for k, v in data.columns.model_dump().items() if v is not None},
+                columns=columns,
                 load_unit=data.load_unit,
                 strain_unit=data.strain_unit,
                 decimal=data.decimal,
@@ -98,10 +151,7 @@ LEAST_STRAIN = 1e-4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BiaxialTest:
-    """A cruciform loaded along warp and fill. Loads N/mm (kN/m), strains as shares.
-
-    `noise` of one measured strain, None where it is not given.
-    """
+    """A cruciform loaded along warp and fill: N/mm, strains as shares; noise of one strain."""
 
     name: str
     place: Place
@@ -124,10 +174,7 @@ class BiaxialTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
-        """Return a patch for each ratio, driven by the loads as they were measured.
-
-        There is nothing to refine: one point of the law, one increment a reading.
-        """
+        """Return a patch for each ratio, driven by the measured loads: nothing to refine."""
         thick = self.place.fabric.thickness if thickness is None else thickness
         return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}
 
@@ -148,11 +195,7 @@ def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
 def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
     """Read the section of a test, and its files."""
     noise = None if section.noise is None else 0.01 * section.noise
+    data = read_biaxial(place, section)
     return BiaxialTest(
-        name=name,
-        place=place,
-        weight=section.weight,
-        data=read_biaxial(place, section),
-        section=section,
-        noise=noise,
+        name=name, place=place, weight=section.weight, data=data, section=section, noise=noise
     )

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from ...materials.law import HypoelasticLaw
-from ..kinds import Candidate, MakeSolver, Place, Planning
-from .candidates import candidates
-from .prepared import PreparedBubble, prepare
+from .prepared import candidates, prepare
 from .section import BubbleSection
-from .test import STUDIED, BubbleTest, read
+from .test import STUDIED, read
 
 NAMES = (
     "length-unit", "zero-points", "repeated-frame", "z-flipped", "frame-order",
     "deformed-coordinates", "axis-flipped", "pressure-unit", "camera-frame", "off-centre", "tilted",
     "turned", "swapped",
 )  # fmt: skip
-
-
-__all__ = ["KIND", "BubbleKind"]
 
 
 class BubbleKind:
@@ -32,20 +24,9 @@ class BubbleKind:
     predicted = None
     studied = STUDIED
     doubts = NAMES
-
-    def read(self, section: BubbleSection, place: Place, name: str) -> BubbleTest:
-        """Return the test of a section; raises InputError."""
-        return read(section, place, name)
-
-    def prepare(
-        self, test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver
-    ) -> PreparedBubble:
-        """Read the measured fields, or compute those of the known solution."""
-        return prepare(test, law, make_solver)
-
-    def candidates(self, planning: Planning) -> Sequence[Candidate]:
-        """Return the same test again, to more pressure, with an elliptic rim."""
-        return candidates(planning)
+    read = staticmethod(read)
+    prepare = staticmethod(prepare)
+    candidates = staticmethod(candidates)
 
 
 KIND = BubbleKind()

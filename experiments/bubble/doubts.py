@@ -1,12 +1,11 @@
 """Doubts about the data of a bubble test: traps that measured fields may have fallen into.
 
-Each check looks at the measured fields (`View`) and returns doubts, none where all is well. A
-check of its own is one function in `CHECKS`.
+Each check, one function in `CHECKS`, looks at the measured fields (`View`) and yields doubts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,11 +17,18 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ..kinds import Doubt, Expected
-from .placement import POWERS, apex_shape, in_all_quarters, line_angle
-from .registration import Axes, Rim, rim_of_motion, symmetry_axes
+from .registration import (
+    POWERS,
+    Axes,
+    Rim,
+    apex_shape,
+    in_all_quarters,
+    line_angle,
+    rim_of_motion,
+    symmetry_axes,
+)
 
 Array = NDArray[np.float64]
-
 #: Of the highest rise: a centre that sinks by more while the pressure rises is no noise.
 SINKS = 0.02
 #: Share of the displacements by which reference places follow them when they are deformed ones,
@@ -54,9 +60,8 @@ class Apex:
     """Equilibrium at the apex of one field without any model: n1 k1 + n2 k2 = p from its shape.
 
     pressure : MPa. height : mm, rise of the centre. curvature : 1/mm, k1 + k2 of the inflated
-    surface; positive where it is a dome. force : N/mm, the membrane force p / (k1 + k2), the same
-    in all directions if the two are equal. error : N/mm, standard error of the force from the
-    scatter of the points about a smooth surface. strain : logarithmic, along x and along y.
+    surface; positive where it is a dome. force : N/mm, p / (k1 + k2), that of all directions if
+    alike. error : N/mm, of the force by the points' scatter. strain : logarithmic, along x and y.
     """
 
     pressure: float
@@ -74,10 +79,7 @@ class Apex:
 
 
 def apex_of(field: DisplacementField, radius: float) -> Apex:
-    """Return the apex of a field about the rim's centre; radius of the rim in mm.
-
-    Raises InputError for too few points about the centre.
-    """
+    """Return the apex of a field about the centre of a rim of `radius` mm; raises InputError."""
     before = field.frame.points
     after = before + field.displacement
     try:
@@ -109,11 +111,7 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Measured fields by rising pressure, in the test's coordinates.
-
-    outline : of the clamped edge. thickness : mm. registered : whether a registration brought
-    them there.
-    """
+    """Measured fields by rising pressure, in the test's coordinates; thickness mm."""
 
     fields: tuple[DisplacementField, ...]
     outline: Outline
@@ -130,15 +128,19 @@ class View:
         """Return the field at the highest pressure."""
         return self.fields[-1]
 
+    @property
+    def top(self) -> str:
+        """Return the highest pressure, kPa."""
+        return f"{1e3 * self.last.pressure:.4g}"
+
     @cached_property
     def rises(self) -> Array:
         """Return (fields,) mm: median rise of points within a quarter of the radius, or of all."""
-        return np.array([self._rise(field) for field in self.fields])
-
-    def _rise(self, field: DisplacementField) -> float:
-        near = self.outline.share(field.points) < 0.25
-        rise = field.displacement[near, 2] if near.any() else field.displacement[:, 2]
-        return float(np.median(rise))
+        found = []
+        for field in self.fields:
+            near = self.outline.share(field.points) < 0.25
+            found.append(np.median(field.displacement[near if near.any() else ..., 2]))
+        return np.array(found)
 
     @cached_property
     def apexes(self) -> tuple[Apex, ...]:
@@ -160,11 +162,7 @@ class View:
 
     @cached_property
     def axes(self) -> Axes | None:
-        """Find the axes of symmetry; None where points lie on one side only.
-
-        None, too, where the edge is an ellipse: its turn says more, and across the yarns there
-        are no axes.
-        """
+        """Find the axes of symmetry; None of an ellipse or where points lie on one side only."""
         if not self.outline.round or not in_all_quarters(self.last.points):
             return None
         return symmetry_axes([field.frame for field in self.fields], self.radius)
@@ -174,19 +172,17 @@ class View:
         return np.asarray(self.outline.share(field.points) < share)
 
 
-def upside_down(view: View, expected: Expected) -> list[Doubt]:
+def upside_down(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a bubble that goes down as the pressure goes up: z is flipped."""
-    rise = float(view.rises[-1])
-    if rise >= 0:
-        return []
-    text = (
-        f"the centre moves by {rise:.3g} mm along z at {_kilo(view)} kPa: z is "
-        "flipped; turn the axes, or let a registration find them"
-    )
-    return [Doubt("z-flipped", True, text)]
+    if not view.rises[-1] >= 0:
+        text = (
+            f"the centre moves by {view.rises[-1]:.3g} mm along z at {view.top} kPa: z is "
+            "flipped; turn the axes, or let a registration find them"
+        )
+        yield Doubt("z-flipped", True, text)
 
 
-def order(view: View, expected: Expected) -> list[Doubt]:
+def order(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt frames that are not in the order of their pressures."""
     for k, (a, b) in enumerate(pairwise(view.rises)):
         if b < a - SINKS * view.rises.max():
@@ -195,45 +191,39 @@ def order(view: View, expected: Expected) -> list[Doubt]:
                 f"the centre sinks from {a:.3g} to {b:.3g} mm between {low:.4g} and {high:.4g} "
                 "kPa: the frames are not in the order of the pressures"
             )
-            return [Doubt("frame-order", True, text)]
-    return []
+            yield Doubt("frame-order", True, text)
+            return
 
 
-def repeated(view: View, expected: Expected) -> list[Doubt]:
+def repeated(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt one frame given for two pressures."""
     pairs = [
         f"{1e3 * first.pressure:.4g} and {1e3 * second.pressure:.4g} kPa"
         for first, second in pairwise(view.fields)
-        if np.array_equal(first.displacement, second.displacement)
-        and np.abs(first.displacement).max() > 0
+        if np.array_equal(first.displacement, second.displacement) and first.displacement.any()
     ]
-    if not pairs:
-        return []
-    more = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
-    text = (
-        f"the displacements at {pairs[0]} are the same to the last digit{more}: one frame is given "
-        "twice"
-    )
-    return [Doubt("repeated-frame", True, text)]
+    if pairs:
+        more = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
+        text = f"the displacements at {pairs[0]} are the same to the last digit{more}: one frame"
+        yield Doubt("repeated-frame", True, f"{text} is given twice")
 
 
-def rejected_at_zero(view: View, expected: Expected) -> list[Doubt]:
+def rejected_at_zero(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt points without correlation that were written as zeros."""
     moved = view.last.displacement[view.inner(view.last)]
     still = int((moved == 0).all(axis=1).sum())
     twice = int((view.last.points == 0).all(axis=1).sum())
-    if still == 0 and twice < 2:
-        return []
     found = [f"{still} of {len(moved)} points well within the rim do not move at all"] * (still > 0)
     found += [f"{twice} points lie at exactly x = y = 0"] * (twice > 1)
-    text = (
-        f"{' and '.join(found)} at {_kilo(view)} kPa: points without correlation "
-        "seem to be written as zeros; name the column that marks them (flag_column)"
-    )
-    return [Doubt("zero-points", True, text)]
+    if found:
+        text = (
+            f"{' and '.join(found)} at {view.top} kPa: points without correlation "
+            "seem to be written as zeros; name the column that marks them (flag_column)"
+        )
+        yield Doubt("zero-points", True, text)
 
 
-def deformed_coordinates(view: View, expected: Expected) -> list[Doubt]:
+def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt places after the motion where those before it are meant."""
     last, seen = view.last, ""
     if last.z is not None and not view.registered:
@@ -246,10 +236,9 @@ def deformed_coordinates(view: View, expected: Expected) -> list[Doubt]:
             alike = _follows(last.points - other.points, moved)
             if alike > FOLLOWS:
                 seen = f"x and y change from frame to frame by {alike:.0%} of dx and dy"
-    if not seen:
-        return []
-    text = f"{seen}: the coordinates are those of the deformed sheet; export the reference"
-    return [Doubt("deformed-coordinates", True, f"{text} coordinates")]
+    if seen:
+        text = f"{seen}: the coordinates are those of the deformed sheet; export the reference"
+        yield Doubt("deformed-coordinates", True, f"{text} coordinates")
 
 
 def _follows(place: Array, moved: Array) -> float:
@@ -261,73 +250,61 @@ def _follows(place: Array, moved: Array) -> float:
     return float((a * b).sum() / (b**2).sum())
 
 
-def mirrored(view: View, expected: Expected) -> list[Doubt]:
+def mirrored(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt x or y flipped in places or in displacements, not in both."""
-    if not view.apexes:
-        return []
-    strain = np.array(view.apexes[-1].strain)
-    if not strain.max() > 0:
+    strain = np.array(view.apexes[-1].strain if view.apexes else [])
+    if len(strain) and not strain.max() > 0:
         text = f"the sheet shrinks at its centre (strains {strain[0]:.3g}, {strain[1]:.3g})"
-        return [Doubt("axis-flipped", True, f"{text}: x, y, dx and dy do not go together")]
-    strained = f"the centre is strained by {strain[0]:.3g} along x and {strain[1]:.3g} along y"
-    return [
-        Doubt(
-            "axis-flipped",
-            True,
-            f"{strained}: {name} and d{name} have opposite senses; flip one of them",
-        )
-        for name, own in zip("xy", strain, strict=True)
-        if own < NEGATIVE * strain.max()
-    ]
+        yield Doubt("axis-flipped", True, f"{text}: x, y, dx and dy do not go together")
+        return
+    for name, own in zip("xy", strain, strict=False):
+        if own < NEGATIVE * strain.max():
+            text = f"the centre is strained by {strain[0]:.3g} along x and {strain[1]:.3g} along y"
+            text += f": {name} and d{name} have opposite senses; flip one of them"
+            yield Doubt("axis-flipped", True, text)
 
 
-def camera_height(view: View, expected: Expected) -> list[Doubt]:
+def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt heights counted from somewhere else than the rim."""
-    if view.last.z is None:
-        return []
-    height = float(np.median(view.last.z))
-    if abs(height) < HIGH * view.radius:
-        return []
-    text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
-    return [Doubt("camera-frame", False, text)]
+    height = 0.0 if view.last.z is None else float(np.median(view.last.z))
+    if not abs(height) < HIGH * view.radius:
+        text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
+        yield Doubt("camera-frame", False, text)
 
 
-def off_centre(view: View, expected: Expected) -> list[Doubt]:
+def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt an origin that is not the rim's centre."""
-    if view.rim is None:
-        return []
-    off = float(np.hypot(view.rim.x, view.rim.y))
-    if off < max(OFF * view.radius, SURE * view.rim.error):
-        return []
-    text = (
-        f"the sheet rises about x = {view.rim.x:.3g}, y = {view.rim.y:.3g} mm (+- "
-        f"{view.rim.error:.2g}), not about the origin: {ADVICE}"
-    )
-    return [Doubt("off-centre", off > FAR_OFF * view.radius, text)]
+    rim = view.rim
+    off = 0.0 if rim is None else float(np.hypot(rim.x, rim.y))
+    if rim is not None and not off < max(OFF * view.radius, SURE * rim.error):
+        text = (
+            f"the sheet rises about x = {rim.x:.3g}, y = {rim.y:.3g} mm (+- {rim.error:.2g}), not "
+            f"about the origin: {ADVICE}"
+        )
+        yield Doubt("off-centre", off > FAR_OFF * view.radius, text)
 
 
-def tilted(view: View, expected: Expected) -> list[Doubt]:
+def tilted(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a rise that is not along z: on average the sheet moves sideways."""
     last, first = view.last, view.fields[0]
     inner = view.inner(last)
     if not inner.any():
-        return []
+        return
     start = first.displacement[view.inner(first)].mean(axis=0) * (len(view.fields) > 1)
     x, y, z = last.displacement[inner].mean(axis=0) - start
     tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
-    if tilt < TILT:
-        return []
-    text = (
-        f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "
-        f"clamp moved; {ADVICE}"
-    )
-    return [Doubt("tilted", tilt > STEEP, text)]
+    if not tilt < TILT:
+        text = (
+            f"the sheet moves along a line {tilt:.2g} degrees from z: its frame is tilted, or the "
+            f"clamp moved; {ADVICE}"
+        )
+        yield Doubt("tilted", tilt > STEEP, text)
 
 
-def turned(view: View, expected: Expected) -> list[Doubt]:
+def turned(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt that warp and fill lie along x and y, or that an elliptic rim lies as it is said to."""
     if view.rim is None:
-        return []
+        return
     if not view.outline.round:
         said = view.outline.angle
         off = line_angle(view.rim.angle - said)
@@ -337,77 +314,69 @@ def turned(view: View, expected: Expected) -> list[Doubt]:
             f" {said:.3g}: is its angle right, and {ADVICE}"
         )
     elif view.axes is None or view.axes.clear < CLEAR:
-        return []
+        return
     else:
         off, error = view.axes.off, view.axes.error
         text = (
             f"the fields are symmetric about axes {off:.3g} degrees from x and y (+- "
             f"{error:.2g}): warp and fill lie there; {ADVICE}"
         )
-    return [] if abs(off) < max(TURN, SURE * error) else [Doubt("turned", False, text)]
+    if not abs(off) < max(TURN, SURE * error):
+        yield Doubt("turned", False, text)
 
 
-def swapped(view: View, expected: Expected) -> list[Doubt]:
-    """Doubt warp and fill that seem to be swapped, by the bounds of the moduli.
-
-    An ellipse is strained more along its minor axis, whatever the law.
-    """
+def swapped(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt warp and fill that seem swapped; an ellipse is strained more along its minor axis."""
     if not view.outline.round or not view.apexes:
-        return []
+        return
     if not expected.moduli or not expected.warp_is_stiffer:
-        return []
+        return
     warp, fill = view.apexes[-1].strain
     if len(view.apexes) > 1:
         # What the sheet's first shape adds to both frames cancels.
         warp, fill = warp - view.apexes[0].strain[0], fill - view.apexes[0].strain[1]
-    if not warp > MORE * fill > 0:
-        return []
-    text = (
-        f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, and "
-        "the bounds have the warp stiffer: warp and fill seem to be swapped"
-    )
-    return [Doubt("swapped", False, text)]
+    if warp > MORE * fill > 0:
+        text = (
+            f"the centre is strained by {warp:.3g} along the warp and {fill:.3g} along the fill, "
+            "and the bounds have the warp stiffer: warp and fill seem to be swapped"
+        )
+        yield Doubt("swapped", False, text)
 
 
-def length_unit(view: View, expected: Expected) -> list[Doubt]:
+def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt mm taken for m, in places or in displacements."""
     reach = float(view.outline.share(view.last.points).max())
     rise = abs(float(view.rises[-1])) / view.radius
-    found = []
     if not LEAST_REACH < reach < MOST_REACH:
-        found.append(
+        text = (
             f"the outermost point is {reach:.3g} radii from the centre: are x and y in the length "
             "unit that is said, and is the radius right?"
         )
+        yield Doubt("length-unit", True, text)
     if not LEAST_RISE < rise < MOST_RISE:
-        found.append(
-            f"the centre rises by {rise:.3g} radii at {_kilo(view)} kPa: are the displacements in "
+        text = (
+            f"the centre rises by {rise:.3g} radii at {view.top} kPa: are the displacements in "
             "the length unit that is said (mm beside m)?"
         )
-    return [Doubt("length-unit", True, text) for text in found]
+        yield Doubt("length-unit", True, text)
 
 
-def pressure_unit(view: View, expected: Expected) -> list[Doubt]:
+def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt bar taken for kPa, or a wrong thickness, by the force that equilibrium gives."""
     if not view.apexes or not expected.moduli:
-        return []
+        return
     top = view.apexes[-1]
     mean = 0.5 * sum(top.strain)
     if not np.isfinite(top.force) or mean < TELLING:
-        return []
+        return
     far = expected.outside(top.stiffness * (1 - RATIO) / view.thickness, ("E1", "E2"))
-    if not far:
-        return []
-    text = (
-        f"equilibrium of the apex at {_kilo(view)} kPa gives {top.force:.3g} N/mm at a strain of "
-        f"{mean:.3g}, a modulus of about {far}: is the pressure in the unit that is said (bar "
-        "beside kPa), and are thickness and lengths right?"
-    )
-    return [Doubt("pressure-unit", True, text)]
-
-
-def _kilo(view: View) -> str:
-    return f"{1e3 * view.last.pressure:.4g}"
+    if far:
+        text = (
+            f"equilibrium of the apex at {view.top} kPa gives {top.force:.3g} N/mm at a strain of "
+            f"{mean:.3g}, a modulus of about {far}: is the pressure in the unit that is said (bar "
+            "beside kPa), and are thickness and lengths right?"
+        )
+        yield Doubt("pressure-unit", True, text)
 
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.

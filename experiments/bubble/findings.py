@@ -6,26 +6,20 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import Note, NoteKind
 from ...meshes.bubble_model import BubbleModel
 from ...readers.pressure_log import ClockOffset
-from ..kinds import FittedTest
+from ..kinds import Array, FittedTest
 from .objective import FieldObjective
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS
 
-#: Kinds of notes that are made here.
 INVERSE_CRIME = NoteKind("inverse crime", weight=4)
 SURFACES = NoteKind("unfaithful surfaces", weight=10)
 FLAT_SHEET = NoteKind("sheet taken for flat", weight=11)
-
-
-Array = NDArray[np.float64]
-
 NOT_BELIEVED = (
     "the moduli of this test are not to be believed: the sheet is taken for flat and taut in the "
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "
@@ -78,9 +72,9 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
 
 def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     """Return the line of the terminal on what the fit used of the sheet, each with its size."""
-    words, surface = [], numbers["surface_mm"]
-    if numbers["measured_rms_mm"] is not None:
-        words.append(f"measured surface (followed to {numbers['measured_rms_mm']:.2g} mm RMS)")
+    words, surface, measured = [], numbers["surface_mm"], numbers["measured_rms_mm"]
+    if measured is not None:
+        words.append(f"measured surface (followed to {measured:.2g} mm RMS)")
     if numbers["modes_mm"]:
         words.append(f"{len(numbers['modes_mm'])} modes of the surface")
     if words:
@@ -101,16 +95,14 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
 
 def sheet_warnings(prepared: PreparedBubble) -> list[Note]:
     """Warn of a real test of which nothing is known of the sheet's shape."""
-    if prepared.known is not None or prepared.test.sheet.known:
-        return []
-    return [Note(FLAT_SHEET, NOT_BELIEVED)]
+    known = prepared.known is not None or prepared.test.sheet.known
+    return [] if known else [Note(FLAT_SHEET, NOT_BELIEVED)]
 
 
 def match_warnings(prepared: PreparedBubble) -> list[Note]:
     """Warn of data computed by the fitted model, and of surfaces too coarse to follow a bubble."""
-    test, notes = prepared.test, []
-    if prepared.by_this_model:
-        notes.append(Note(INVERSE_CRIME, CRIME))
+    test = prepared.test
+    notes = [Note(INVERSE_CRIME, CRIME)] if prepared.by_this_model else []
     if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
         words = (
             f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk "
@@ -124,13 +116,10 @@ def used_of(prepared: PreparedBubble) -> list[str]:
     """Return in words what the fit used of the sheet."""
     sheet = prepared.test.sheet
     on = {
-        "measured surface": sheet.measured,
-        "modes": sheet.modes,
-        "slack": sheet.slack,
-        "measured rim": sheet.moving_rim,
-        "constant field": sheet.constant,
+        "measured surface": sheet.measured, "modes": sheet.modes, "slack": sheet.slack,
+        "measured rim": sheet.moving_rim, "constant field": sheet.constant,
         "loaded reference frame": sheet.since is not None,
-    }
+    }  # fmt: skip
     return [words for words, used in on.items() if used]
 
 
@@ -166,12 +155,9 @@ def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
     }
     clock = taken.clock
     if clock is not None:
-        numbers["clock"] = {
-            "offset_s": clock.offset,
-            "between_s": [clock.lower, clock.upper],
-            "misfit": clock.misfit,
-            "how": "given" if clock.misfit is None else "found by the apex heights",
-        }
+        how = "given" if clock.misfit is None else "found by the apex heights"
+        numbers["clock"] = {"offset_s": clock.offset, "between_s": [clock.lower, clock.upper]}
+        numbers["clock"] |= {"misfit": clock.misfit, "how": how}
     return numbers
 
 

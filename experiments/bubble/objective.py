@@ -1,8 +1,8 @@
 """Residuals of a bubble test (Eqs 4.5-4.8).
 
-A residual block is one displacement direction at one pressure: (model - measured) / (largest
-measured |value| * sqrt(n)). The norm of a block is e_x/max(P_x) of Eq. 4.8, e is the sum of the
-block norms. With plain millimetres the scale is one and e is a sum of RMS errors in mm.
+A block is one displacement direction at one pressure: (model - measured) / (largest measured
+|value| * sqrt(n)). Its norm is e_x/max(P_x) of Eq. 4.8, e is the sum of the norms. With plain
+millimetres the scale is one and e is a sum of RMS errors in mm.
 """
 
 from __future__ import annotations
@@ -27,28 +27,26 @@ from ...solvers.base import History
 from .test import BubbleTest
 
 Array = NDArray[np.float64]
-
-
+Unknowns = Mapping[str, float]
 #: Nuisance of a measured field: a rigid displacement, mm.
 OFFSETS = ("offset_x", "offset_y", "offset_z")
 #: mm, noise of a displacement by a good image correlation.
 CORRELATION = 0.05
 
 
-def displacement_offset(nuisance: Mapping[str, float]) -> Array:
+def displacement_offset(nuisance: Unknowns | None) -> Array:
     """Return (3,) mm; zero where it is no unknown."""
-    return np.array([nuisance.get(name, 0.0) for name in OFFSETS])
+    return np.array([(nuisance or {}).get(name, 0.0) for name in OFFSETS])
 
 
 @dataclass(frozen=True, eq=False)
 class FieldTarget:
     """The displacement field that was measured at one pressure.
 
-    displacement (n, 3) mm at n places; `sample` (n, nodes) takes model nodes to these places
-    (None: the places are the nodes). places : (n,) numbers, the same for a place in all targets;
-    needed for a constant field. frame : of the model's history, the target's own number unless
-    given; since : the frame from which the displacement is counted, None for the reference state.
-    at_rest : (n, 2) mm, the places before the test.
+    displacement (n, 3) mm; `sample` (n, nodes) takes model nodes to the places (None: the nodes).
+    places : (n,) numbers, equal for a place in all targets, for a constant field. frame : of the
+    model's history, the target's number unless given; since : the frame from which displacements
+    are counted, None: the reference state. at_rest : (n, 2) mm before the test.
     """
 
     pressure: float
@@ -80,14 +78,12 @@ class FieldTarget:
 class FieldObjective:
     """Residual blocks for displacement fields at several pressures, x, y, z at each.
 
-    targets : one a reported pressure, in the order of the model's frames. normalise : "e" (Eq. 4.8)
-    or "mm". weight : of every block in e. noise : mm, of one measured displacement, at least.
-    constant : directions (0 to 2) in which a field that is the same at all pressures is projected
-    out: at every place the weighted mean over the pressures of model less measured is zero.
-    Raises InputError for a direction without any displacement to normalise by.
+    targets : one a reported pressure, in the order of the model's frames. weight : of every block
+    in e. noise : mm of one displacement, at least. constant : directions (0 to 2) in which at every
+    place the weighted mean over the pressures of model less measured is projected out. Raises
+    InputError for a direction without any displacement to normalise by.
     """
 
-    #: What the residuals are in after `scale`.
     unit = "mm"
 
     def __init__(
@@ -127,9 +123,7 @@ class FieldObjective:
     def places(self) -> tuple[Array, ...]:
         """Return (n, 2) mm at rest of every block's values; empty where they are not known."""
         known = [target.at_rest for target in self.targets if target.at_rest is not None]
-        if len(known) < len(self.targets):
-            return ()
-        return tuple(places for places in known for _ in "xyz")
+        return tuple(p for p in known for _ in "xyz") if len(known) == len(self.targets) else ()
 
     def of_points(self, values: Array) -> Array:
         """Return (m,) for each residual, of values for each place, frame by frame."""
@@ -146,33 +140,25 @@ class FieldObjective:
         )
         return other
 
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+    def residual(self, history: History, nuisance: Unknowns | None = None) -> Array:
         """Return the blocks laid end to end, (m,); the model is moved by the offsets."""
-        parts = self.differences(history.displacement, nuisance)
-        return np.concatenate(
-            [(d / s).T.reshape(-1) for d, s in zip(parts, self.scales, strict=True)]
-        )
+        every = zip(self.differences(history.displacement, nuisance), self.scales, strict=True)
+        return np.concatenate([(part / scale).T.reshape(-1) for part, scale in every])
 
-    def modelled(
-        self, displacement: Array, nuisance: Mapping[str, float] | None = None
-    ) -> list[Array]:
+    def modelled(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
-        shift = displacement_offset(nuisance or {})
+        shift = displacement_offset(nuisance)
         return [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
 
-    def differences(
-        self, displacement: Array, nuisance: Mapping[str, float] | None = None
-    ) -> list[Array]:
+    def differences(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return model less measured (n, 3) mm of each target, without a constant field."""
         return self._varying(self._off(displacement, nuisance))
 
-    def constant_field(
-        self, displacement: Array, nuisance: Mapping[str, float] | None = None
-    ) -> Array:
+    def constant_field(self, displacement: Array, nuisance: Unknowns | None = None) -> Array:
         """Return (places, 3) mm, measured less model as far as it is the same at all pressures."""
         return -self._mean(self._off(displacement, nuisance))
 
-    def _off(self, displacement: Array, nuisance: Mapping[str, float] | None) -> list[Array]:
+    def _off(self, displacement: Array, nuisance: Unknowns | None) -> list[Array]:
         modelled = self.modelled(displacement, nuisance)
         return [m - t.displacement for m, t in zip(modelled, self.targets, strict=True)]
 
@@ -195,19 +181,16 @@ class FieldObjective:
             np.add.at(weights, own, weight)
         weights[weights == 0] = 1.0
         mean = total / weights.reshape(*weights.shape, *[1] * (total.ndim - 2))
-        for axis in set(range(3)) - set(self.constant):
-            mean[:, axis] = 0.0
+        mean[:, sorted(set(range(3)) - set(self.constant))] = 0.0
         return np.asarray(mean)
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from d displacement (frames, nodes, 3, parameters)."""
         count = slope.shape[-1]
         parts = self._varying([target.of(slope, k) for k, target in enumerate(self.targets)])
+        every = zip(parts, self.scales, strict=True)
         return np.concatenate(
-            [
-                (part / scale[:, None]).transpose(1, 0, 2).reshape(-1, count)
-                for part, scale in zip(parts, self.scales, strict=True)
-            ]
+            [(p / s[:, None]).swapaxes(0, 1).reshape(-1, count) for p, s in every]
         )
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
@@ -221,9 +204,7 @@ class FieldObjective:
         ]
         return np.concatenate(columns)[:, [OFFSETS.index(name) for name in names]]
 
-    def mean_absolute(
-        self, displacement: Array, nuisance: Mapping[str, float] | None = None
-    ) -> float:
+    def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
         """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""
         parts = self.differences(displacement, nuisance)
         return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())
@@ -245,11 +226,9 @@ def mirrored(field: DisplacementField) -> DisplacementField:
     """Mirror a quarter's field to the full disk."""
     if (field.points < -1e-9).any():
         return field
-    points, moved = [], []
-    for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
-        points.append(field.points * (sx, sy))
-        moved.append(field.displacement * (sx, sy, 1))
-    xy, u = np.concatenate(points), np.concatenate(moved)
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    xy = np.concatenate([field.points * (sx, sy) for sx, sy in signs])
+    u = np.concatenate([field.displacement * (sx, sy, 1) for sx, sy in signs])
     _, once = np.unique(np.round(xy, 6), axis=0, return_index=True)
     z, sigma = (None if own is None else np.tile(own, 4)[once] for own in (field.z, field.sigma))
     return replace(field, points=xy[once], displacement=u[once], z=z, sigma=sigma)
@@ -293,10 +272,7 @@ def reading_of(test: BubbleTest, mesh: Mesh) -> SmoothReading | FacetReading:
 def at_points(
     test: BubbleTest, fields: Sequence[DisplacementField], mesh: Mesh
 ) -> tuple[list[FieldTarget], int]:
-    """Return targets at the measured points on the disk, and how many lie beyond its rim.
-
-    Raises InputError where next to no point lies on the disk, or all of them near its centre.
-    """
+    """Return targets at points on the disk, and how many lie beyond; raises InputError."""
     targets, outside = [], 0
     reading, before = reading_of(test, mesh), None
     for field in fields:
@@ -305,25 +281,21 @@ def at_points(
             sample, inside = reading.matrix(field.points)
             before = field.points
         outside += int((~inside).sum())
-        _check_scale(test, field, inside)
-        rest = field.points[inside]
-        moved = field.displacement[inside]
+        rest, moved = field.points[inside], field.displacement[inside]
         targets.append(FieldTarget(field.pressure, moved, sample, at_rest=rest))
+        reach = float(np.abs(field.points).max())
+        if inside.mean() < LEAST_SHARE:
+            where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of"
+        elif reach < LEAST_SHARE * test.outline.major:
+            where = f"all points lie within {reach:.3g} mm of the centre of a disk of"
+        else:
+            continue
+        at = f"{test.place.at}, data at {field.pressure * 1e3:g} kPa"
+        problem = (
+            f"{where} {test.outline.words}: are the length unit and the columns x and y right?"
+        )
+        raise InputError(test.place.path, at, problem)
     return targets, outside
-
-
-def _check_scale(test: BubbleTest, field: DisplacementField, inside: NDArray[np.bool_]) -> None:
-    """Raise InputError where points lie as if metres were taken for millimetres, or vice versa."""
-    reach = float(np.abs(field.points).max())
-    if inside.mean() < LEAST_SHARE:
-        where = f"{int(inside.sum())} of {len(inside)} points lie on the disk of"
-    elif reach < LEAST_SHARE * test.outline.major:
-        where = f"all points lie within {reach:.3g} mm of the centre of a disk of"
-    else:
-        return
-    at = f"{test.place.at}, data at {field.pressure * 1e3:g} kPa"
-    problem = f"{where} {test.outline.words}: are the length unit and the columns x and y right?"
-    raise InputError(test.place.path, at, problem)
 
 
 #: Decimals of a mm to which two frames give the same reference place.
@@ -338,9 +310,8 @@ POWER = 2.0 / 3.0
 def at_rest(fields: Sequence[DisplacementField], since: int) -> list[DisplacementField]:
     """Return fields with places in the sheet without load, where they are those of frame `since`.
 
-    That is so where the picture that all displacements are counted from was taken at the pressure
-    of this frame: nothing moves in it. The next frame shows how far its places have moved already:
-    in-plane displacements grow with p^(2/3). Other fields are left as they are.
+    Nothing moves in a frame that the others are counted from. The next one shows how far its places
+    have moved already: in-plane displacements grow with p^(2/3). Other fields stay as they are.
     """
     first = fields[since]
     if first.displacement.any():
@@ -353,10 +324,7 @@ def at_rest(fields: Sequence[DisplacementField], since: int) -> list[Displacemen
 
 
 def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarget]:
-    """Return the targets with numbers of their places, equal for the same place in all.
-
-    nodes : (nodes, 2) mm, of the model.
-    """
+    """Number the places, equal for the same place in all targets; nodes (nodes, 2) mm."""
     places = [np.round(target.at(nodes), DECIMALS) + 0.0 for target in targets]
     _, numbers = np.unique(np.concatenate(places), axis=0, return_inverse=True)
     ends = np.cumsum([len(p) for p in places])[:-1]
@@ -367,17 +335,12 @@ def with_places(targets: Sequence[FieldTarget], nodes: Array) -> list[FieldTarge
 
 
 def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget]:
-    """Return targets, with places, less that of the frame `since`, from which they are counted.
-
-    Raises InputError for a frame that shares too few places with it.
-    """
-    origin = targets[since]
-    assert origin.places is not None
-    relative = []
+    """Return targets, with places, less that of frame `since`; InputError for too few in common."""
+    origin, relative = targets[since], []
     for k, target in enumerate(targets):
         if k == since:
             continue
-        assert target.places is not None
+        assert target.places is not None and origin.places is not None
         _, mine, its = np.intersect1d(target.places, origin.places, return_indices=True)
         if len(mine) < LEAST_SHARE_RELATIVE * len(target.places):
             problem = (

@@ -10,33 +10,21 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import is_file
+from ...readers import pressure_log
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
 from ...readers.machine_tables import Channel, read_times
-from ...readers.pressure_log import (
-    ClockOffset,
-    LogOptions,
-    apex_heights,
-    check_pattern,
-    choose_frames,
-    find_offset,
-    given_offset,
-    number_in_name,
-    read_pressure_log,
-    value_in_file,
-)
+from ...readers.pressure_log import check_pattern, number_in_name, value_in_file
 from ...readers.sections import LENGTH_UNITS
 from ...readers.tables import PRESSURE_UNITS, TIME_UNITS
 from ..keys import channel_of, named_format
-from ..kinds import Place
+from ..kinds import Array, Place
 from .registration import RegistrationOptions
 from .section import BubbleSection, LogSection, PointsSection, PressureSection, registration_options
 
-Array = NDArray[np.float64]
 #: Key of the section that says the pressures, below that of the test.
 AT = "data.points.pressure"
 
@@ -48,32 +36,33 @@ def pressures_by_log(
     format: str | None,
     place: Place,
     folder: Path,
-) -> tuple[ClockOffset, list[str]]:
-    """Return the pressures of all frames by a log, and the frames' names.
+) -> tuple[pressure_log.ClockOffset, list[str]]:
+    """Return the pressures of all frames by a log, and the frames' names; raises InputError.
 
-    folder : of the data, where the log may be too. Raises InputError naming file and key for a bad
-    log or frame, times that are missing, clocks that cannot be matched.
+    folder : of the data, where the log may be too.
     """
     at = f"{AT}.log"
     file = _beside(section.file, place, folder, f"{at}.file")
     kind = named_format(place, f"{at}.format", "machine table", section.format)
     pressure, time = channel_of(section.pressure), channel_of(section.time)
-    log = read_pressure_log(
-        file, LogOptions(pressure, time, kind, section.comment, section.decimal)
+    log = pressure_log.read_pressure_log(
+        file, pressure_log.LogOptions(pressure, time, kind, section.comment, section.decimal)
     )
     heights, names = [], []
     for one in files:
         # One file at a time: all frames of a test need not be in memory at once.
-        risen = apex_heights(read_frames([one], options, format))
-        heights += risen.tolist()
-        count = len(risen)
-        names += [f"{one.name}, frame {i + 1}" if count > 1 else one.name for i in range(count)]
+        risen = pressure_log.apex_heights(read_frames([one], options, format)).tolist()
+        heights += risen
+        several = [f"{one.name}, frame {i + 1}" for i in range(len(risen))]
+        names += several if len(risen) > 1 else [one.name] * len(risen)
     height = np.array(heights)
     try:
         times = _frame_times(section, files, len(height), place, folder)
         seen = times, height, log.time, log.pressure
         given = section.offset
-        return find_offset(*seen) if given is None else given_offset(given, *seen), names
+        if given is None:
+            return pressure_log.find_offset(*seen), names
+        return pressure_log.given_offset(given, *seen), names
     except InputError as error:
         if error.path is not None:
             raise
@@ -113,16 +102,6 @@ def _frame_times(
     return np.array(numbers) / (section.rate or 1.0)
 
 
-def log_files(section: LogSection | None, place: Place, folder: Path) -> tuple[Path, ...]:
-    """Return the files of the pressures beside the frames, for the record; none without a log."""
-    if section is None:
-        return ()
-    named = {"file": section.file, "times": section.times}
-    return tuple(
-        _beside(name, place, folder, f"{AT}.log.{key}") for key, name in named.items() if name
-    )
-
-
 def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
     """Return a file beside the frames, in the folder of the data, or beside the project."""
     for home in (folder, place.path.parent):
@@ -135,11 +114,10 @@ def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
 class RecordedFrames:
     """The frames that a test takes, by rising pressure.
 
-    files : of the frames taken; all files where one holds several frames. frames : numbers among
-    all frames of the files, None where each file holds one. pressure : (n,) MPa, as recorded. asked
-    : (n,) MPa, None where none were asked for. source : of the pressures, in words. count : of all
-    frames. left_out : number of frames not used, by why. doubt : (n,) MPa, by the uncertain offset
-    of the clocks; None without a log. logs : other files that were read: a log, a table of times.
+    files : of the frames taken; all files where one holds several. frames : numbers among all
+    frames of the files, None where each file holds one. pressure, asked : (n,) MPa. source : of the
+    pressures, in words. count : of all frames. left_out : number of frames not used, by why. doubt
+    : (n,) MPa, by the uncertain offset of the clocks. logs : a log, a table of times.
     """
 
     files: tuple[Path, ...]
@@ -151,7 +129,7 @@ class RecordedFrames:
     count: int
     left_out: Mapping[str, int]
     doubt: Array | None = None
-    clock: ClockOffset | None = None
+    clock: pressure_log.ClockOffset | None = None
     logs: tuple[Path, ...] = ()
 
 
@@ -164,10 +142,9 @@ def recorded_frames(
     place: Place,
     folder: Path,
 ) -> RecordedFrames:
-    """Choose the frames of a test by the pressures that were recorded.
+    """Choose the frames of a test by the pressures that were recorded; raises InputError.
 
-    asked : MPa, the test's own `pressures`; None takes all frames, or `frames` of them. folder : of
-    the data, where a log may be too. Raises InputError naming file and key.
+    asked : MPa, the test's `pressures`; None takes all frames, or `frames` of them.
     """
     _check(section, asked, place)
     clock, names = None, [file.name for file in files]
@@ -182,15 +159,18 @@ def recorded_frames(
         pattern = section.from_name if isinstance(section.from_name, str) else None
         unit = section.unit or place.scales.pressure_unit
         own = [number_in_name(f, PRESSURE_UNITS, pattern, unit, "from_name") for f in files]
-        pressures = np.array(own)
-        source = "the files' names"
+        pressures, source = np.array(own), "the files' names"
     limit = None if section.tolerance is None else section.tolerance * place.scales.pressure
     try:
-        chosen = choose_frames(pressures, asked, section.frames, limit, clock is not None)
+        how = section.frames, limit, clock is not None
+        chosen = pressure_log.choose_frames(pressures, asked, *how)
     except InputError as error:
         field = error.field if error.field.startswith("pressures") else f"{AT}.{error.field}"
         raise place.error(field.rstrip("."), error.problem) from None
-    taken = list(chosen.frames)
+    taken, logs = list(chosen.frames), []
+    if section.log is not None:
+        named = {"file": section.log.file, "times": section.log.times}
+        logs = [_beside(f, place, folder, f"{AT}.log.{k}") for k, f in named.items() if f]
     single = len(names) == len(files)
     return RecordedFrames(
         files=tuple(files[i] for i in taken) if single else tuple(files),
@@ -203,7 +183,7 @@ def recorded_frames(
         left_out=chosen.left_out,
         doubt=None if clock is None else clock.doubt[taken],
         clock=clock,
-        logs=log_files(section.log, place, folder),
+        logs=tuple(logs),
     )
 
 
@@ -211,29 +191,28 @@ def _check(section: PressureSection, asked: Sequence[float] | None, place: Place
     given = [bool(section.from_name), section.column is not None, section.log is not None]
     if sum(given) != 1:
         raise place.error(AT, "expected exactly one of 'from_name', 'column' and 'log'")
-    if section.frames is not None and asked is not None:
-        raise place.error(f"{AT}.frames", "means nothing where 'pressures' are asked for")
-    if section.tolerance is not None and asked is None:
-        raise place.error(f"{AT}.tolerance", "means nothing without 'pressures'")
-    if section.column is None and (section.scale is not None or section.offset):
-        raise place.error(f"{AT}.scale", "'scale' and 'offset' here are of a 'column'")
-    if section.log is not None and section.unit is not None:
-        raise place.error(f"{AT}.unit", "say the unit of a log in [...log] pressure = { unit }")
-    patterns = {f"{AT}.from_name": section.from_name}
-    if section.log is not None:
-        patterns[f"{AT}.log.time_in_name"] = section.log.time_in_name
-    for key, pattern in patterns.items():
-        problem = check_pattern(pattern) if isinstance(pattern, str) else None
-        if problem is not None:
-            raise place.error(key, problem)
+    in_log = "say the unit of a log in [...log] pressure = { unit }"
+    no_column = section.column is None and (section.scale is not None or section.offset)
+    for wrong, key, problem in (
+        (section.frames and asked, "frames", "means nothing where 'pressures' are asked for"),
+        (section.tolerance and asked is None, "tolerance", "means nothing without 'pressures'"),
+        (no_column, "scale", "'scale' and 'offset' here are of a 'column'"),
+        (section.log and section.unit, "unit", in_log),
+    ):
+        if wrong:
+            raise place.error(f"{AT}.{key}", problem)
+    times = section.log is not None and section.log.time_in_name
+    for key, pattern in {"from_name": section.from_name, "log.time_in_name": times}.items():
+        bad = check_pattern(pattern) if isinstance(pattern, str) else None
+        if bad is not None:
+            raise place.error(f"{AT}.{key}", bad)
 
 
 @dataclass(frozen=True)
 class PointFiles:
-    """Measured displacements: files in the order of the pressures, and how they are read.
+    """Measured displacements: files by pressure, how they are read, frames chosen among them.
 
-    recorded : frames and pressures chosen among them; None where the pressures are the project's
-    own, one a frame. correlation : words by the keys of [bubble.data.points.correlation].
+    correlation : words by the keys of [bubble.data.points.correlation].
     """
 
     files: tuple[Path, ...]
@@ -247,10 +226,9 @@ class PointFiles:
 def measured_files(
     section: BubbleSection, place: Place, pressures: Sequence[float] | None
 ) -> PointFiles | None:
-    """Return the files of [bubble.data.points]; None for a known solution.
+    """Return the files of [bubble.data.points]; None for a known solution; raises InputError.
 
-    pressures : MPa, None where the project names none. Raises InputError for both sources of data
-    or none, missing files, and pressures of frames that are unreadable or not those asked for.
+    pressures : MPa, None where the project names none.
     """
     known, points = section.data.known_solution, section.data.points
     if (known is None) == (points is None):
@@ -286,9 +264,7 @@ def _points(points: PointsSection, place: Place) -> PointFiles:
 
 
 def _folder(points: PointsSection, place: Place) -> Path:
-    if place.data_folder is not None:
-        return Path(place.data_folder)
-    return place.path.parent / points.folder
+    return Path(place.data_folder or place.path.parent / points.folder)
 
 
 def _file_names(points: PointsSection, place: Place) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,32 +15,22 @@ from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison, Nuisance
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
-from ...meshes.bubble_model import BubbleModel
+from ...meshes.bubble_model import BubbleModel, default_increments
+from ...meshes.disk import Outline
 from ...meshes.mesh import Mesh
 from ...meshes.reading import FacetReading, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface, read_fields
 from ...readers.frames import FrameSource
-from ..kinds import DataFile, Doubt, Expected, MakeSolver, Masks, Reach, Weighting, joined
+from .. import kinds
+from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precision, Weighting
+from . import objective as matching
 from .doubts import View, doubts_of
-from .objective import (
-    OFFSETS,
-    FieldObjective,
-    FieldTarget,
-    at_nodes,
-    at_points,
-    at_rest,
-    counted_from,
-    folded,
-    mirrored,
-    reading_of,
-    with_places,
-)
+from .objective import FieldObjective, FieldTarget, folded, mirrored
 from .point_files import PointFiles
 from .registration import Registration, register_fields
+from .section import Sheet
 from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
 from .test import PART, BubbleTest, KnownSolution
-
-Array = NDArray[np.float64]
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
 OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
@@ -59,10 +49,9 @@ INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 class PreparedBubble:
     """The test, its fields as read (or computed), and polynomial surfaces of them.
 
-    known : the law behind computed data. surfaces : for the match or the report. registration :
-    of the fields, None where the files were in the test's coordinates. by_this_model : the data
-    were computed with the mesh, the increments and the solver of the fit. sheet : surface and rim
-    as measured.
+    known : the law behind computed data. registration : None where the files were in the test's
+    coordinates. by_this_model : the data were computed with the mesh, the increments and the solver
+    of the fit. sheet : surface and rim as measured.
     """
 
     test: BubbleTest
@@ -87,11 +76,7 @@ class PreparedBubble:
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
-        """Return the points kept without each frame, by its pressure; none of a single frame.
-
-        None, too, where a field that is the same in all frames is projected out: it is known of
-        all of them together only.
-        """
+        """Return the points kept without each frame; none beside a constant field."""
         targets = self.targets
         if self.test.sheet.constant or len(targets) < 2:
             return {}
@@ -101,9 +86,14 @@ class PreparedBubble:
             names = [f"{name} (frame {k + 1})" for k, name in enumerate(names)]
         return {"frames": {name: {self.test.name: frame != k} for k, name in enumerate(names)}}
 
-    def reach(self, masks: Masks) -> Reach:
+    def reach(self, masks: Masks) -> kinds.Reach:
         """Return the test's own: a bubble does not tell how far it is strained."""
         return self.test.reach
+
+    @property
+    def source(self) -> str:
+        """Describe where the fields come from."""
+        return "the known solution" if self.known is not None else "what was measured"
 
     @property
     def dropped(self) -> int:
@@ -135,16 +125,16 @@ class PreparedBubble:
         """Return the fields to match, frame by frame, on the model's mesh; raises InputError."""
         test, mesh, sheet = self.test, self.model.mesh, self.test.sheet
         if test.match_by == "surfaces":
-            targets = at_nodes(self.surfaces, mesh)
+            targets = matching.at_nodes(self.surfaces, mesh)
         elif self.known is not None:
-            targets = at_nodes(self.matched, mesh)
+            targets = matching.at_nodes(self.matched, mesh)
         else:
-            targets, _ = at_points(test, self.matched, mesh)
+            targets, _ = matching.at_points(test, self.matched, mesh)
         try:
             if sheet.constant or sheet.since is not None:
-                targets = with_places(targets, mesh.points[:, :2])
+                targets = matching.with_places(targets, mesh.points[:, :2])
             if sheet.since is not None:
-                targets = counted_from(targets, sheet.since)
+                targets = matching.counted_from(targets, sheet.since)
         except InputError as error:
             raise test.place.error(error.field, error.problem) from None
         return targets
@@ -157,9 +147,8 @@ class PreparedBubble:
         return (own if self.by_this_model and factor > 1 else self._refined(own, factor),)
 
     def _refined(self, own: Comparison, factor: float) -> Comparison:
-        """Return a comparison of quads and increments divided by a factor; below one of quads.
+        """Return a comparison of quads and increments divided by a factor, read as the fit reads.
 
-        Displacements between nodes are read as the fit reads them: that is part of the difference.
         Raises InputError for a mesh too coarse for a disk, or for the places of the data.
         """
         test = self.test
@@ -172,25 +161,24 @@ class PreparedBubble:
         model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
         assert isinstance(own.objective, FieldObjective)
         moved = copy.copy(own.objective)
-        reading = reading_of(test, model.mesh)
+        reading = matching.reading_of(test, model.mesh)
         moved.targets = resampled(own.objective.targets, own.model.mesh, model.mesh, reading)
         return replace(own, model=model, objective=moved)
 
-    def data_files(self) -> Sequence[DataFile]:
+    def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files of the measured fields; none where they were computed."""
-        data = self.test.data
-        logs: Sequence[Path] = ()
-        if isinstance(data, PointFiles) and data.recorded is not None:
-            logs = data.recorded.logs
+        recorded = self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
+        logs = () if recorded is None else recorded.logs
         read = [(field.path, field) for field in self.fields if field.path is not None]
-        frames = [DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
-        return [*joined(frames), *(DataFile(log, FrameSource("log"), None) for log in logs)]
+        frames = [kinds.DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
+        others = [kinds.DataFile(log, FrameSource("log"), None) for log in logs]
+        return [*kinds.joined(frames), *others]
 
     @property
     def matched(self) -> Sequence[DisplacementField]:
         """Return the fields as they are matched: at places without load, folded for a quarter."""
         since = self.test.sheet.since
-        fields = self.fields if since is None else at_rest(self.fields, since)
+        fields = self.fields if since is None else matching.at_rest(self.fields, since)
         return [folded(f) for f in fields] if self.test.symmetry == "quarter" else fields
 
     @property
@@ -203,7 +191,7 @@ class PreparedBubble:
         """Return the number of measured points beyond the model's rim, which are not matched."""
         if self.test.match_by == "surfaces" or self.known is not None:
             return 0
-        return at_points(self.test, self.matched, self.test.model().mesh)[1]
+        return matching.at_points(self.test, self.matched, self.test.model().mesh)[1]
 
     @property
     def view(self) -> View:
@@ -220,7 +208,8 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
     """Return the offsets that the test's section turns on."""
     on: list[Nuisance] = []
     if test.displacement_offset:
-        on += [Nuisance(name, -MOST_SHIFT, MOST_SHIFT, "mm", None, 1.0) for name in OFFSETS]
+        ends = -MOST_SHIFT, MOST_SHIFT
+        on += [Nuisance(name, *ends, "mm", None, 1.0) for name in matching.OFFSETS]
     if test.pressure_offset:
         least = LEAST_SHARE * 1e3 * min(test.increments)
         on.append(Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3))
@@ -233,10 +222,7 @@ def resampled(
     other: Mesh,
     reading: SmoothReading | FacetReading | None = None,
 ) -> tuple[FieldTarget, ...]:
-    """Return the same targets at the same places, from the nodes of another mesh.
-
-    reading : of that mesh, smooth unless given.
-    """
+    """Return the targets at the same places of another mesh; its reading is smooth unless given."""
     reading = reading or SmoothReading.of(other)
     found: list[tuple[Array, sp.csr_matrix]] = []
     moved = []
@@ -302,10 +288,7 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
 def _computed(
     test: BubbleTest, data: KnownSolution, law: HypoelasticLaw, make_solver: MakeSolver
 ) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
-    """Compute the known solution on the data's own mesh; `law` : of the fit, but its coefficients.
-
-    Returns the fields, their law, and whether mesh, increments and solver are those of the fit.
-    """
+    """Return fields, their law, and whether mesh, increments and solver are those of the fit."""
     field = "data.known_solution"
     try:
         form = form_named(data.form, {}, law.strain_range.tolist())
@@ -336,12 +319,11 @@ def _computed(
 
 def _same_steps_and_mesh(test: BubbleTest, data: KnownSolution) -> bool:
     """Return whether the data are of the fit's increments and mesh, whole or folded."""
-    if len(data.increments) != len(test.increments):
+    own, other = np.array(test.increments), np.array(data.increments)
+    if own.shape != other.shape or not np.allclose(other, own, rtol=1e-9, atol=0.0):
         return False
-    if not np.allclose(data.increments, test.increments, rtol=1e-9, atol=0.0):
-        return False
-    own, other = (test.model(elements=n).mesh for n in (test.elements, data.elements))
-    return own.points.shape == other.points.shape and np.allclose(own.points, other.points)
+    own, other = (test.model(elements=n).mesh.points for n in (test.elements, data.elements))
+    return own.shape == other.shape and np.allclose(own, other)
 
 
 def _surfaces(
@@ -350,9 +332,9 @@ def _surfaces(
     """Fit surfaces to every field; too few points leave them out where they are only reported."""
     # A computed quarter is mirrored: surfaces are fitted to the full disk.
     whole = [mirrored(f) if computed else f for f in fields]
-    if test.match_by == "points":
-        if min(len(f.points) for f in whole) < (test.match_degree + 1) ** 2:
-            return ()
+    few = min(len(f.points) for f in whole) < (test.match_degree + 1) ** 2
+    if few and test.match_by == "points":
+        return ()
     try:
         return tuple(fit_surface(f, test.match_degree) for f in whole)
     except InputError as error:
@@ -379,3 +361,108 @@ def _measured(
     except InputError as error:
         field = f"data.points.registration.{error.field}".rstrip(".")
         raise test.place.error(field, error.problem) from None
+
+
+#: Of the highest pressure of the project's own test: frames of one to more pressure.
+FURTHER = (1.25, 1.5)
+#: Minor over major semi-axis of an elliptic rim, and degrees from the warp to the major one.
+SLENDER, ANGLES = 0.5, (0.0, 45.0, 90.0)
+#: Where the project has no bubble: mm, quads of the full disk, places a frame, and pressures in
+#: shares of the highest one.
+RADIUS, ELEMENTS, PLACES = 100.0, 432, 400
+LEVELS = (0.1, 0.25, 0.45, 0.7, 1.0)
+#: Of the strains that the law is known for: what such a bubble is to reach.
+REACHED = 0.7
+
+
+def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+    """Return variants of the project's first bubble, or of a usual one where there is none."""
+    own = [test for test in planning.present if isinstance(test, PreparedBubble)]
+    if own:
+        first, noise_is = own[0].test, f"that of {own[0].test.name}"
+        sight = planning.precision[first.name]
+    else:
+        first, noise_is = _usual(planning), "assumed"
+        sight = Precision(matching.CORRELATION, 1.0, PLACES)
+    if planning.noise is not None:
+        sight, noise_is = replace(sight, noise=planning.noise), "given"
+    # As it would be made: matched at points, in millimetres, its rim at rest.
+    sheet = replace(first.sheet, measured=False, moving_rim=False)
+    first = replace(first, match_by="points", objective="mm", sheet=sheet)
+    tests = {"the same bubble again" if own else "bubble": first}
+    top = first.pressures[-1]
+    more = tuple(f * top for f in FURTHER)
+    pressures, increments = (*first.pressures, *more), (*first.increments, *more)
+    higher = replace(first, pressures=pressures, increments=increments)
+    tests[f"bubble to {1e3 * more[-1]:.4g} kPa"] = higher
+    for angle in ANGLES:
+        tests[f"bubble, elliptic rim at {angle:g} degrees"] = _elliptic(first, angle)
+    return [
+        kinds.Candidate(name, partial(_made, test, sight, planning), noise_is)
+        for name, test in tests.items()
+    ]
+
+
+def _made(test: BubbleTest, sight: Precision, planning: Planning) -> PreparedBubble:
+    """Return the test with the law's displacements at the nodes of its model."""
+    law = planning.law
+    model = with_sheet(test.model(), test.sheet, test.outline, FLAT)
+    history = planning.make_solver().run(model, law)
+    nodes = model.mesh.points[:, :2]
+    test = replace(test, noise=sight.at(len(nodes)))
+    fields = tuple(
+        DisplacementField(p, nodes, u)
+        for p, u in zip(test.pressures, np.asarray(history.displacement), strict=True)
+    )
+    if test.symmetry == "quarter":
+        fields = tuple(folded(field) for field in fields)
+    return PreparedBubble(test, fields, (), law, by_this_model=True)
+
+
+def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
+    """Return the test with a rim as long as its own, at pressures that strain it about as much.
+
+    Of a shallow dome of height h, p = h (N1/a^2 + N2/b^2) up to a factor; alike strained it is h
+    that goes with the minor semi-axis b.
+    """
+    rim = Outline(test.outline.major, SLENDER * test.outline.major, angle)
+    curved = rim.minor * (rim.major**-2 + rim.minor**-2)
+    times = curved * test.outline.radius / 2.0
+    symmetry = test.symmetry if rim.doubly_symmetric else "full"
+    pressures, increments = (tuple(times * p for p in a) for a in (test.pressures, test.increments))
+    return replace(test, outline=rim, symmetry=symmetry, pressures=pressures, increments=increments)
+
+
+def _usual(planning: Planning) -> BubbleTest:
+    """Return a circular test, to a pressure that strains the sheet as far as the law is known."""
+    law, ends = planning.law, planning.ends
+    top = _pressure(law, REACHED * float(min(ends[:2])), planning.place.fabric.thickness)
+    pressures = tuple(share * top for share in LEVELS)
+    increments = default_increments(pressures)
+    return BubbleTest(
+        name="bubble",
+        place=planning.place,
+        weight=1.0,
+        outline=Outline.circle(RADIUS),
+        elements=ELEMENTS,
+        symmetry="quarter",
+        generator="blocks",
+        pressures=pressures,
+        increments=increments,
+        data=KnownSolution(law.beta, law.form.name, ELEMENTS, increments, "quarter"),
+        match_by="points",
+        match_degree=4,
+        objective="mm",
+        displacement_offset=False,
+        pressure_offset=False,
+        sheet=Sheet(),
+    )
+
+
+def _pressure(law: HypoelasticLaw, strain: float, thickness: float) -> float:
+    """Return MPa at a strain of a shallow cap: 2/3 (h/R)^2, curvature 2 h/R^2, mean modulus."""
+    along = np.linspace(0.0, strain, 21)
+    mean = np.mean([law.modulus(name, along).mean() for name in ("E1", "E2")])
+    tension = float(mean) * strain * thickness / (1.0 - law.nu12)
+    height = RADIUS * float(np.sqrt(1.5 * strain))
+    return 4.0 * height * tension / RADIUS**2

@@ -1,16 +1,18 @@
 """Frames of a bubble test brought into the test's coordinates, each step found or given.
 
-The rim is where the sheet does not rise (`rim_of_motion`). The warp follows from symmetry: a disk
-of orthotropic fabric moves symmetrically about warp and fill, whatever the law. In polar components
-about the centre, u_r and u_z then have only cosines of the angle from the warp, u_theta only sines
-(`symmetry_axes`). The sheet's first shape adds much the same at every pressure: two frames are
-subtracted. `register` puts plane, centre, clamp motion and warp together.
+`Placement` moves frames, `plane_through` and `clamp_motion` find where the rim lies, `apex_shape`
+is the polynomial about the centre. The rim is where the sheet does not rise (`rim_of_motion`). A
+disk of orthotropic fabric moves symmetrically about warp and fill: in polar components u_r and u_z
+have only cosines of the angle from the warp, u_theta only sines (`symmetry_axes`). The sheet's
+first shape adds much the same at every pressure: two frames are subtracted. `register` puts plane,
+centre, clamp motion and warp together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import factorial
 from typing import Literal
 
 import numpy as np
@@ -21,26 +23,183 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ...readers.frames import Frame
-from .placement import (
-    LEAST,
-    Placement,
-    RigidMotion,
-    all_applied,
-    apex_shape,
-    axes_angle,
-    clamp_motion,
-    clamp_points,
-    in_all_quarters,
-    line_angle,
-    plane_through,
-    shifted,
-    turned,
-    without,
-)
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
 PlaneOf = Literal["found", "clamp", "edge", "camera"]
+#: Points further from the plane than this many robust deviations do not count.
+FAR = 4.0
+ROUNDS = 20
+#: A median absolute deviation of a normal distribution in standard deviations.
+MAD = 1.4826
+#: Points from this share of the rim's radius on are on the clamp, and so many of them are needed.
+BEYOND, LEAST = 1.03, 12
+#: Points within this share of the radius determine the shape about the centre.
+WITHIN = 0.5
+#: Powers of the polynomial, each up to a total of four.
+POWERS = tuple((i, j) for i in range(5) for j in range(5 - i))
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A right-handed frame in the camera's: `origin` (3,) mm, unit `axes` (3, 3), rows x, y, z."""
+
+    origin: Array
+    axes: Array
+
+    def __post_init__(self) -> None:
+        square = np.allclose(self.axes @ self.axes.T, np.eye(3), atol=1e-9)
+        if not square or np.linalg.det(self.axes) < 0:
+            raise ValueError("expected right-handed, orthonormal axes")
+
+    def places(self, points: Array) -> Array:
+        """Return points (..., 3) of the camera's frame in the test's."""
+        return np.asarray((points - self.origin) @ self.axes.T)
+
+    def applied(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
+        """Return the frames in the test's coordinates."""
+        moved = [np.asarray(frame.displacement @ self.axes.T) for frame in frames]
+        every = zip(frames, moved, strict=True)
+        return tuple(replace(f, points=self.places(f.points), displacement=u) for f, u in every)
+
+    def after(self, first: Placement) -> Placement:
+        """Return the one placement that is `first` and then this."""
+        return Placement(first.origin + self.origin @ first.axes, self.axes @ first.axes)
+
+    @property
+    def tilt(self) -> float:
+        """Return the angle between the two z axes, degrees."""
+        return float(np.degrees(np.arccos(np.clip(self.axes[2, 2], -1.0, 1.0))))
+
+
+def turned(angle: float) -> Placement:
+    """Return the same plane and origin, x turned by `angle` degrees from x towards y."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return Placement(np.zeros(3), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+
+
+def shifted(x: float, y: float, z: float = 0.0) -> Placement:
+    """Return the same axes with the origin moved."""
+    return Placement(np.array([x, y, z], dtype=float), np.eye(3))
+
+
+def plane_through(points: Array, up: Array) -> tuple[Placement, float]:
+    """Fit a plane through points (n, 3); return it and their robust deviation from it in mm.
+
+    Its origin is the mean of the points that count, its z the normal on the side of `up` (3,), its
+    x the camera's x laid into the plane. Raises InputError for points on a line.
+    """
+    points = points[np.isfinite(points).all(axis=1)]
+    kept = np.ones(len(points), dtype=bool)
+    for _ in range(ROUNDS):
+        if kept.sum() < 3:
+            raise InputError(None, "plane", f"expected three points or more, got {kept.sum()}")
+        origin = points[kept].mean(axis=0)
+        _, spread, axes = np.linalg.svd(points[kept] - origin, full_matrices=False)
+        if spread[1] < 1e-6 * spread[0]:
+            raise InputError(None, "plane", "expected points across a surface, got a line")
+        distance = (points - origin) @ axes[2]
+        deviation = MAD * float(np.median(np.abs(distance[kept])))
+        now = np.abs(distance) <= max(FAR * deviation, 1e-9 * spread[0])
+        if (now == kept).all():
+            break
+        kept = now
+    normal = axes[2] * (1.0 if axes[2] @ up >= 0 else -1.0)
+    x = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+    if np.linalg.norm(x) < 0.1:  # the camera looks along its own x
+        x = np.array([0.0, 1.0, 0.0]) - normal[1] * normal
+    x /= np.linalg.norm(x)
+    return Placement(origin, np.stack([x, np.cross(normal, x), normal])), deviation
+
+
+def line_angle(degrees: float) -> float:
+    """Return the angle of a line, which repeats after 180 degrees: from -90 to below 90."""
+    return (degrees + 90.0) % 180.0 - 90.0
+
+
+def axes_angle(degrees: float) -> float:
+    """Return the angle of two axes at right angles, which repeats after 90: -45 to below 45."""
+    return (degrees + 45.0) % 90.0 - 45.0
+
+
+def in_all_quarters(points: NDArray[np.float64]) -> bool:
+    """Return whether points (n, 2 or 3) about the centre lie in all four quarters of its plane."""
+    return len(np.unique(points[:, :2] > 0, axis=0)) == 4
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMotion:
+    """A motion of a rigid body: place -> turn @ place + shift, mm, RMS `left` at so many points."""
+
+    turn: Array
+    shift: Array
+    left: float
+    points: int
+
+    @property
+    def angle(self) -> float:
+        """Return the angle of the turn, degrees."""
+        return float(np.degrees(np.arccos(np.clip((np.trace(self.turn) - 1) / 2, -1.0, 1.0))))
+
+
+UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), float("nan"), 0)
+
+
+def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
+    """Return the rigid motion of the clamp (Kabsch 1976); `UNKNOWN` of too few points around it."""
+    whole = clamp & np.isfinite(frame.displacement).all(axis=1)
+    before = frame.points[whole]
+    if len(before) < LEAST or not in_all_quarters(before):
+        return UNKNOWN
+    after = before + frame.displacement[whole]
+    middle_before, middle_after = before.mean(axis=0), after.mean(axis=0)
+    u, _, v = np.linalg.svd((after - middle_after).T @ (before - middle_before))
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    shift = middle_after - turn @ middle_before
+    rest = after - before @ turn.T - shift
+    return RigidMotion(turn, shift, float(np.sqrt((rest**2).sum(axis=1).mean())), len(before))
+
+
+def without(frame: Frame, motion: RigidMotion) -> Frame:
+    """Return the frame as a clamp that did not move would show it."""
+    after = frame.points + frame.displacement
+    still = (after - motion.shift) @ motion.turn  # the inverse of a rotation is its transpose
+    return replace(frame, displacement=still - frame.points)
+
+
+@dataclass(frozen=True, eq=False)
+class ApexShape:
+    """A polynomial of x and y in radii (mm) about the centre, coefficients (15, values).
+
+    near : (points,) which of those given it was fitted to. terms : (near, 15) at those points.
+    """
+
+    radius: float
+    near: NDArray[np.bool_]
+    terms: Array
+    coefficients: Array
+
+    def at_centre(self, i: int = 0, j: int = 0) -> Array:
+        """Return (values,) differentiated i times by x and j times by y (mm), at the centre."""
+        factor = factorial(i) * factorial(j)
+        solution = self.coefficients[POWERS.index((i, j))]
+        return np.asarray(factor * solution / self.radius ** (i + j))
+
+
+def apex_shape(points: Array, values: Array, radius: float) -> ApexShape:
+    """Fit a polynomial to finite values (n, k) at points (n, 2) mm near the rim's centre.
+
+    Raises InputError for too few.
+    """
+    x = points / radius
+    near = np.isfinite(values).all(axis=1) & (np.hypot(*x.T) < WITHIN)
+    if near.sum() < 2 * len(POWERS):
+        problem = f"expected {2 * len(POWERS)} points about the centre, got {int(near.sum())}"
+        raise InputError(None, "", problem)
+    terms = np.stack([x[near, 0] ** i * x[near, 1] ** j for i, j in POWERS], axis=1)
+    solution, *_ = np.linalg.lstsq(terms, values[near], rcond=None)
+    return ApexShape(radius, near, terms, solution)
+
 
 #: Even and odd powers (of u, of v) of a shape beside the factor that vanishes at the rim.
 EVEN = ((0, 0), (2, 0), (1, 1), (0, 2), (4, 0), (3, 1), (2, 2), (1, 3), (0, 4))
@@ -71,10 +230,9 @@ HIGH = 0.5
 
 @dataclass(frozen=True)
 class Rim:
-    """The clamped edge in the plane of the sheet.
+    """The clamped edge in the plane of the sheet: centre x, y and its standard error, mm.
 
-    x, y : centre, mm. angle : of the first semi-axis from x towards y, degrees (0 for a circle).
-    error : standard error of the centre, mm, from the scatter about the shape. turn_error : of an
+    angle : of the first semi-axis from x towards y, degrees (0 for a circle). turn_error : of an
     angle that was found, degrees; 0 where it was not looked for.
     """
 
@@ -93,14 +251,13 @@ def rim_of_motion(
 ) -> Rim:
     """Find the rim of known size through which the sheet does not rise.
 
-    The rise of every frame is a polynomial of even and odd terms times a factor that is zero on
-    the rim, all about the centre that is looked for, and one constant (the frame's shift along
-    z). Odd terms take what the sheet is not symmetric in: they cannot move the rim.
+    The rise of every frame is a polynomial times a factor that is zero on the rim, about the centre
+    that is looked for, and one constant, the frame's shift along z. Odd terms take what the sheet
+    is not symmetric in: they cannot move the rim.
 
-    surfaces : reference places (n, 2) mm in the plane and rises (n,) mm along its normal, by rising
-    pressure: the last few are taken. semi_axes : mm. start : mm, a guess of the centre. angle :
-    degrees, of the first semi-axis; found unless given where the axes differ. Raises InputError for
-    points that do not come near the rim all around it, and for too few of them.
+    surfaces : places (n, 2) mm in the plane and rises (n,) mm, by rising pressure: the last few are
+    taken. semi_axes, start : mm. angle : degrees, of the first semi-axis; found unless given where
+    the axes differ. Raises InputError for too few points, or none near the rim all around it.
     """
     free = semi_axes[0] != semi_axes[1] and angle is None
     fixed = 0.0 if angle is None else angle
@@ -136,8 +293,7 @@ def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> fl
 
 def _local(points: Array, place: Array, semi_axes: tuple[float, float]) -> Array:
     """Return coordinates (2, n) about a centre x, y, turned by degrees, in semi-axes."""
-    turn = np.radians(place[2])
-    c, s = np.cos(turn), np.sin(turn)
+    c, s = np.cos(np.radians(place[2])), np.sin(np.radians(place[2]))
     x, y = (points - place[:2]).T
     return np.stack([(c * x + s * y) / semi_axes[0], (c * y - s * x) / semi_axes[1]])
 
@@ -170,11 +326,10 @@ def _terms(u: Array, v: Array) -> Array:
 
 @dataclass(frozen=True)
 class Axes:
-    """Two axes of symmetry at right angles.
+    """Two axes of symmetry at right angles, one at `angle` (0 to 90 degrees) from x towards y.
 
-    angle : degrees from x towards y of one of them, 0 to 90. error : standard error, degrees, from
-    frame to frame and between parts of the points. clear : 1 where the field is wholly symmetric
-    about the axes, 0 where no axes are better.
+    error : standard error, degrees, from frame to frame and between parts of the points. clear : 1
+    where the field is wholly symmetric about the axes, 0 where no axes are better.
     """
 
     angle: float
@@ -188,10 +343,7 @@ class Axes:
 
 
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
-    """Return the axes of the frames' even part.
-
-    frames : about the rim's centre, in its plane, by rising pressure. radius : mm.
-    """
+    """Return the axes of the frames' even part; frames about the rim's centre, rising pressure."""
     costs = _costs(frames, radius)
     together = costs.sum(axis=0)
     best = float(ANGLES[np.argmin(together)])
@@ -199,27 +351,25 @@ def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     error = _scatter(costs, best)
     count = min(PARTS, min(len(frame.points) for frame in frames) // ENOUGH)
     if count > 1:
-        parts = [[_part(frame, slice(k, None, count)) for frame in frames] for k in range(count)]
-        by_part = np.array([_costs(part, radius).sum(axis=0) for part in parts])
+        parts = [_costs(frames, radius, slice(k, None, count)) for k in range(count)]
+        by_part = np.array([costs.sum(axis=0) for costs in parts])
         error = float(np.hypot(error, _scatter(by_part, best)))
     total = float(together.max())
     clear = 1.0 - float(together.min()) / total if total > 0 else 0.0
     return Axes(float(np.degrees(best)), error, clear)
 
 
-def _costs(frames: Sequence[Frame], radius: float) -> Array:
-    """Return the asymmetry (frames, angles) of each high frame less the lowest."""
+def _costs(frames: Sequence[Frame], radius: float, every: slice = slice(None)) -> Array:
+    """Return the asymmetry (frames, angles) of some points of each high frame less the lowest."""
+    frames = [
+        replace(f, points=f.points[every], displacement=f.displacement[every]) for f in frames
+    ]
     rise = [float(np.nanmax(frame.displacement[:, 2])) for frame in frames]
     low = [f for f, r in zip(frames, rise, strict=True) if r <= LOW * rise[-1]]
     high = [f for f, r in zip(frames, rise, strict=True) if r > LOW * rise[-1]]
     first = harmonics(low[0], radius) if low else 0.0
-    return np.array(
-        [_asymmetry(harmonics(frame, radius) - first) for frame in high[-FRAMES_SYMMETRY:]]
-    )
-
-
-def _part(frame: Frame, every: slice) -> Frame:
-    return replace(frame, points=frame.points[every], displacement=frame.displacement[every])
+    high = high[-FRAMES_SYMMETRY:]
+    return np.array([_asymmetry(harmonics(frame, radius) - first) for frame in high])
 
 
 def _scatter(costs: Array, best: float) -> float:
@@ -279,11 +429,10 @@ def _asymmetry(profile: Array) -> Array:
 
 @dataclass(frozen=True)
 class WarpDirection:
-    """The direction of the warp by the fields of all frames.
+    """The direction of the warp, -90 to 90 degrees from x towards y, and its standard error.
 
-    angle : degrees from x towards y, from -90 to 90. error : standard error of their mean, degrees.
-    clear : as that of `Axes`; None where the angle is that of an elliptic rim. strains :
-    Green-Lagrange at the centre in the highest frame less those of the lowest, warp and fill.
+    clear : as that of `Axes`; None by an elliptic rim. strains : Green-Lagrange at the centre in
+    the highest frame less those of the lowest, warp and fill.
     """
 
     angle: float
@@ -297,8 +446,7 @@ def warp_of_field(
 ) -> WarpDirection:
     """Find the axis of symmetry along which the centre is strained less (warp stiff), or more.
 
-    frames : about the rim's centre, in its plane, by rising pressure. Raises InputError for too few
-    points about the centre, and for a field without clear axes.
+    Raises InputError for too few points about the centre, and for a field without clear axes.
     """
     axes = symmetry_axes(frames, radius)
     if axes.error > UNSURE or axes.clear < CLEAR:
@@ -312,24 +460,6 @@ def warp_of_field(
     if (along > across) == warp_is_stiff:
         angle, along, across = angle + 90.0, across, along
     return WarpDirection(line_angle(angle), axes.error, axes.clear, (along, across))
-
-
-def warp_of_rim(
-    frames: Sequence[Frame], radius: float, rim: Rim, rim_angle: float
-) -> WarpDirection:
-    """Find the warp by an elliptic rim with its first semi-axis at `rim_angle` (degrees) from it.
-
-    A sheet with an edge that is an ellipse turned to the yarns has no axes of symmetry. Raises
-    InputError for an ellipse too round to tell its turn.
-    """
-    if rim.turn_error > UNSURE:
-        problem = (
-            f"the rim is too round to tell the warp (turned by {rim.angle:.0f} +- "
-            f"{rim.turn_error:.0f} degrees); give the angle"
-        )
-        raise InputError(None, "warp", problem)
-    angle = line_angle(rim.angle - rim_angle)
-    return WarpDirection(angle, rim.turn_error, None, _strains(frames, radius, angle))
 
 
 def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
@@ -364,14 +494,12 @@ def warp_of_points(first: Array, second: Array) -> float:
 class RegistrationOptions:
     """The given steps of a registration; everything else is found.
 
-    plane : of the rim: through points on the "clamp", through the "edge" of the sheet, the
-    "camera"'s own x and y, or "found": the clamp where it was seen, else the edge. centre : (3,) of
-    the rim in the camera's coordinates, mm. rim_angle : degrees, of the first semi-axis of an
-    ellipse from the warp towards the fill. warp : degrees from the camera's x to the warp, towards
-    the camera's y where the sheet rises towards the camera's z. warp_points : two marks along the
-    warp in the camera's coordinates, mm. warp_is_stiff : whether the direction strained less is the
-    warp, where it is found. remove_clamp_motion : whether the clamp's rigid motion is taken out of
-    every frame.
+    plane : through points on the "clamp", through the "edge" of the sheet, the "camera"'s own x and
+    y, or "found": the clamp where it was seen, else the edge. centre, warp_points : (3,) of the rim
+    and two marks along the warp, mm, in the camera's coordinates. rim_angle : degrees, of the first
+    semi-axis of an ellipse from the warp towards the fill. warp : degrees from the camera's x,
+    towards its y where the sheet rises towards its z. warp_is_stiff : the direction strained less
+    is the warp, where it is found.
     """
 
     plane: PlaneOf = "found"
@@ -396,10 +524,9 @@ class Registration:
     """The result of a registration, and how each step came about.
 
     placement : of the test's coordinates in the camera's. plane_of : "clamp", "edge" or "camera".
-    flatness : mm, robust deviation of its points. rim : in the plane, x along the warp, about the
-    origin; None where the centre is given. warp : None where its direction is given. warp_angle :
-    degrees, as `RegistrationOptions.warp`. motions : of the clamp, one a frame, in the test's
-    coordinates. options : as they were given.
+    flatness : mm, robust deviation of its points. rim : x along the warp; None where the centre is
+    given. warp : None where it is given. warp_angle : degrees, as `RegistrationOptions.warp`.
+    motions : of the clamp, one a frame, in the test's coordinates.
     """
 
     placement: Placement
@@ -419,10 +546,9 @@ def register(
 ) -> tuple[tuple[Frame, ...], Registration]:
     """Return the frames in the test's coordinates, and how these were found.
 
-    frames : in the camera's coordinates, mm, by rising pressure; the rim must not turn by more
-    than rounding between frames, unless the clamp is seen. semi_axes : of the rim, mm; equal for a
-    circle, first the one that `rim_angle` belongs to. Raises InputError for a step that cannot be
-    found and must be given.
+    frames : in the camera's coordinates, mm, by rising pressure; unless the clamp is seen, the rim
+    must not turn between them. semi_axes : of the rim, mm, first the one that `rim_angle` belongs
+    to. Raises InputError for a step that cannot be found and must be given.
     """
     reference = frames[-1]
     moving = reference.displacement[np.isfinite(reference.displacement).all(axis=1)]
@@ -443,9 +569,9 @@ def register(
         points, plane_of = _rim_points(places, Outline(*semi_axes, angle), options)
         placement, flatness = plane_through(reference.points[points], up)
         placement, rim = _centred(frames, placement, semi_axes, options)
-    moved = all_applied(placement, frames)
+    moved = placement.applied(frames)
     outline = Outline(*semi_axes, _rim_angle(placement, rim, options))
-    motions = tuple(clamp_motion(frame, clamp_points(frame.points, outline)) for frame in moved)
+    motions = tuple(clamp_motion(f, outline.share(f.points[:, :2]) > BEYOND) for f in moved)
     if options.remove_clamp_motion:
         moved = tuple(without(f, m) for f, m in zip(moved, motions, strict=True))
     angle, warp = _warp(moved, placement, semi_axes, rim, options)
@@ -456,7 +582,7 @@ def register(
     full = turn.after(placement)
     x = full.axes @ np.array([1.0, 0.0, 0.0])
     from_camera_x = line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))
-    return all_applied(turn, moved), Registration(
+    return turn.applied(moved), Registration(
         full, plane_of, flatness, rim, warp, from_camera_x, motions, options
     )
 
@@ -471,15 +597,14 @@ def _centred(
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
         return shifted(place[0], place[1]).after(placement), None
-    seen = [_whole(frame) for frame in all_applied(placement, frames)]
+    seen = [_whole(frame) for frame in placement.applied(frames)]
     surfaces = [(points[:, :2], displacement[:, 2]) for points, displacement in seen]
     top = surfaces[-1][1].max()
     surfaces = [one for one in surfaces if one[1].max() > HIGH * top]
     points, rise = surfaces[-1]
     weight = np.clip(rise, 0.0, None)
     start = (weight[:, None] * points).sum(axis=0) / weight.sum()
-    angle = options.rim_angle
-    warp = _given_warp(placement, options)
+    angle, warp = options.rim_angle, _given_warp(placement, options)
     if angle is not None and warp is not None:
         angle += warp
     elif semi_axes[0] != semi_axes[1]:
@@ -501,7 +626,7 @@ def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptio
 def _rim_points(
     points: Array, outline: Outline, options: RegistrationOptions
 ) -> tuple[NDArray[np.bool_], str]:
-    beyond = clamp_points(points, outline)
+    beyond = outline.share(points[:, :2]) > BEYOND
     seen = beyond.sum() >= LEAST and in_all_quarters(points[beyond])
     if options.plane == "clamp" and not seen:
         problem = "too few points beyond the rim to lay a plane through the clamp; choose 'edge'"
@@ -535,21 +660,25 @@ def _warp(
     elif rim is None:
         problem = "expected the warp, too, where the centre of an elliptic rim is given"
         raise InputError(None, "warp", problem)
+    elif rim.turn_error > UNSURE:
+        problem = (
+            f"the rim is too round to tell the warp (turned by {rim.angle:.0f} +- "
+            f"{rim.turn_error:.0f} degrees); give the angle"
+        )
+        raise InputError(None, "warp", problem)
     else:
-        found = warp_of_rim(frames, min(semi_axes), rim, options.rim_angle)
+        angle = line_angle(rim.angle - options.rim_angle)
+        strains = _strains(frames, min(semi_axes), angle)
+        found = WarpDirection(angle, rim.turn_error, None, strains)
     return found.angle, found
 
 
 def register_fields(
-    fields: Sequence[DisplacementField],
-    outline: Outline,
-    options: RegistrationOptions = ALL_FOUND,
+    fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
 ) -> tuple[tuple[DisplacementField, ...], Registration]:
-    """Register fields by rising pressure as `register` does frames.
+    """Register fields by rising pressure as `register` does frames; outline from the warp.
 
-    outline : of the rim, its angle counted from the warp. Without a measured height of the
-    reference state the sheet is taken to lie in the camera's plane; a plane to be found without
-    one raises InputError.
+    Without measured heights the plane is the camera's; one to be found raises InputError.
     """
     measured = all(field.z is not None for field in fields)
     if not measured:
@@ -564,6 +693,6 @@ def register_fields(
     moved = []
     for field, frame in zip(fields, frames, strict=True):
         z = frame.points[:, 2] if measured else None
-        xy, u = frame.points[:, :2], frame.displacement
-        moved.append(replace(field, points=xy, z=z, displacement=u))
+        own = replace(field, points=frame.points[:, :2], z=z, displacement=frame.displacement)
+        moved.append(own)
     return tuple(moved), registration

@@ -1,4 +1,4 @@
-"""The presenter of bubble tests: what a fit says of one, its page, a look at its data, simulations.
+"""The presenter of bubble tests.
 
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
 fit, `residuals` the table of all matched values, `simulate` the results of forward analyses.
@@ -24,42 +24,15 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField, write_surfaces
-from ...reports.bubbles import (
-    chosen,
-    clock_charts,
-    cut_charts,
-    disk_charts,
-    height_charts,
-    kilo,
-    left_out,
-    ranks,
-    registration_charts,
-    rise_charts,
-)
+from ...reports import bubbles
 from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
 from ...reports.maps import Maps, Shade, Solid, maps_of, pack, write_pvd, write_vtu
 from ...reports.vega import save
 from ...solvers.base import History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
-from .findings import (
-    clock_words,
-    constant_field,
-    fitted_model,
-    match_warnings,
-    nuisance_lines,
-    objective_of,
-    read_numbers,
-    recorded_lines,
-    recorded_numbers,
-    recorded_of,
-    registration_line,
-    registration_numbers,
-    sheet_lines,
-    sheet_numbers,
-    sheet_warnings,
-    used_of,
-)
+from . import findings as wording
+from .findings import fitted_model, objective_of
 from .objective import displacement_offset
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
@@ -69,7 +42,6 @@ from .sheet import at_nodes, inflated_sheets
 from .test import PART, BubbleTest, apex_heights
 
 Array = NDArray[np.float64]
-
 #: What each choice of the plane means.
 PLANES = {
     "clamp": "through the points beyond the rim",
@@ -125,16 +97,16 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "matched_by": test.match_by,
             "places": [len(t.displacement) for t in objective.targets],
             "doubtful_dropped": prepared.dropped,
-            **read_numbers(prepared),
+            **wording.read_numbers(prepared),
             "outside_dropped": prepared.outside,
         },
     }
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    taken = recorded_of(prepared)
+    taken = wording.recorded_of(prepared)
     if taken is not None:
-        numbers["data"]["pressures"] = recorded_numbers(taken)
-        lines += recorded_lines(taken)
-    numbers["sheet"] = sheet_numbers(prepared, fitted)
+        numbers["data"]["pressures"] = wording.recorded_numbers(taken)
+        lines += wording.recorded_lines(taken)
+    numbers["sheet"] = wording.sheet_numbers(prepared, fitted)
     if prepared.surfaces:
         numbers["surface_r_squared"] = [s.r_squared.tolist() for s in prepared.surfaces]
     notes = dict.fromkeys(note for field in prepared.fields for note in field.source.notes)
@@ -149,24 +121,17 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         )
         lines.append(f"largest error of the moduli over the strain reached: {said}")
     if prepared.registration is not None:
-        numbers["registration"] = registration_numbers(prepared.registration)
-        lines.append(registration_line(prepared.registration))
-    lines += [*sheet_lines(numbers["sheet"]), *nuisance_lines(fitted)]
-    return Findings(
-        numbers,
-        (*sheet_warnings(prepared), *match_warnings(prepared)),
-        tuple(lines),
-        f"mean |dx|+|dy|+|dz| {mean:.4g} mm",
-        f"mean |dx| + |dy| + |dz| = {mean:.3g} mm",
-    )
+        numbers["registration"] = wording.registration_numbers(prepared.registration)
+        lines.append(wording.registration_line(prepared.registration))
+    lines += [*wording.sheet_lines(numbers["sheet"]), *wording.nuisance_lines(fitted)]
+    warnings = (*wording.sheet_warnings(prepared), *wording.match_warnings(prepared))
+    quality = f"mean |dx|+|dy|+|dz| {mean:.4g} mm"
+    summary = f"mean |dx| + |dy| + |dz| = {mean:.3g} mm"
+    return Findings(numbers, warnings, tuple(lines), quality, summary)
 
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
-    """Return a row a place, pressure and direction.
-
-    Columns part, frame (the number of the pressure, from 1), pressure_kPa, x_mm, y_mm, quantity
-    (dx, dy, dz), measured, modelled, difference (modelled less measured, offset included), unit.
-    """
+    """Return a row a place, pressure (`frame`, from 1) and direction; offsets included."""
     objective, frames = objective_of(fitted), []
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
@@ -185,37 +150,43 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
             }
             frames.append(pd.DataFrame(columns))
     table = pd.concat(frames, ignore_index=True)
-    table["difference"] = table["modelled"] - table["measured"]
-    table["unit"] = objective.unit
-    return table
+    return table.assign(difference=table["modelled"] - table["measured"], unit=objective.unit)
 
 
 def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write the figures, surfaces.csv and bubble.pvd with its files; return the test's page."""
-    left, cuts = left_at_nodes(fitted), profile_charts(prepared, fitted)
+    left, cuts, name = left_at_nodes(fitted), profile_charts(prepared, fitted), prepared.test.name
+    objective = objective_of(fitted)
+    modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
+    pressures = [t.pressure for t in objective.targets]
+    seen = [t.displacement[:, 2] for t in objective.targets]
+    source = "known solution" if prepared.known is not None else "measured"
+    heights = bubbles.height_charts(pressures, seen, [own[:, 2] for own in modelled], source)
     series = out.path("bubble.pvd")
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
+    surfaces = []
+    if prepared.surfaces:
+        with replacing(out.path("surfaces.csv")) as path:
+            write_surfaces(prepared.surfaces, path)
+        surfaces.append((out.name("surfaces.csv"), "polynomial surfaces of the data"))
     files = [
-        *write_surface_table(prepared, out),
+        *surfaces,
         (series.name, "the inflated bubble pressure by pressure, for ParaView"),
-        *_pictures(prepared, fitted, cuts, out),
+        _saved(out, "profiles.png", cuts, f"{name}: cuts through the bubble along warp and fill"),
+        _saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
         *sheet_files,
     ]
     tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
-    taken = recorded_of(prepared)
+    taken = wording.recorded_of(prepared)
     if taken is not None:
         tables.insert(0, recorded_table(taken))
         figures += clock_pictures(taken, out)
-    parts: list[Part] = [
-        cuts,
-        field_maps(prepared, fitted),
-        bubble_solid(prepared, fitted, left),
-        residual_chart(prepared, fitted),
-    ]
+    shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
+    parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
     facts, record = _facts(prepared, findings), correlation_table(prepared)
     return Exhibit(facts, figures, tables, files, parts, record)
 
@@ -231,32 +202,13 @@ def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, obje
         facts.append(("displacement offset, mm", ", ".join(f"{v:.3f}" for v in shift)))
     if pressure is not None:
         facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
-    (sheet,) = sheet_lines(numbers["sheet"])
+    (sheet,) = wording.sheet_lines(numbers["sheet"])
     return [*facts, ("sheet", sheet.removeprefix("sheet: "))]
 
 
 def _saved(out: Output, name: str, charts: Charts, caption: str) -> Shown:
     save(out.path(name), charts)
     return out.name(name), caption
-
-
-def _pictures(
-    prepared: PreparedBubble, fitted: FittedTest, cuts: Charts, out: Output
-) -> list[Shown]:
-    """Write cuts and heights against what was measured, as pictures beside the page."""
-    name, objective = prepared.test.name, objective_of(fitted)
-    modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
-    heights = height_charts(
-        [t.pressure for t in objective.targets],
-        [t.displacement[:, 2] for t in objective.targets],
-        [own[:, 2] for own in modelled],
-        "known solution" if prepared.known is not None else "measured",
-    )
-    words = f"{name}: cuts through the bubble along warp and fill"
-    return [
-        _saved(out, "profiles.png", cuts, words),
-        _saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
-    ]
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
@@ -277,9 +229,7 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
     residual = objective.residual(fitted.histories[0], fitted.nuisance)
     norms = Blocks(objective.sizes).norms(residual).reshape(-1, 3).tolist()
     of = "over the largest measured value" if prepared.test.objective == "e" else "in mm"
-    rows: list[list[object]] = [
-        [1e3 * t.pressure, *own] for t, own in zip(objective.targets, norms, strict=True)
-    ]
+    rows = [[1e3 * t.pressure, *own] for t, own in zip(objective.targets, norms, strict=True)]
     header = ["pressure, kPa", "x", "y", "z"]
     return Table("Misfit by pressure", header, rows, f"RMS error {of}, direction by direction")
 
@@ -298,29 +248,16 @@ def surface_tables(prepared: PreparedBubble) -> list[Table]:
     return [Table(title, ["pressure, kPa", "x", "y", "z"], rows, note)]
 
 
-def write_surface_table(prepared: PreparedBubble, out: Output) -> list[Shown]:
-    """Write surfaces.csv, where there are surfaces."""
-    if not prepared.surfaces:
-        return []
-    with replacing(out.path("surfaces.csv")) as path:
-        write_surfaces(prepared.surfaces, path)
-    return [(out.name("surfaces.csv"), "polynomial surfaces of the data")]
-
-
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return heights along both axes: lines of the model, dots of what was measured."""
-    return cut_charts(
+    return bubbles.cut_charts(
         f"{prepared.test.name} cuts",
         prepared.test.pressures,
         fitted.comparisons[0].model.mesh.points,
         fitted.histories[0].displacement + displacement_offset(fitted.nuisance),
         [(seen.points, seen.displacement) for seen in prepared.fields],
-        f"{prepared.test.name}: lines are the model, dots {_source(prepared)}.",
+        f"{prepared.test.name}: lines are the model, dots {prepared.source}.",
     )
-
-
-def _source(prepared: PreparedBubble) -> str:
-    return "the known solution" if prepared.known is not None else "what was measured"
 
 
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
@@ -328,21 +265,23 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     objective = objective_of(fitted)
     left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
     targets = objective.targets
-    numbers, charts = chosen(len(targets)), []
+    numbers, charts = bubbles.chosen(len(targets)), []
     for axis, name in enumerate(DIRECTIONS):
         series = []
-        for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
+        for rank, k in zip(bubbles.ranks(len(numbers)), numbers, strict=True):
             every = slice(None, None, max(1, -(-len(left[k]) // POINTS)))
             height = np.asarray(targets[k].displacement)[every, 2]
-            series.append(dots(kilo(targets[k].pressure), height, left[k][every, axis], rank=rank))
+            series.append(
+                dots(bubbles.kilo(targets[k].pressure), height, left[k][every, axis], rank=rank)
+            )
         rms = float(np.sqrt(np.mean(np.concatenate([own[:, axis] for own in left]) ** 2)))
         title = f"{name}: RMS {rms:.2g} mm"
         alt = f"modelled less measured {name} over the measured height, {rms:.2g} mm RMS"
-        charts.append(
-            Chart(title, "measured dz, mm", "modelled − measured, mm", series, alt, level=0.0)
-        )
-    caption = f"{prepared.test.name}: what is left, over the measured height."
-    return Charts(f"{prepared.test.name} residual", charts, caption + left_out(len(targets)))
+        axes = "measured dz, mm", "modelled − measured, mm"
+        charts.append(Chart(title, *axes, series, alt, level=0.0))
+    own, unseen = prepared.test.name, bubbles.left_out(len(targets))
+    caption = f"{own}: what is left, over the measured height.{unseen}"
+    return Charts(f"{own} residual", charts, caption)
 
 
 def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
@@ -358,13 +297,13 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
         a, b, c = ([own[:, k] for own in one] for one in (measured, modelled, left))
         rows.append((quantity, "mm", a, b, c))
     caption = (
-        f"{name}: displacement of {_source(prepared)}, of the model, and their difference. Colours "
+        f"{name}: displacement of {prepared.source}, of the model, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."
     )
     if objective.constant:
         caption += " From the difference a field is taken out that is the same at all pressures."
     return maps_of(
-        f"{name} maps", "pressure", [kilo(t.pressure) for t in targets],
+        f"{name} maps", "pressure", [bubbles.kilo(t.pressure) for t in targets],
         [target.at(nodes) for target in targets], rows, LABELS, caption,
         f"maps of dx, dy and dz of {name}",
     )  # fmt: skip
@@ -373,10 +312,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
 def bubble_solid(
     prepared: PreparedBubble, fitted: FittedTest, left: Sequence[Array | None]
 ) -> Solid:
-    """Return the modelled surface at every pressure of the test.
-
-    left : (nodes, 3) mm a pressure, between model and measurement; None where nothing is matched.
-    """
+    """Return the modelled surface at every pressure; left (nodes, 3) mm."""
     test, model = prepared.test, fitted_model(fitted)
     mesh, sheets = model.mesh, list(inflated_sheets(model, fitted.histories[0], fitted.law))
     signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
@@ -403,7 +339,7 @@ def bubble_solid(
     )
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
-        f"{test.name} bubble", [kilo(sheet.pressure) for sheet in sheets], "pressure",
+        f"{test.name} bubble", [bubbles.kilo(sheet.pressure) for sheet in sheets], "pressure",
         pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
     )  # fmt: skip
 
@@ -429,7 +365,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     if view.apexes:
         tables.append(_equilibrium(prepared))
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
-    rises = rise_charts([field.pressure for field in prepared.fields], view.rises)
+    rises = bubbles.rise_charts([field.pressure for field in prepared.fields], view.rises)
     figure = _saved(out, "rises.png", rises, "rise about the centre against pressure")
     return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
 
@@ -467,28 +403,28 @@ def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
     """Write figures and files of the surface and of a constant field, where there are any."""
-    figures: list[Shown] = []
-    files: list[Shown] = []
+    figures, files = list[Shown](), list[Shown]()
     sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         columns = dict(zip(("x_mm", "y_mm", "z0_mm"), points.T, strict=True))
         _write(out, "reference_surface.csv", columns)
-        charts = disk_charts([("z0, mm", points[:, :2], points[:, 2])], edge)
-        how = " and ".join(w for w in used_of(prepared) if w in ("measured surface", "modes"))
+        charts = bubbles.disk_charts([("z0, mm", points[:, :2], points[:, 2])], edge)
+        shapes = ("measured surface", "modes")
+        how = " and ".join(used for used in wording.used_of(prepared) if used in shapes)
         words = "surface of the sheet in the reference picture"
         caption = f"{prepared.test.name}: {words} ({how})"
         figures.append(_saved(out, "reference_surface.png", charts, caption))
         files.append((out.name("reference_surface.csv"), f"{words}, node by node"))
     if sheet.constant:
-        places, field = constant_field(fitted)
+        places, field = wording.constant_field(fitted)
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
         columns = {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns}
         _write(out, "constant_field.csv", columns)
         words = "measured less modelled, as far as it is the same at all pressures"
         caption = f"Taken out of the fit: {words}"
-        figures.append(_saved(out, "constant_field.png", disk_charts(own, edge), caption))
+        figures.append(_saved(out, "constant_field.png", bubbles.disk_charts(own, edge), caption))
         files.append((out.name("constant_field.csv"), f"{words}, point by point"))
     return figures, files
 
@@ -513,7 +449,7 @@ def recorded_table(taken: RecordedFrames) -> Table:
     dropped = "".join(f"; {count} {why}" for why, count in taken.left_out.items())
     note = f"pressures from {taken.source}; {len(rows)} of {taken.count} frames{dropped}"
     if taken.clock is not None:
-        note += ". " + clock_words(taken.clock)
+        note += ". " + wording.clock_words(taken.clock)
     return Table("Frames taken", list(columns), rows, note)
 
 
@@ -523,7 +459,7 @@ def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
     if clock is None:
         return []
     times = clock.times + clock.offset
-    charts = clock_charts(times, clock.pressure, clock.heights, taken.pressure)
+    charts = bubbles.clock_charts(times, clock.pressure, clock.heights, taken.pressure)
     words = "pressures of the log and heights of the frames, by one clock"
     return [_saved(out, "clock.png", charts, words)]
 
@@ -570,7 +506,7 @@ def registration_picture(
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))
-    charts = registration_charts(last.points, maps, outline.edge())
+    charts = bubbles.registration_charts(last.points, maps, outline.edge())
     words = "measured points in the test's coordinates, the rim, warp and fill"
     return _saved(out, "registration.png", charts, words)
 
@@ -580,7 +516,10 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     test = prepared.test
     if not isinstance(test.data, PointFiles) or not prepared.fields:
         return []
-    given = {**_of_filter(test), **test.data.correlation}
+    facet = () if test.facet is None else (("subset", test.facet.size), ("step", test.facet.step))
+    given = {key: words for key, value in facet if (words := _mm(value))} | {
+        **test.data.correlation
+    }
     formats = sorted({f.source.format for f in prepared.fields if f.source.format})
     points = [len(f.points) for f in prepared.fields]
     software = [given.get("software", ""), ", ".join(formats)]
@@ -598,14 +537,6 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     return [Table(f"Image correlation: {test.name}", ["", ""], rows, GUIDE, text=(1,))]
 
 
-def _of_filter(test: BubbleTest) -> dict[str, str]:
-    """Return what the section of the camera's own filter says, mm."""
-    if test.facet is None:
-        return {}
-    said = {"subset": _mm(test.facet.size), "step": _mm(test.facet.step)}
-    return {key: words for key, words in said.items() if words}
-
-
 def _mm(value: float | None) -> str:
     return "" if value is None else f"{value:.3g} mm"
 
@@ -619,9 +550,7 @@ def write_series(
 ) -> Path:
     """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
 
-    Point data: displacement (mm), and residual_mm, measured less modelled, where there are
-    `residuals` (nodes, 3), one a reported pressure. Cell data: log_strain_1_2_12,
-    stress_1_2_12_MPa, wrinkling (0 taut, 1 wrinkled, 2 slack). Raises OutputError.
+    residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without.
     """
     folder, files = path.with_name(f"{path.stem}-vtu"), []
     for number, sheet in enumerate(inflated_sheets(model, history, law)):
@@ -664,7 +593,7 @@ def simulate(
         with replacing(out.path(f"displacement{suffix}.csv")) as path:
             displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
-        cuts = cut_charts(name, test.pressures, model.mesh.points, history.displacement)
+        cuts = bubbles.cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
@@ -680,16 +609,9 @@ def simulate(
 def displacement_table(model: BubbleModel, history: History) -> pd.DataFrame:
     """Return a row a node and pressure: pressure_kPa, node, x_mm, y_mm, dx_mm, dy_mm, dz_mm."""
     x, y = model.mesh.points[:, :2].T
-    frames = [
-        pd.DataFrame(
-            {
-                "pressure_kPa": np.full(len(x), 1e3 * load),
-                "node": np.arange(len(x)),
-                "x_mm": x,
-                "y_mm": y,
-                **{f"{name}_mm": u[:, k] for k, name in enumerate(DIRECTIONS)},
-            }
-        )
-        for load, u in zip(history.load, history.displacement, strict=True)
-    ]
+    frames = []
+    for load, u in zip(history.load, history.displacement, strict=True):
+        columns = {"pressure_kPa": 1e3 * load, "node": np.arange(len(x)), "x_mm": x, "y_mm": y}
+        columns |= {f"{name}_mm": u[:, k] for k, name in enumerate(DIRECTIONS)}
+        frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)

@@ -56,11 +56,7 @@ class FilterSection(Section):
 def facet_of(
     section: FilterSection | None, place: Place, scale: float, symmetry: str, match: str
 ) -> Facet | None:
-    """Return the facet of a section, in mm; None where points are read as they are.
-
-    scale : mm per unit of the project's lengths. Raises InputError for an impossible facet, a
-    quarter model, and surfaces that are matched.
-    """
+    """Return the facet in mm, None without one; scale: mm per unit; raises InputError."""
     if section is None:
         return None
     at = "data.points.filter"
@@ -96,16 +92,17 @@ def outline_of(section: BubbleSection, place: Place) -> Outline:
     else:
         problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
         raise place.error("radius", problem)
-    key = "radius" if ellipse is None else "ellipse.minor"
-    if outline.minor > outline.major:
-        problem = f"expected at most the major {outline.major:g} mm, got {outline.minor:g} mm"
-        raise place.error(key, f"{problem}; 'angle' is that of the major semi-axis")
-    if outline.major > MOST_SLENDER * outline.minor:
-        problem = f"expected at least the {MOST_SLENDER:g}th part of the major {outline.major:g} mm"
-        raise place.error(key, f"{problem}, got {outline.minor:g} mm")
-    if place.fabric.thickness >= outline.minor:
-        problem = f"expected more than the fabric's thickness {place.fabric.thickness:g} mm"
-        raise place.error(key, f"{problem}, got {outline.minor:g} mm")
+    major, minor, thickness = outline.major, outline.minor, place.fabric.thickness
+    least = f"at least the {MOST_SLENDER:g}th part of the major {major:g} mm"
+    of_major = "; 'angle' is that of the major semi-axis"
+    for wrong, expected, more in (
+        (minor > major, f"at most the major {major:g} mm", of_major),
+        (major > MOST_SLENDER * minor, least, ""),
+        (thickness >= minor, f"more than the fabric's thickness {thickness:g} mm", ""),
+    ):
+        if wrong:
+            key = "radius" if ellipse is None else "ellipse.minor"
+            raise place.error(key, f"expected {expected}, got {minor:g} mm{more}")
     if section.symmetry == "quarter" and not outline.doubly_symmetric:
         axes = f"the axes of the ellipse lie at {outline.angle:g} degrees from the yarns"
         raise place.error("symmetry", f"{axes}: needs 'full'")
@@ -163,10 +160,7 @@ class RegistrationSection(Section):
 def registration_options(
     section: RegistrationSection | None, place: Place, scale: float
 ) -> RegistrationOptions | None:
-    """Return the given steps in mm; None where the files are in the test's coordinates.
-
-    scale : mm per unit of the files' lengths. Raises InputError for an angle and two points.
-    """
+    """Return the given steps in mm, None without a section; scale: mm per unit of the files."""
     if section is None:
         return None
     marks = [_point(one, scale) for one in section.warp_points or ()]
@@ -212,13 +206,12 @@ class SheetSection(Section):
 class Sheet:
     """The first shape of the sheet, and its unknowns.
 
-    measured : whether the measured z is the reference surface. degree : of the polynomials through
-    measured heights and the measured motion of the rim. modes : number of unknown shapes of the
-    surface; prior : mm, one standard deviation of each. slack : whether it is unknown in both
-    directions; slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against
-    which priors are weighed. moving_rim : whether the rim follows the measurement. constant :
-    directions (0 to 2) in which a field that is the same at all pressures is projected out. since :
-    number of the frame from which displacements are counted, None for the reference picture.
+    measured : the measured z is the reference surface. degree : of the polynomials through measured
+    heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
+    slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against which priors
+    are weighed. moving_rim : the rim follows the measurement. constant : directions (0 to 2) in
+    which a field that is the same at all pressures is projected out. since : number of the frame
+    from which displacements are counted, None for the reference picture.
     """
 
     measured: bool = False
@@ -246,41 +239,39 @@ def sheet_of(
     of_files: bool,
     offset: bool,
 ) -> Sheet:
-    """Return the section in mm; pressures are in MPa.
+    """Return the section in mm; pressures in MPa; raises InputError for keys at odds.
 
-    of_files : whether the data are measured points. offset : whether a displacement offset is an
-    unknown. Raises InputError for keys that do not go together.
+    of_files : the data are measured points. offset : a displacement offset is an unknown.
     """
     for key in ("surface", "rim"):
         if not of_files and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
-    if symmetry == "quarter":
-        if section.surface == "measured":
-            raise place.error("sheet.surface", f"a measured surface: {FULL}")
-        if not doubly_symmetric(section.modes):
-            raise place.error("sheet.modes", f"{section.modes} modes: {FULL}")
-    for key, what, needs in (
-        ("prior", "modes", section.modes),
-        ("slack_prior", "slack", section.slack),
-        ("misfit", "modes or slack", section.modes or section.slack),
+    given, since = section.model_fields_set, _frame(section, place, pressures)
+    quarter, measured = symmetry == "quarter", section.surface == "measured"
+    unknown, taken = section.modes or section.slack, since is not None or section.constant_field
+    stressed = "a surface measured under pressure is not without stress: use modes instead"
+    out = "takes up what from_pressure and constant_field take out; use one of them"
+    twice = "takes out what from_pressure takes out already; use one of them"
+    no = "not asked for"
+    few = "nothing is left of the data of one pressure"
+    modes = quarter and not doubly_symmetric(section.modes)
+    slack = "slack_prior" in given and not section.slack
+    for wrong, key, problem in (
+        (quarter and measured, "sheet.surface", f"a measured surface: {FULL}"),
+        (modes, "sheet.modes", f"{section.modes} modes: {FULL}"),
+        ("prior" in given and not section.modes, "sheet.prior", f"belongs to modes, {no}"),
+        (slack, "sheet.slack_prior", f"belongs to slack, {no}"),
+        ("misfit" in given and not unknown, "sheet.misfit", f"belongs to modes or slack, {no}"),
+        (since is not None and measured, "sheet.from_pressure", stressed),
+        (offset and taken, "nuisance.displacement_offset", out),
+        (since is not None and section.constant_field, "sheet.constant_field", twice),
+        (section.constant_field and len(pressures) < 2, "sheet.constant_field", few),
     ):
-        if key in section.model_fields_set and not needs:
-            raise place.error(f"sheet.{key}", f"belongs to {what}, not asked for")
-    since = _frame(section, place, pressures)
-    if since is not None and section.surface == "measured":
-        problem = "a surface measured under pressure is not without stress: use modes instead"
-        raise place.error("sheet.from_pressure", problem)
-    if offset and (since is not None or section.constant_field):
-        problem = "takes up what from_pressure and constant_field take out; use one of them"
-        raise place.error("nuisance.displacement_offset", problem)
-    if since is not None and section.constant_field:
-        problem = "takes out what from_pressure takes out already; use one of them"
-        raise place.error("sheet.constant_field", problem)
-    if section.constant_field and len(pressures) < 2:
-        raise place.error("sheet.constant_field", "nothing is left of the data of one pressure")
+        if wrong:
+            raise place.error(key, problem)
     scale = place.scales.length
     return Sheet(
-        measured=section.surface == "measured",
+        measured=measured,
         degree=section.degree,
         modes=section.modes,
         prior=3.0 if section.prior is None else section.prior * scale,

@@ -23,17 +23,15 @@ from ...solvers.base import History
 from .section import Sheet
 
 Array = NDArray[np.float64]
-
 #: Points a coefficient needs at least.
 LEAST_POINTS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class DiskPolynomial:
-    """A polynomial of x and y, of several values at once.
+    """A polynomial of x and y of several values: coefficients (terms, values) of Legendre products.
 
-    radius : mm, of the disk; degree : in x and y together. coefficients : (terms, values) of
-    products of Legendre polynomials. rms : (values,) left at the points it was fitted to.
+    radius : mm, of the disk; degree : in x and y together. rms : (values,) left at its points.
     """
 
     radius: float
@@ -47,10 +45,7 @@ class DiskPolynomial:
 
 
 def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int) -> DiskPolynomial:
-    """Fit values (n, k) at points (n, 2) mm by least squares.
-
-    Raises InputError for too few points for the degree, and for points that leave it undetermined.
-    """
+    """Fit values (n, k) at points (n, 2) mm; raises InputError if they do not determine it."""
     terms = _terms(points / radius, degree)
     count = terms.shape[1]
     if len(points) < LEAST_POINTS * count:
@@ -61,8 +56,7 @@ def fit_disk_polynomial(points: Array, values: Array, radius: float, degree: int
     if rank < count:
         problem = f"the points do not determine a polynomial of degree {degree}; take a lower one"
         raise InputError(None, "degree", problem)
-    left = values - terms @ coefficients
-    rms = np.sqrt(np.mean(left**2, axis=0))
+    rms = np.sqrt(np.mean((values - terms @ coefficients) ** 2, axis=0))
     return DiskPolynomial(radius, degree, coefficients, rms)
 
 
@@ -96,10 +90,7 @@ FLAT = MeasuredSheet()
 def measured_sheet(
     sheet: Sheet, outline: Outline, fields: Sequence[DisplacementField]
 ) -> MeasuredSheet:
-    """Fit polynomials to the measurement on the disk.
-
-    Raises InputError for heights that are missing, do not go out to the rim or are too large.
-    """
+    """Fit polynomials to the measurement; InputError for missing, narrow or large heights."""
     surface = _surface(sheet, outline, fields) if sheet.measured else None
     rim = []
     for field in fields if sheet.moving_rim else ():
@@ -172,32 +163,26 @@ def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisa
     unknowns = [
         Nuisance(name, -most, most, "mm", name, 1.0, sheet.prior, weight) for name in model.modes
     ]
-    if sheet.slack:
-        own = sheet.slack_prior
-        most = MOST_SIGMAS * own
-        unknowns += [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
-    return unknowns
+    own = sheet.slack_prior
+    most = MOST_SIGMAS * own
+    slack = [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
+    return unknowns + (slack if sheet.slack else [])
 
 
 #: States of a quad by its principal stresses, as the files have them.
 TAUT, WRINKLED, LOOSE = 0, 1, 2
-
-
 #: Stress over the largest of the sheet that is taken as none.
 NONE = 1e-6
-
-
 #: Distances between neighbouring measured places: farther from all of them nothing is measured.
 FAR = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class InflatedSheet:
-    """The sheet at one reported pressure.
+    """The sheet at one reported pressure (MPa), displaced by (nodes, 3) mm.
 
-    pressure : MPa. displacement : (nodes, 3) mm. strain : (quads, 3) log strain (eps1, eps2,
-    gamma12) in the middle of the quads; stress : (quads, 3) MPa, Cauchy, along the turned yarns, in
-    the same order. state : (quads,) of `TAUT`, `WRINKLED` (tension in one direction only), `LOOSE`.
+    strain : (quads, 3) log strain (eps1, eps2, gamma12) in the middle of the quads; stress : MPa,
+    Cauchy, along the turned yarns. state : `TAUT`, `WRINKLED` (tension in one direction), `LOOSE`.
     """
 
     pressure: float
@@ -243,10 +228,7 @@ def states(stress: Array) -> NDArray[np.intp]:
 
 
 def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
-    """Carry values (n, 3) at measured places (n, 2) to nodes (nodes, 2); NaN where none is near.
-
-    Linear between the places; a node beyond them, or in a hole of them, has none.
-    """
+    """Interpolate values (n, 3) at places (n, 2) at nodes (nodes, 2); NaN where none is near."""
     if len(places) == len(nodes) and np.allclose(places, nodes):
         return values
     found = np.full((len(nodes), 3), np.nan)

@@ -25,7 +25,7 @@ def merge_increments(
 ) -> tuple[float, ...]:
     """Return load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
 
-    Raises InputError for an extra one beyond the last pressure; `field` : their key in the section.
+    Raises InputError for an extra one, of key `field`, beyond the last pressure.
     """
     steps = list(pressures)
     for i, step in enumerate(extra):
@@ -41,11 +41,7 @@ def merge_increments(
 
 @dataclass(frozen=True, eq=False)
 class KnownSolution:
-    """Data to be computed by the forward model.
-
-    beta : MPa, of the form `form`. elements : of the full disk. increments : MPa, with the
-    pressures. solver : that computes them, the one that fits unless named.
-    """
+    """Data to be computed by the forward model: beta and increments in MPa, a full disk's quads."""
 
     beta: NDArray[np.float64]
     form: str
@@ -62,10 +58,7 @@ def data_source(
     increments: Sequence[float],
     measured: PointFiles | None,
 ) -> KnownSolution | PointFiles:
-    """Return the measured files, or the known solution; pressures and increments are in MPa.
-
-    Raises InputError for more or fewer files than pressures.
-    """
+    """Return the measured files, as many as pressures (MPa), or the known solution."""
     known, points = section.data.known_solution, section.data.points
     if known is not None:
         field = "data.known_solution"
@@ -99,9 +92,8 @@ PART = "bubble"
 class BubbleTest:
     """A clamped disk that is inflated. Lengths mm, pressures MPa.
 
-    `pressures` are reported and matched, `increments` are the load steps and contain them.
-    `noise` (mm) of one measured displacement, None where it is not given. `facet` : by which the
-    camera reads displacements, None for those of points.
+    `pressures` are reported and matched, `increments` are the load steps and contain them. `noise`
+    of one displacement. `facet` : by which the camera reads displacements, None for points.
     """
 
     name: str
@@ -161,16 +153,12 @@ class BubbleTest:
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, BubbleModel]:
-        """Return the one model; edges of its quads, or its increments, divided by a factor.
-
-        Raises InputError for a mesh that cannot be had, and for increments to be joined.
-        """
+        """Return the one model; edges of its quads, or its increments, divided by a factor."""
         own = self.model(thickness)
         if factor == 1:
             return {PART: own}
         if what == "elements":
-            # From the count that the mesh has, not the one asked for: so that finer meshes divide
-            # its quads, as far as there is such a mesh.
+            # From the count that the mesh has, not the one asked for: finer meshes divide quads.
             whole = len(own.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
             return {PART: self.model(thickness, elements=round(whole * factor**2))}
         if factor != int(factor):
@@ -241,14 +229,12 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
 
 
 def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None:
-    given = section.pressures
-    if given is None:
-        return None
-    for i in range(1, len(given)):
-        if given[i] <= given[i - 1]:
-            problem = f"pressures must increase, got {given[i]:g} after {given[i - 1]:g}"
+    for i, (before, after) in enumerate(pairwise(section.pressures or ()), start=1):
+        if after <= before:
+            problem = f"pressures must increase, got {after:g} after {before:g}"
             raise place.error(f"pressures[{i}]", problem)
-    return tuple(p * place.scales.pressure for p in given)
+    given = section.pressures
+    return None if given is None else tuple(p * place.scales.pressure for p in given)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:
@@ -262,8 +248,7 @@ def quantities(model: BubbleModel, history: History) -> dict[str, float]:
     kilo, heights = 1e3 * history.load, apex_heights(model, history)
     in_plane = np.linalg.norm(history.displacement[-1, :, :2], axis=1).max()
     values = {f"apex at {p:.4g} kPa, mm": float(z) for p, z in zip(kilo, heights, strict=True)}
-    last = f"largest in-plane displacement at {kilo[-1]:.4g} kPa, mm"
-    return {**values, last: float(in_plane)}
+    return {**values, f"largest in-plane displacement at {kilo[-1]:.4g} kPa, mm": float(in_plane)}
 
 
 def responses(model: BubbleModel, history: History) -> dict[str, float]:
@@ -273,8 +258,5 @@ def responses(model: BubbleModel, history: History) -> dict[str, float]:
 
 
 STUDIED = Studied(
-    steps=lambda model: model.increments,
-    quantities=quantities,
-    responses=responses,
-    response="largest displacement",
+    lambda model: model.increments, quantities, responses, response="largest displacement"
 )

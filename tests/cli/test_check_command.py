@@ -8,9 +8,8 @@ import re
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial import doubts as biaxial_doubts
+from bubblefit.experiments.biaxial import prepared as biaxial_doubts
 from bubblefit.experiments.bubble import doubts as place
-from bubblefit.experiments.bubble import doubts as size
 from bubblefit.experiments.kinds import ROUGH
 from bubblefit.experiments.registry import kinds
 from bubblefit.experiments.strips import doubts
@@ -20,7 +19,7 @@ from bubblefit.runs.setup import prepare_fit
 from ..camera import camera_project
 from ..commands import in_process, one_line, result_in
 from ..complaints import complaint
-from ..experiments.biaxial.test_biaxial_doubts import TRAPS as BIAXIAL_TRAPS
+from ..experiments.biaxial.test_biaxial_fit import TRAPS as BIAXIAL_TRAPS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
 from ..places import EXAMPLES, ROOT
@@ -122,7 +121,7 @@ def test_the_document_lists_every_doubt_and_its_limits():
     assert set(told) == set(kinds()["bubble"].doubts)
     for _, name, sure, _ in BUBBLE_TRAPS.values():
         assert told[name][0].startswith("error" if sure else "warning"), name
-    for value in (size.LEAST_REACH, size.MOST_REACH, size.LEAST_RISE, size.MOST_RISE):
+    for value in (place.LEAST_REACH, place.MOST_REACH, place.LEAST_RISE, place.MOST_RISE):
         assert f"{value:g}" in told["length-unit"][1]
     assert f"{place.FAR_OFF:g} radii" in told["off-centre"][0]
     assert f"{place.STEEP:g} degrees" in told["tilted"][0]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.placement import axes_angle, in_all_quarters, line_angle
+from bubblefit.experiments.bubble.registration import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
 from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header, nothing_found
 from bubblefit.readers.machine_tables import read_machine_loads, read_times

@@ -3,21 +3,19 @@
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.experiments.bubble.placement import (
+from bubblefit.experiments.bubble.registration import (
     UNKNOWN,
     Placement,
-    clamp_motion,
-    plane_through,
-    turned,
-    without,
-)
-from bubblefit.experiments.bubble.registration import (
     RegistrationOptions,
     centre_strain,
+    clamp_motion,
+    plane_through,
     register,
     rim_of_motion,
     symmetry_axes,
+    turned,
     warp_of_points,
+    without,
 )
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings

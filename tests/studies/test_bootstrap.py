@@ -39,7 +39,7 @@ from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file
 from ..published_laws import TABLE_4_2
 
 # Packages of kinds have functions of the same names.
-bubbles = import_module("bubblefit.experiments.bubble.candidates")
+bubbles = import_module("bubblefit.experiments.bubble.prepared")
 strips = import_module("bubblefit.experiments.strips.candidates")
 #: MPa, near the optima of the tests; without contraction loads along the yarns are 20 mm^2 E eps.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")

@@ -1,8 +1,5 @@
 """[[bubble]] of a project: conversion to mm and MPa, the examples, and one-line errors."""
 
-from __future__ import annotations
-
-import re
 import shutil
 from dataclasses import replace
 from functools import partial
@@ -16,13 +13,10 @@ from bubblefit.experiments.bubble import point_files
 from bubblefit.experiments.bubble import report as examined
 from bubblefit.experiments.bubble.doubts import Apex
 from bubblefit.experiments.bubble.objective import (
-    FieldTarget,
     at_points,
     at_rest,
-    counted_from,
-    with_places,
 )
-from bubblefit.experiments.bubble.point_files import PointFiles, _frame_times
+from bubblefit.experiments.bubble.point_files import _frame_times
 from bubblefit.experiments.bubble.section import (
     LogSection,
     Sheet,
@@ -31,7 +25,7 @@ from bubblefit.experiments.bubble.section import (
     sheet_of,
 )
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
-from bubblefit.experiments.bubble.test import BubbleTest, KnownSolution, merge_increments
+from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
 from bubblefit.experiments.kinds import Fabric, Output, Place, Scales
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.project.project import Project, read_project
@@ -64,16 +58,11 @@ def bubble(project: Project) -> BubbleTest:
 
 def test_known_solution_is_table_4_2_in_mpa():
     p = bubble(read_project(KNOWN))
-    assert isinstance(p.data, KnownSolution)
     assert p.pressures == pytest.approx([0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.300])
-    assert p.increments == pytest.approx(
-        [0.006, 0.022, 0.040, 0.059, 0.097, 0.132, 0.186, 0.251, 0.300]
-    )
-    assert set(p.pressures) <= set(p.increments)
+    assert p.increments == p.data.increments == pytest.approx(sorted([0.006, 0.040, *p.pressures]))
     assert (p.radius, p.thickness, p.elements, p.symmetry) == (100.0, 0.81, 800, "quarter")
     assert p.data.beta[[0, 3, 7, 11]] == pytest.approx([-7.96788, 20.0439, 139.437, 806.35])
     assert (p.data.elements, p.data.symmetry) == (800, "quarter")
-    assert p.data.increments == p.increments
     assert (p.match_by, p.objective, p.name, p.weight) == ("points", "e", "bubble", 1.0)
 
 
@@ -82,10 +71,8 @@ def test_units_of_the_file_do_not_matter(edit):
     bar = bubble(edit('pressure = "kPa"', 'pressure = "bar"'))
     assert bar.pressures == pytest.approx(np.array(reference.pressures) * 100)
     mpa = bubble(edit('modulus = "GPa"', 'modulus = "MPa"'))
-    assert isinstance(mpa.data, KnownSolution) and isinstance(reference.data, KnownSolution)
     assert mpa.data.beta == pytest.approx(reference.data.beta / 1000)
-    metre = bubble(edit('length = "mm"', 'length = "m"'))
-    assert metre.radius == pytest.approx(reference.radius * 1000)
+    assert bubble(edit('length = "mm"', 'length = "m"')).radius == reference.radius * 1000
 
 
 def test_an_ellipse_in_place_of_the_radius(edit):
@@ -96,15 +83,12 @@ def test_an_ellipse_in_place_of_the_radius(edit):
     assert str(p.settings()) != str(bubble(read_project(KNOWN)).settings())
 
 
-def test_data_from_another_model(edit):
+def test_data_from_another_model_and_default_increments(edit):
     other = bubble(edit("# elements = 1800\n# increments", "elements = 1800\nincrements"))
-    assert isinstance(other.data, KnownSolution) and other.data.elements == 1800
+    assert other.data.elements == 1800
     assert other.data.increments[0] == pytest.approx(0.004)
     assert set(other.pressures) <= set(other.data.increments)
     assert other.data.increments != other.increments
-
-
-def test_default_increments_and_repeated_ones(edit):
     reference = bubble(read_project(KNOWN)).increments
     assert bubble(edit("increments = [6, 40]", "")).increments == pytest.approx(reference)
     assert len(bubble(edit("increments = [6, 40]", "increments = [40, 22, 6]")).increments) == 9
@@ -113,63 +97,39 @@ def test_default_increments_and_repeated_ones(edit):
 @pytest.mark.parametrize("name", sorted(p.name for p in VALMEX.glob("*.toml")))
 def test_real_examples(name, shared_data):
     p = bubble(read_project(VALMEX / name, shared_data / "bubble"))
-    assert isinstance(p.data, PointFiles)
     assert len(p.data.files) == len(p.pressures) == 20 and p.symmetry == "full"
     recorded = np.loadtxt(GRID / "grid_pressures.csv", delimiter=",", skiprows=1)
     indices = [int(f.stem[-2:]) for f in p.data.files]
     assert p.pressures == pytest.approx(recorded[indices, 2])
-    assert p.data.options.columns == {name: name for name in ("x", "y", "dx", "dy", "dz")}
     assert p.data.options.flag_column == "flag"
     for file, bar in zip(p.data.files, recorded[indices, 1], strict=True):
         assert f"p_bar={bar:.6f}" in file.open().readline()
-
-
-def test_pressures_in_the_headers_of_real_frames(shared_data, tmp_path):
-    """Those that the example writes out, read from "p_bar=" in each of the 20 files."""
-    text = (VALMEX / "test1-cubic.toml").read_text()
-    pattern, indices = (re.search(rf"(?m)^{key} = .*$", text)[0] for key in ("pattern", "indices"))
-    text = text.replace(pattern, 'files = ["grid/test1_*.csv"]').replace(indices, "")
-    listed = re.search(r"(?ms)^pressures = \[.*?\].*?$", text)[0]
-    said = '[bubble.data.points.pressure]\ncolumn = "p_bar"\n'
-    (tmp_path / "project.toml").write_text(text.replace(listed, "") + said)
-    found = bubble(read_project(tmp_path / "project.toml", shared_data / "bubble"))
-    asked = bubble(read_project(VALMEX / "test1-cubic.toml", shared_data / "bubble"))
-    assert [f.name for f in found.data.files] == [f.name for f in asked.data.files]
-    assert found.pressures == pytest.approx(asked.pressures, rel=1e-5)
 
 
 def test_missing_data_says_what_to_do(tmp_path):
     project = VALMEX / "test1-linear.toml"
     for folder in (None, tmp_path / "nowhere", tmp_path):
         assert "--data DIR" in complaint(read_project, project, folder)
-    p = bubble(read_project(project, need_data=False))
-    assert isinstance(p.data, PointFiles) and p.data.files[0].name == "test1_00.csv"
-
-
-def test_data_folder_is_relative_to_the_project(tmp_path):
-    shutil.copy(VALMEX / "test2-cubic.toml", tmp_path)
+    assert bubble(read_project(project, need_data=False)).data.files[0].name == "test1_00.csv"
+    # The folder of the data is relative to the project.
+    shutil.copy(project, tmp_path)
     (tmp_path / "data" / "grid").mkdir(parents=True)
     for i in range(20):
-        (tmp_path / "data" / "grid" / f"test2_{i:02d}.csv").touch()
-    data = bubble(read_project(tmp_path / "test2-cubic.toml")).data
-    assert isinstance(data, PointFiles) and all(f.is_file() for f in data.files)
+        (tmp_path / "data" / "grid" / f"test1_{i:02d}.csv").touch()
+    files = bubble(read_project(tmp_path / project.name)).data.files
+    assert all(f.is_file() for f in files) and tmp_path in files[0].parents
 
 
 @pytest.mark.parametrize(
     "old, new, words",
     [
-        ("radius = 100.0", "", ["bubble[0].radius", "missing"]),
+        ("[bubble.match]", '[bubble.sheet]\nrim = "measured"\n[bubble.match]', ["sheet.rim"]),
+        ("[bubble.match]", "[bubble.sheet]\nmodes = 46\n[bubble.match]", ["sheet.modes"]),
         ("radius =", "raduis =", ["bubble[0].raduis", "did you mean 'radius'"]),
         ("[bubble.match]", "[bubble.matsch]", ["bubble[0].matsch", "did you mean 'match'"]),
         ("displacement_offset", "offset", ["bubble[0].nuisance.offset", "displacement_offset"]),
         ("radius = 100.0", 'radius = "100 mm"', ["bubble[0].radius", "number", "'100 mm'"]),
         ("radius = 100.0", "radius = -1.0", ["bubble[0].radius", "greater than 0"]),
-        ("radius = 100.0", "radius = 0.5", ["bubble[0].radius", "thickness 0.81 mm"]),
-        (R, f"{R}\nellipse = {{ major = 9, minor = 8 }}", ["bubble[0].radius", "both"]),
-        (R, ELLIPSE % "80, minor = 120", ["bubble[0].ellipse.minor", "80 mm, got 120 mm"]),
-        (R, ELLIPSE % "120, minor = 20", ["bubble[0].ellipse.minor", "4th part", "20 mm"]),
-        (R, ELLIPSE % "1.2, minor = 0.7", ["bubble[0].ellipse.minor", "0.81 mm"]),
-        (R, ELLIPSE % "120, minor = 80, angle = 30", ["bubble[0].symmetry", "'full'"]),
         (R, ELLIPSE % "120, minor = 80, angle = 120", ["bubble[0].ellipse.angle", "90"]),
         (R, ELLIPSE % "120", ["bubble[0].ellipse.minor", "missing"]),
         ("[22, 59, 97", "[22, 97, 59", ["bubble[0].pressures[2]", "59 after 97"]),
@@ -200,23 +160,19 @@ def test_bad_point_files(edit, old, new, words):
 
 
 def test_files_that_cannot_be_had_are_named_with_what_to_do(tmp_path):
-    advice = "give the folder of the measured data with --data DIR"
-    section = section_of("f*.csv")
-    place = Place(tmp_path / "p.toml", "bubble[0]", Fabric("a fabric", 0.8))
-    at = f"{tmp_path / 'p.toml'}: bubble[0].data.points.files"
-    found = complaint(point_files._files, section, place)
-    assert found == f"{at}: no file matches {str(tmp_path / 'f*.csv')!r}; {advice}"
+    def section(*files):
+        return SimpleNamespace(files=list(files), pattern=None, indices=None, folder="")
+
+    place = replace(PLACE, path=tmp_path / "p.toml")
+    words = [f"{tmp_path / 'p.toml'}: bubble[0].data.points.files", "--data DIR"]
+    complaint_with([*words, "f*.csv"], point_files._files, section("f*.csv"), place)
     (tmp_path / "f1.csv").write_text("")
-    section.files = ["f1.csv", "f*.csv"]
-    found = complaint(point_files._files, section, place)
-    assert found == f"{at}: {tmp_path / 'f1.csv'} is given twice; {advice}"
+    both = section("f1.csv", "f*.csv")
+    complaint_with([*words, "f1.csv is given twice"], point_files._files, both, place)
     # A forward analysis does without a pattern's files, not without sense.
-    assert point_files._files(section_of("g*.csv"), replace(place, need_data=False)) == ()
-    complaint(point_files._files, section, replace(place, need_data=False))
-
-
-def section_of(*files: str) -> Any:
-    return SimpleNamespace(files=list(files), pattern=None, indices=None, folder="")
+    place = replace(place, need_data=False)
+    assert point_files._files(section("g*.csv"), place) == ()
+    complaint(point_files._files, both, place)
 
 
 PLACE = Place(Path("p.toml"), "bubble[0]", Fabric("a fabric", 0.8))
@@ -258,10 +214,8 @@ def test_load_steps_are_in_the_unit_of_the_file():
     assert steps == pytest.approx((0.010, 0.022, 0.03)) and len(steps) == 3
     assert len(merge_increments(PLACE, "i", [22.0 * (1 + 1e-8)], (0.022, 0.03))) == 3
     assert merge_increments(METRES, "i", [0.1], (0.022,)) == pytest.approx((0.01, 0.022))
-    assert complaint(merge_increments, PLACE, "increments", [10.0, 30.001], (0.03,)) == (
-        "p.toml: bubble[0].increments[1]: expected a step up to the last pressure, got 30.001 "
-        "beyond it"
-    )
+    said = complaint(merge_increments, PLACE, "increments", [10.0, 30.001], (0.03,))
+    assert said.startswith("p.toml: bubble[0].increments[1]: ") and "30.001" in said
 
 
 def sheet(place: Place = PLACE, **said: Any) -> Sheet:
@@ -280,12 +234,6 @@ def test_what_a_section_says_of_the_sheet():
     assert sheet(from_pressure=200.0).since == 1 and sheet(METRES, from_pressure=0.2).since == 0
     assert sheet(from_pressure=20.0 * (1 + 9e-7)).since == 0
     assert sheet(modes=1, symmetry="quarter").modes == 1
-
-
-def test_computed_data_have_no_measured_surface(tmp_path):
-    rim = '[bubble.sheet]\nrim = "measured"\n[bubble.match]'
-    path = small(tmp_path, ("[bubble.match]", rim))
-    complaint_with(["sheet.rim", "nothing is measured"], read_project, path)
 
 
 @pytest.mark.parametrize(
@@ -324,33 +272,25 @@ def measured(reach: float, height: float = 0.0, nan: bool = False) -> Displaceme
 @pytest.mark.parametrize(
     ("field", "words"),
     [
-        (measured(0.85), ""),
-        (measured(0.849), "sheet.surface: points go out to 85 %"),
+        (measured(0.85), ""), (measured(0.849), "sheet.surface: points go out to 85 %"),
         (measured(0.9, nan=True), "sheet.surface: points go out to 63 %"),
         (measured(0.9, 49.0), ""), (measured(0.9, 52.0), "sheet.surface: heights"),
     ],
 )  # fmt: skip
 def test_heights_of_a_reference_picture(field, words):
-    asked = Sheet(measured=True, degree=2), Outline.circle(100.0), [field]
+    asked = Outline.circle(100.0), [field]
+    surface, rim = Sheet(measured=True, degree=2), Sheet(moving_rim=True, degree=2)
     if words:
-        assert complaint(measured_sheet, *asked).startswith(words)
+        assert complaint(measured_sheet, surface, *asked).startswith(words)
     else:
-        assert measured_sheet(*asked).surface is not None
+        assert measured_sheet(surface, *asked).surface is not None
     # The motion of the rim asks for no height.
-    if np.isnan(field.z).any():
-        assert _on_disk(field, asked[1], "rim").all()
-        assert _on_disk(field, asked[1], "rim").sum() == 200
-    rim = Sheet(moving_rim=True, degree=2)
     if field.points.max() < 84.95:
-        assert "sheet.rim: points go out to 85 %" in complaint(measured_sheet, rim, *asked[1:])
-
-
-def test_points_none_of_which_lies_on_the_disk():
-    far = measured(2.0)
-    far = replace(far, points=far.points[np.hypot(*far.points.T) > 101.0], z=None,
-                  displacement=far.displacement[np.hypot(*far.points.T) > 101.0])  # fmt: skip
-    said = complaint(measured_sheet, Sheet(moving_rim=True), Outline.circle(100.0), [far])
-    assert said.startswith("sheet.rim: points go out to 0 %")
+        assert "sheet.rim: points go out to 85 %" in complaint(measured_sheet, rim, *asked)
+    else:
+        assert _on_disk(field, asked[0], "rim").sum() == 200
+    far = replace(field, points=field.points + 300.0)
+    assert "sheet.rim: points go out to 0 %" in complaint(measured_sheet, rim, asked[0], [far])
 
 
 def test_priors_of_a_sheet_weigh_as_twenty_points():
@@ -380,24 +320,6 @@ def test_places_at_rest_by_the_two_thirds_of_the_pressure():
             assert found.points[order] == pytest.approx(np.array([[9.6, 0.0], [0.0, 19.2]]))
     seen = replace(first, displacement=np.full((2, 3), 1e-9))
     assert at_rest([seen, other], 0) == [seen, other]
-
-
-def test_a_frame_shares_half_of_its_places():
-    nodes = np.array([[float(k), 0.0] for k in range(5)])
-
-    def target(pressure, *which):
-        import scipy.sparse as sp
-
-        sample = sp.csr_matrix(np.eye(5)[list(which)])
-        return FieldTarget(pressure, np.array([[k, pressure, 1.0] for k in which]), sample)
-
-    some = with_places([target(0.1, 0, 1, 2, 3), target(0.02, 4, 3, 2)], nodes)
-    (found,) = counted_from(some, 1)
-    np.testing.assert_allclose(found.displacement, [[0.0, 0.08, 0.0]] * 2, atol=1e-12)
-    assert (found.frame, found.since, found.pressure) == (0, 1, 0.1)
-    assert found.at(nodes)[:, 0].tolist() == [2.0, 3.0]
-    few = with_places([target(0.1, 0, 1, 2), target(0.02, 4, 3, 2)], nodes)
-    assert "100 and 20 kPa share 1 of 3" in complaint(counted_from, few, 1)
 
 
 def test_points_that_lie_on_the_disk():
@@ -448,29 +370,27 @@ def test_times_that_cannot_be_had(tmp_path, said, words):
 
 
 def test_every_cell_of_what_is_seen(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, examined, "rise_charts")
+    drawn = caught(monkeypatch, examined, "bubbles.rise_charts")
     monkeypatch.setattr(examined, "registration_picture", lambda *_: ("maps.png", "maps"))
-    points = np.zeros((4, 2))
+    at = np.zeros((4, 2)), np.zeros((4, 3))
+    dropped = {"all zero": 2, "without a value": 1}
     fields = [
-        DisplacementField(0.02, points, np.zeros((4, 3)), {"all zero": 2, "without a value": 1}),
-        DisplacementField(0.2, points, np.zeros((4, 3)), path=Path("x/b.csv")),
-    ]
-    apexes = [Apex(0.2, 31.0, 0.012, 16.0, 0.5, (0.03, 0.05))]
-    rim = SimpleNamespace(x=1.234, y=-0.5, error=0.123)
-    axes = SimpleNamespace(off=-2.346, error=0.456, clear=0.876)
-    view = SimpleNamespace(rises=np.array([3.0, 30.0]), apexes=apexes, rim=rim, axes=axes)
+        DisplacementField(0.02, *at, dropped), DisplacementField(0.2, *at, path=Path("x/b.csv"))
+    ]  # fmt: skip
+    view = SimpleNamespace(
+        rises=np.array([3.0, 30.0]), apexes=[Apex(0.2, 31.0, 0.012, 16.0, 0.5, (0.03, 0.05))],
+        rim=SimpleNamespace(x=1.234, y=-0.5, error=0.123),
+        axes=SimpleNamespace(off=-2.346, error=0.456, clear=0.876),
+    )  # fmt: skip
     test = SimpleNamespace(thickness=0.8, outline=None)
     prepared: Any = SimpleNamespace(fields=fields, view=view, test=test, registration=None)
     shown = examined.examine(prepared, Output(tmp_path))
-    assert shown.facts == [
-        ("the sheet rises about, mm", "1.23, -0.50 (+- 0.12)"),
-        ("axes of symmetry, degrees from x and y", "-2.35 (+- 0.46, 88% clear)"),
-    ]
+    facts = ["1.23, -0.50 (+- 0.12)", "-2.35 (+- 0.46, 88% clear)"]
+    assert [value for _, value in shown.facts] == facts
     frames, equilibrium = shown.tables
-    assert frames.rows == [
-        [20.0, "computed", 4, "2 all zero, 1 without a value", 3.0],
-        [200.0, "b.csv", 4, "none", 30.0],
-    ]
+    first, second = frames.rows
+    assert first == [20.0, "computed", 4, "2 all zero, 1 without a value", 3.0]
+    assert second == [200.0, "b.csv", 4, "none", 30.0]
     assert equilibrium.rows == [pytest.approx([200.0, 31.0, 12.0, 16.0, 0.5, 20.0, 3.0, 5.0])]
     assert [name for name, _ in shown.figures] == ["maps.png", "rises.png"]
     ((path, pressures, rises),) = drawn
@@ -480,23 +400,18 @@ def test_every_cell_of_what_is_seen(tmp_path, monkeypatch):
     assert bare.facts == [] and len(bare.tables) == 1
 
 
-KNOWN_INVERSE_CRIME = "[bubble.data.known_solution]\n"
-
-
 class Other(MembraneSolver):
     name = identity = "other"
 
 
 @pytest.mark.parametrize(
     ("said", "crime"),
-    [
-        ("", True), ("elements = 48\n", True), ('symmetry = "full"\n', True),
-        ('solver = "membrane"\n', True), ("elements = 108\n", False),
-        ("increments = [4, 11, 40]\n", False), ('solver = "other"\n', False),
-    ],
+    [('solver = "membrane"\nelements = 48\nsymmetry = "full"\n', True), ("elements = 108\n", False),
+     ('solver = "other"\n', False)],
 )  # fmt: skip
 def test_the_inverse_crime(tmp_path, monkeypatch, said, crime):
     monkeypatch.setitem(registry.SOLVERS, "other", Other)
-    project = read_project(small(tmp_path, (KNOWN_INVERSE_CRIME, KNOWN_INVERSE_CRIME + said)))
+    known = "[bubble.data.known_solution]\n"
+    project = read_project(small(tmp_path, (known, known + said)))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
     assert prepared.by_this_model is crime
