@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.registration import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
-from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header, nothing_found
+from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -203,6 +203,8 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
         ("", {}, "no header row"),
         ("Load\0(N),disp_mm\n1,2\n", {}, "not a text file"),
         ("a,b\n1,2\n", {}, "line 1, above the first numbers, has: a, b"),
+        ("t\na,b\n(mm),s\n1,2\n", {}, "line 2, above the first numbers, has: a, b"),
+        ("a,b\n1,x\n", {}, "no line with two numbers"),
         ("Load (N),Extension (mm)\n", {}, "line 1: no rows of numbers"),
         ("Load,Extension\n1,2\n", {}, "column 'Extension': the file does not name the unit"),
         ("Load (lbf),disp_mm\n1,2\n", {}, "line 1, column 'Load (lbf)': unit 'lbf' is not one of"),
@@ -344,23 +346,6 @@ def test_tables_one_after_the_other():
     named = {"load": "F", "elongation": "u"}
     assert find_header(rows("Load,Extension", "1,2", "F,u", "3,4"), named, NEEDED) == 2
     assert cells_of('"a,b", c', ",") == ["a,b", "c"] and cells_of(" a ;b", ";") == ["a", "b"]
-
-
-@pytest.mark.parametrize(
-    ("lines", "words"),
-    [
-        (["a,b", "1,2"], "line 11, above the first numbers, has: a, b"),
-        (["a,b", "(mm),s", "1,2"], "line 11, above the first numbers, has: a, b"),
-        (["a,b", "x,y", "1,2"], "line 12, above the first numbers, has: x, y"),
-        (["a,b,c", "mm,s", "1,2"], "line 12, above the first numbers, has: mm, s"),
-        (["a,b", "1,x"], "no line with two numbers was found either"),
-        (["a;b", "1;2"], "line 11, above the first numbers, has: a, b"),
-    ],
-)
-def test_which_row_it_might_have_been(lines, words):
-    said = nothing_found(list(enumerate(lines, start=11)), {"load": "F"}, NEEDED)
-    assert said.startswith("no header row with the columns one of elongation and 'F'; name them")
-    assert said.endswith(words)
 
 
 @pytest.mark.parametrize(

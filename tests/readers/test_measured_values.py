@@ -86,26 +86,12 @@ def test_the_elongation_nearest_to_the_strip():
         assert tables.nearest_to_strip(names, which) == nearest
 
 
-def unit(own: str, **channel) -> float:
-    value = in_unit(np.array([2.0]), own, Channel(**channel), PRESSURE_UNITS, Path("a.csv"), "here")
-    return float(value[0])
-
-
 @pytest.mark.parametrize(
-    ("own", "channel", "pressure"),
+    ("own", "channel", "expected"),
     [
         ("kPa", {}, 2e-3), ("", {"unit": "bar"}, 0.2), ("bar", {"unit": "bar"}, 0.2),
         ("V", {"scale": 3.0, "offset": 1.0, "unit": "bar"}, 0.7), ("hPa", {"unit": "mbar"}, 2e-4),
         ("kPa", {"scale": 1.0, "offset": 1.0}, 3e-3),
-    ],
-)  # fmt: skip
-def test_readings_of_a_sensor(own, channel, pressure):
-    assert unit(own, **channel) == pytest.approx(pressure)
-
-
-@pytest.mark.parametrize(
-    ("own", "channel", "words"),
-    [
         ("kPa", {"scale": 2.0}, "is in kPa already"), ("", {}, "say the unit of the readings"),
         ("V", {"scale": 2.0}, "say the unit after scaling"), ("mV", {}, "unit 'mV' is not one of"),
         ("at", {}, "unit 'at' is not one of Pa, hPa, mbar, kPa, psi, bar, MPa"),
@@ -114,8 +100,15 @@ def test_readings_of_a_sensor(own, channel, pressure):
         ("bar", {"unit": "kPa", "scale": 1.0}, "the file says 'bar', the project 'kPa'"),
     ],
 )  # fmt: skip
-def test_units_that_contradict(own, channel, words):
-    assert complaint(unit, own, **channel).startswith(f"a.csv: here: {words}")
+def test_readings_of_a_sensor(own, channel, expected):
+    def read():
+        channels = np.array([2.0]), own, Channel(**channel), PRESSURE_UNITS, Path("a.csv"), "here"
+        return in_unit(*channels)[0]
+
+    if isinstance(expected, float):
+        assert read() == pytest.approx(expected)
+    else:
+        assert complaint(read).startswith(f"a.csv: here: {expected}")
 
 
 def test_states_of_dice_that_are_failures(tmp_path):
@@ -299,21 +292,16 @@ def written(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"),
+    ("name", "units", "pattern", "expected"),
     [
-        ("step_012_35.5kPa.csv", 0.0355), ("step_012_35,5_kPa.csv", 0.0355),
-        ("run7-0.355bar-a.csv", 0.0355), ("12_355 mbar.txt", 0.0355), ("5.1489psi.csv", 0.0355),
-        ("3mbar2.csv", 3e-4),
-    ],
-)  # fmt: skip
-def test_a_number_with_its_unit_in_the_name(name, expected):
-    assert number_in_name(Path(name), PRESSURE_UNITS) == pytest.approx(expected, rel=2e-5)
-
-
-@pytest.mark.parametrize(
-    ("name", "units", "pattern", "words"),
-    [
-        ("12max.csv", PRESSURE_UNITS, None, "found none"),
+        ("step_012_35.5kPa.csv", PRESSURE_UNITS, None, 0.0355),
+        ("step_012_35,5_kPa.csv", PRESSURE_UNITS, None, 0.0355),
+        ("run7-0.355bar-a.csv", PRESSURE_UNITS, None, 0.0355),
+        ("12_355 mbar.txt", PRESSURE_UNITS, None, 0.0355),
+        ("5.1489psi.csv", PRESSURE_UNITS, None, 0.0355), ("3mbar2.csv", PRESSURE_UNITS, None, 3e-4),
+        ("bubble_p35.5_t12.csv", PRESSURE_UNITS, r"_p([\d.]+)_", 0.0355),
+        ("bubble_p35.5_t12.csv", TIME_UNITS, r"_t(\d+)\.", 12.0),
+        ("p3_7x.csv", TIME_UNITS, r"_(\d)", 7.0), ("12max.csv", PRESSURE_UNITS, None, "found none"),
         ("p3_7x.csv", {"s": 1.0, "ms": 1e-3}, None, "with its unit (s, ms)"),
         ("10kPa_0.1bar.csv", PRESSURE_UNITS, None, "10 kPa and 0.1 bar"),
         ("1s_2ms", {"s": 1.0, "ms": 1e-3}, None, "found 1 s and 2 ms"),
@@ -321,41 +309,33 @@ def test_a_number_with_its_unit_in_the_name(name, expected):
         ("px.csv", PRESSURE_UNITS, r"p(\w)", "found 'x'"),
         ("p3.csv", PRESSURE_UNITS, "p(q)?", "found None"),
     ],
-)
-def test_names_without_one_number(name, units, pattern, words):
-    unit = "kPa" if units is PRESSURE_UNITS else None
-    said = complaint(number_in_name, Path(name), units, pattern, unit, "from_name")
-    assert said.startswith(f"{name}: from_name: ") and words in said
-
-
-def test_a_pattern_says_where_the_number_is():
-    path = Path("bubble_p0355_t12.csv")
-    assert number_in_name(path, PRESSURE_UNITS, r"_p(\d+)_", "hPa") == pytest.approx(0.0355)
-    assert number_in_name(path, TIME_UNITS, r"_t(\d+)\.") == 12.0
-    assert number_in_name(Path("p3_7x.csv"), PRESSURE_UNITS, r"_(\d)") == 7.0
+)  # fmt: skip
+def test_a_number_in_the_name(name, units, pattern, expected):
+    asked = Path(name), units, pattern, "kPa" if units is PRESSURE_UNITS else None, "from_name"
+    if isinstance(expected, float):
+        assert number_in_name(*asked) == pytest.approx(expected, rel=2e-5)
+    else:
+        said = complaint(number_in_name, *asked)
+        assert said.startswith(f"{name}: from_name: ") and expected in said
     assert check_pattern(r"_p(\d+)_") is None
-    for pattern, words in (("(", "no regular expression"), ("(a)(b)", "has 2"), ("a", "has 0")):
-        assert words in check_pattern(pattern)
+    for bad, words in (("(", "no regular expression"), ("(a)(b)", "has 2"), ("a", "has 0")):
+        assert words in check_pattern(bad)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_a_column_or_a_line_above_the_numbers(tmp_path):
+    for text in (
         f"{POINTS};p [kPa]\n0;0;0;0;1;35,5\n1;0;0;0;1;35,5\n",
         f"{POINTS};p\nmm;mm;mm;mm;mm;bar\n0;0;0;0;1;0.355\n1;0;0;0;1;0.355\n",
-        f"# p [kPa] = 35.5\n{POINTS}\n0;0;0;0;1\n",
-        f"Title\np;35,5;kPa\n{POINTS}\n0;0;0;0;1\n",
+        f"# p [kPa] = 35.5\n{POINTS}\n0;0;0;0;1\n", f"Title\np;35,5;kPa\n{POINTS}\n0;0;0;0;1\n",
         f"# test 1 p_bar=0.355000; x,y in mm\n# p = 0.355 bar\n{POINTS}\n0;0;0;0;1\n",
         f"{POINTS};p [kPa]\n0;0;0;0;1;35.5\n1;0;nan;nan;nan;\n",
         f"{POINTS};p [kPa]\n0;0;0;0;1;35.5\n1;0;0;0;1;n/a\n2;0;0;0;1;35.5\n",
         f"{POINTS};p\n;;;;;[kPa]\n0;0;0;0;1;35.5\n", f"{POINTS}\n0;0;0;0;1\np = 3.55e1 kPa\n",
         "p [kPa],q,r\n35.5,a,1\n35.5,b,2\n", "x p_kPa\n1 35.5\n", "# p_kPa = 35.5\nx;y\n1;2\n",
         "p [kPa]: 35,5\nx;y\n1;2\n", "p 35.5 kPa, and p 35.5 kPa again\n", "p (kPa) 355e-1\n",
-    ],
-)  # fmt: skip
-def test_a_column_or_a_line_above_the_numbers(tmp_path, text):
-    path = written(tmp_path, text)
-    assert value_in_file(path, Channel("p"), PRESSURE_UNITS) == pytest.approx(0.0355)
+    ):  # fmt: skip
+        value = value_in_file(written(tmp_path, text), Channel("p"), PRESSURE_UNITS)
+        assert value == pytest.approx(0.0355), text
 
 
 NEITHER = ["neither a column 'p' nor a line"]
@@ -383,18 +363,16 @@ def test_values_that_cannot_be_told(tmp_path, text, words):
     complaint_with([str(path), *words], value_in_file, path, Channel("p"), PRESSURE_UNITS)
 
 
-@pytest.mark.parametrize(
-    ("channel", "pressure"),
-    [
-        # Festo SPTE-P10R: 0 V at 0 kPa, 10 V at 1,000 kPa (Appendix B of the thesis).
-        (Channel("U_p", "kPa", 100.0), [0.0, 0.0355, 1.0]),
-        (Channel("U_p", "bar", 1.0, -0.5), [-0.05, -0.0145, 0.95]),  # a volt may be a unit
-    ],
-)
-def test_a_log_in_volts(tmp_path, channel, pressure):
+def test_a_log_in_volts(tmp_path):
+    """Festo SPTE-P10R: 0 V at 0 kPa, 10 V at 1,000 kPa (Appendix B); a volt may be a unit."""
     path = written(tmp_path, "Zeit (min);U_p (V)\n0;0\n1;0,355\n2;10\n")
-    log = read_pressure_log(path, LogOptions(channel))
-    assert log.pressure == pytest.approx(pressure) and log.time == pytest.approx([0.0, 60.0, 120.0])
+    for channel, pressure in (
+        (Channel("U_p", "kPa", 100.0), [0.0, 0.0355, 1.0]),
+        (Channel("U_p", "bar", 1.0, -0.5), [-0.05, -0.0145, 0.95]),
+    ):
+        log = read_pressure_log(path, LogOptions(channel))
+        assert log.pressure == pytest.approx(pressure)
+        assert log.time == pytest.approx([0.0, 60.0, 120.0])
 
 
 @pytest.mark.parametrize(

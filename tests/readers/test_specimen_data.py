@@ -43,9 +43,6 @@ def test_repetitions_in_a_column_and_weights_in_kilograms(tmp_path):
         # What came after the largest deflection was unloading.
         assert len(c.load) == 7 and c.load[-1] == pytest.approx(30 * 9.80665)
         assert c.load == pytest.approx(3.5 * c.deflection)
-
-
-def test_sensors_in_volts_and_other_units(tmp_path):
     path = written(tmp_path, "wire (V);cell (V)\n0,5;0,1\n0,6;0,2\n0,75;0,35\n")
     (found,) = read_bending_curves(
         path, deflection=Channel("wire", "cm", 20.0, -10.0), load=Channel("cell", "kN", 2.0)
@@ -200,9 +197,6 @@ def test_cycles_are_told_apart_and_begin_and_end_where_the_loads_turn(table):
     # Without names they have the ratio of their loads, with a prestress kept on both yarns.
     cycles = find_cycles(np.maximum(table.load, 0.4))
     assert [(c.ratio, c.phase, c.number) for c in cycles] == expected
-
-
-def test_holds_and_noise_are_no_cycles():
     hold = [np.full(20, 2.0), np.linspace(2, 30, 40), np.full(15, 30.0), np.linspace(30, 2, 40)]
     s = np.concatenate(hold * 2)
     s += 0.1 * np.random.default_rng(1).standard_normal(len(s))
@@ -230,9 +224,6 @@ def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
     complaint_with(["ratio 1:1", "3 cycles", "number 4"], asked, 4)
     complaint_with(["3:1", "the ratios there: 1:1, 2:1"], asked, ratios=["1:1", "3:1"])
     complaint_with(["any", "after the conditioning"], asked, conditioning=15)
-
-
-def test_a_path_is_counted_from_its_beginning_and_tells_what_was_kept_before(table):
     path = evaluated_paths([table], cycles_of([table], [None]))[1]
     assert path.ratio == "2:1" and len(path.load) == 30
     np.testing.assert_array_equal(path.since[0], [0.0, 0.0])
