@@ -60,6 +60,11 @@ def seen(frame: Frame, turn: np.ndarray, shift) -> Frame:
     return Frame(frame.points @ turn.T + np.asarray(shift), frame.displacement @ turn.T)
 
 
+def noisy(frames, sigma: float, rng) -> list[Frame]:
+    noise = (sigma * rng.standard_normal(f.points.shape) for f in frames)
+    return [Frame(f.points, f.displacement + one) for f, one in zip(frames, noise, strict=True)]
+
+
 FRAMES = [bubble(grid(), rise) for rise in (8.0, 20.0, 30.0)]
 BEYOND = [bubble(grid(10.0, 1.2), rise) for rise in (8.0, 20.0, 30.0)]
 
@@ -142,11 +147,7 @@ def test_noise_shows_in_the_errors_that_are_said():
     rng, made, said = np.random.default_rng(4), [], []
     frames = [bubble(grid(7.0), rise) for rise in (8.0, 20.0, 30.0)]
     for _ in range(8):
-        noisy = [
-            Frame(f.points, f.displacement + 0.05 * rng.standard_normal(f.points.shape))
-            for f in frames
-        ]
-        found = register(noisy, (RADIUS, RADIUS))[1]
+        found = register(noisy(frames, 0.05, rng), (RADIUS, RADIUS))[1]
         made.append((found.warp_angle, np.linalg.norm(found.placement.origin[:2])))
         said.append((found.warp.error, found.rim.error))
     ratio = np.mean(said, axis=0) / np.sqrt(np.mean(np.square(made), axis=0))
@@ -154,25 +155,20 @@ def test_noise_shows_in_the_errors_that_are_said():
 
 
 def test_points_that_tell_too_little_ask_for_it():
-    points, rng, round_frames = grid(), np.random.default_rng(1), []
+    points = grid()
     on = np.clip(1 - (points[:, :2] ** 2).sum(axis=1) / RADIUS**2, 0.0, None)
-    for rise in (10.0, 20.0, 30.0):
-        moved = np.stack([on * points[:, 0] * 0.02, on * points[:, 1] * 0.02, rise * on], axis=1)
-        noise = 0.02 * rng.standard_normal(moved.shape)
-        round_frames.append(Frame(points, moved + noise))
+    moved = np.stack([on * points[:, 0] * 0.02, on * points[:, 1] * 0.02, 10.0 * on], axis=1)
+    alike = [Frame(points, moved * [1, 1, rise]) for rise in (1, 2, 3)]
     half = [Frame(f.points[f.points[:, 0] > 0], f.displacement[f.points[:, 0] > 0]) for f in FRAMES]
-    rng = np.random.default_rng(1)
-    noisy = [
-        Frame(f.points, f.displacement + 0.3 * rng.standard_normal(f.points.shape)) for f in FRAMES
-    ]
+    noise = noisy(FRAMES, 0.3, np.random.default_rng(1))
     both = {"rim_angle": 0.0, "centre": (0, 0, 0)}
     for frames, radii, options, words in (
-        (round_frames, (RADIUS, RADIUS), {}, "give the angle"),
+        (noisy(alike, 0.02, np.random.default_rng(1)), (RADIUS, RADIUS), {}, "give the angle"),
         (half, (RADIUS, RADIUS), {}, "directions only; give the centre"),
         (FRAMES, (5.0, 5.0), {}, "length unit and the radius"),
         ([Frame(points, 0 * points)], (RADIUS, RADIUS), {}, "nothing moves"),
         (FRAMES, (RADIUS, RADIUS), {"plane": "clamp"}, "too few points beyond the rim"),
-        (noisy, (100.0, 99.9), {"rim_angle": 0.0}, "too round to tell the warp"),
+        (noise, (100.0, 99.9), {"rim_angle": 0.0}, "too round to tell the warp"),
         (elliptic(0.0), (100.0, 70.0), both, "expected the warp, too"),
     ):
         assert words in complaint(register, frames, radii, RegistrationOptions(**options))
