@@ -104,10 +104,9 @@ def source_of(
 def measured(
     found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
 ) -> Array:
-    """Return one column (rows,) in mm or N.
+    """Return one column (rows,) in mm or N; its unit is the file's, which must not be another.
 
-    kind : length or load. units : mm or N per unit. asked : the caller's unit, None to take the
-    file's. Raises InputError: no, an unknown or another unit; cells that are not finite numbers.
+    kind : length or load. units : mm or N per unit. asked : the caller's unit, None for none.
     """
     path, at, known = found.table.path, f"line {found.header}, column {column!r}", ", ".join(units)
     if asked is not None and asked not in units:

@@ -43,11 +43,7 @@ def array_names(path: Path) -> list[str]:
 
 
 def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
-    """Read the arrays of these names, those that there are.
-
-    Raises InputError: no such file, no archive, objects instead of numbers, a header that says more
-    than the file holds.
-    """
+    """Read the arrays of these names, those that there are; no Python objects."""
     try:
         with zipfile.ZipFile(path) as archive:
             there = {one.filename: one for one in archive.infolist()}
