@@ -18,7 +18,7 @@ from bubblefit.cli.main import main as bubblefit_command
 from bubblefit.errors import InputError
 from bubblefit.materials.designers import RATIOS, constants_of_law, shares, spread_of
 from bubblefit.materials.exports import base as curves
-from bubblefit.materials.forms.ratio import LoadRatio
+from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import (
     biaxial_response,

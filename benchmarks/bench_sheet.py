@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.meshes.mesh import sampling_matrix
-from bubblefit.meshes.reading import SmoothReading
+from bubblefit.meshes.mesh import SmoothReading, sampling_matrix
 from bubblefit.project.project import read_project
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -78,7 +77,7 @@ def facets(*quads: str) -> None:
     """Estimate what moduli lose on QUADS quads where the measured sheet had 3,072, without noise.
 
     The coarse models are read between their nodes as flat quads, and as fits read them
-    (`meshes/reading.py`). What the moduli make of the difference follows from the
+    (`meshes/mesh.py`). What the moduli make of the difference follows from the
     derivatives at the true law, by least squares, slack taken for known.
     """
     sheet = Uneven(slack=0.0, rim=0.0, noise=0.0)

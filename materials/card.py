@@ -1,9 +1,8 @@
 """Read and write the material card `material.toml`: a law, its thickness, source and certainty.
 
-Format 2 names its form (`form = "cubic"`), and beside it what the form needs (`breaks`, `knots`).
-Format 3 also has `[certainty]`: laws one standard deviation off, along independent directions whose
-products add up to the covariance of the free coefficients; kept like that it is never indefinite. A
-file without `format` is of format 1: cubics, and tri-linear laws by their breaks.
+Format 2 names its form and what the form needs (`breaks`, `knots`). Format 3 also has
+`[certainty]`: independent directions whose products add up to the covariance of the free
+coefficients. A file without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
 import math
@@ -46,10 +45,9 @@ TRIES = 200
 
 @dataclass(frozen=True, eq=False)
 class CardCertainty:
-    """The uncertainty that a fit leaves in its law.
+    """The uncertainty that a fit leaves in its law; words : what is in it, and of what.
 
-    directions : (k, free) MPa, one standard deviation each, of the free coefficients in their
-    order; the least certain first. words : what is in them, and of what.
+    directions : (k, free) MPa, one standard deviation each; the least certain first.
     """
 
     directions: Array
@@ -80,8 +78,7 @@ class CardCertainty:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """Return `count` random laws of positive moduli; raise ValueError if hardly any draw is
-        one."""
+        """Return `count` random laws of positive moduli; ValueError if hardly any draw is one."""
         drawn: list[HypoelasticLaw] = []
         for _ in range(TRIES * count):
             if len(drawn) == count:
@@ -129,7 +126,6 @@ def positive(law: HypoelasticLaw) -> bool:
 
 
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
-    """Describe a card's certainty: noise, mesh, tests, number of values."""
     named = ", ".join(tests)
     also = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
     return f"{also}; {values} values of {named}; the form of the law is taken for right"
@@ -157,15 +153,11 @@ class MaterialCard:
     certainty: CardCertainty | None = None
 
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
-        """Write the card with its moduli in `unit`."""
         write_card(self, Path(path), unit)
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
-    """Describe how `thickness` (mm) differs from that of the card; None where it does not.
-
-    Moduli are stresses: of a fabric twice as thick the same moduli are twice as stiff.
-    """
+    """Describe how `thickness` (mm) differs from that of the card; None where it does not."""
     share = thickness / card.thickness - 1
     if abs(share) < SAME_THICKNESS:
         return None
@@ -182,19 +174,13 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     named = zip(STRAIN_NAMES, law.strain_range, strict=True)
     sure = card.certainty
     content: dict[str, Any] = {
-        "format": FORMAT if sure is None else WITH_CERTAINTY,
-        "name": card.name,
-        "source": card.source,
-        "law": LAW,
-        "form": law.form.name,
-        "unit": unit,
-        "beta": [float(b) / scale for b in law.beta],
-        "nu12": law.nu12,
-        "thickness_mm": card.thickness,
-        "thickness_change": law.thickness_change,
+        "format": FORMAT if sure is None else WITH_CERTAINTY, "name": card.name,
+        "source": card.source, "law": LAW, "form": law.form.name, "unit": unit,
+        "beta": [float(b) / scale for b in law.beta], "nu12": law.nu12,
+        "thickness_mm": card.thickness, "thickness_change": law.thickness_change,
         "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
-        **law.form.to_card(),
-    }
+        **law.form.to_card()
+    }  # fmt: skip
     if sure is not None:
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}

@@ -4,26 +4,21 @@ Inverse form, strains (change of length over length) of loads per width n (kN/m 
 
     eps_w = n_w / E_w - nu_w n_f / E_f,    eps_f = n_f / E_f - nu_f n_w / E_w.
 
-nu_w is how much the warp contracts when the fill is pulled (published as nu_xy beside E_x, E_y, x
-the warp), nu_f how much the fill contracts when the warp is pulled (nu12 of this program's law).
-Reciprocal constants have nu_w / E_f = nu_f / E_w. The direct form is its inverse:
+nu_w is how much the warp contracts when the fill is pulled (nu_xy beside E_x, x the warp), nu_f how
+much the fill does when the warp is pulled (nu12 of the law); reciprocal: nu_w / E_f = nu_f / E_w.
+Direct form:  n_w = A_w eps_w + A_wf eps_f,  n_f = A_fw eps_w + A_f eps_f.
 
-    n_w = A_w eps_w + A_wf eps_f,    n_f = A_fw eps_w + A_f eps_f.
-
-Of every path each yarn's strain is replaced by its regression line over the larger of the two
-loads, likewise the loads. Constants have the least sum of squares, at points evenly spread along
-these lines, of strains (inverse form) or of loads (direct form). Two yarns of five ratios are ten
-strain paths; the eight without the unloaded yarns of 1:0 and 0:1 are the usual choice.
+Strains and loads of a path are replaced by their regression lines over the larger load. Constants
+have the least sum of squares, at points evenly spread along these lines, of strains (inverse) or of
+loads (direct). Two yarns of five ratios are ten paths; the eight without the unloaded are usual.
 """
-
-from __future__ import annotations
 
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,9 +43,8 @@ class DesignersConstants:
     shear: float | None = None
 
     @classmethod
-    def of_compliance(cls, compliance: ArrayLike, shear: float | None = None) -> DesignersConstants:
-        """Return the constants of eps = C n, C (2, 2) per kN/m; raise InputError for a bad
-        diagonal."""
+    def of_compliance(cls, compliance: ArrayLike, shear: float | None = None) -> Self:
+        """Return the constants of eps = C n, C (2, 2) per kN/m; InputError for a bad diagonal."""
         c = np.asarray(compliance, dtype=float)
         if not (np.isfinite(c).all() and c[0, 0] > 0 and c[1, 1] > 0):
             problem = "a fabric would get shorter when it is pulled: these paths have no constants"
@@ -59,7 +53,7 @@ class DesignersConstants:
         return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp), shear)
 
     @classmethod
-    def of_stiffness(cls, stiffness: ArrayLike, shear: float | None = None) -> DesignersConstants:
+    def of_stiffness(cls, stiffness: ArrayLike, shear: float | None = None) -> Self:
         """Return the constants of n = A eps, A (2, 2) kN/m; raise InputError without an inverse."""
         a = np.asarray(stiffness, dtype=float)
         det = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
@@ -103,7 +97,6 @@ class DesignersConstants:
 
 
 Minimise = Literal["strain", "load"]
-
 #: Points of a line whose squares are added.
 POINTS = 10
 #: Of the larger load's change: a yarn whose load changes by less is unloaded.
@@ -112,10 +105,9 @@ UNLOADED = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LinearPath:
-    """The straight lines of one ratio, from its beginning.
+    """The straight lines of one ratio: changes of load (2,) kN/m and strain (2,) to its end.
 
-    load : (2,) kN/m and strain : (2,) by which they change to the end. residual : (2,) RMS of the
-    measured strains about their lines.
+    residual : (2,) RMS of the measured strains about their lines.
     """
 
     ratio: str
@@ -125,7 +117,6 @@ class LinearPath:
 
     @property
     def unloaded(self) -> tuple[bool, bool]:
-        """Return whether the load of the warp, of the fill hardly changes."""
         least = UNLOADED * float(np.abs(self.load).max())
         warp, fill = np.abs(self.load) < least
         return bool(warp), bool(fill)
@@ -148,12 +139,7 @@ def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
 
 @dataclass(frozen=True)
 class Options:
-    """Choices of an evaluation.
-
-    unloaded : with the strains of unloaded yarns (ten paths of five ratios) or without (eight).
-    reciprocal : nu_w / E_f = nu_f / E_w is required. minimise : squares of strains, or of loads.
-    ratios : those that count, all where it is empty.
-    """
+    """Choices of an evaluation: unloaded yarns, reciprocity, whose squares, which ratios."""
 
     unloaded: bool = False
     reciprocal: bool = True
@@ -161,7 +147,6 @@ class Options:
     ratios: tuple[str, ...] = ()
 
     def counts(self, path: LinearPath) -> tuple[bool, bool]:
-        """Return which yarns of a path count."""
         if self.ratios and path.ratio not in self.ratios:
             return False, False
         warp, fill = path.unloaded
@@ -170,11 +155,7 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Constants of some options.
-
-    paths : number of strain paths that count. squares : sum of the squares of strain over them,
-    %^2, at `POINTS` of each. rms : by ratio, of the strains of both yarns, in %.
-    """
+    """Constants of some options; squares : of strain, %^2; rms : of strain by ratio, %."""
 
     options: Options
     constants: DesignersConstants
@@ -213,7 +194,6 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
 
 
 def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluation | None:
-    """Return the constants; None where the paths do not settle them."""
     try:
         return evaluate(paths, options)
     except InputError:
@@ -221,17 +201,13 @@ def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluatio
 
 
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
-    """Return the results of every other choice that settles the constants."""
     others = [other for other in every_option(paths) if other != options]
     found = [evaluate_or_none(paths, other) for other in others]
     return [one for one in found if one is not None]
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:
-    """Return the choices of laboratories: eight or ten paths, reciprocal or not, strains or loads.
-
-    Also the ratios about 1:1 alone where there are others.
-    """
+    """Return the choices of laboratories, and ratios about 1:1 alone where there are others."""
     kinds: tuple[Minimise, ...] = ("strain", "load")
     found = [
         Options(unloaded, reciprocal, minimise)
@@ -251,7 +227,6 @@ def _shares() -> Array:
 
 
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
-    """Return rows of the linear equations, and their right sides."""
     rows, right = [], []
     # All points of a straight line say the same: one row with the root of their squares' sum.
     weight = float(np.sqrt((_shares() ** 2).sum()))
@@ -270,7 +245,6 @@ def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array
 
 #: The five of which designers' constants are made.
 RATIOS = ("1:1", "2:1", "1:2", "1:0", "0:1")
-
 _RATIO = re.compile(r"^\s*(\d+(?:[.,]\d+)?)\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$")
 
 
@@ -296,11 +270,10 @@ SHEARS = 61
 
 @dataclass(frozen=True, eq=False)
 class LawConstants:
-    """A law as designers' constants.
+    """A law as designers' constants; others : of the other options.
 
-    evaluation : its constants with the shear stiffness; others : of the other options. lost : by
-    ratio, RMS difference from the law's own strains along the path, %. largest : by ratio, the
-    law's largest strain, %. shear : (least, largest) G per width over the shear strains, kN/m.
+    lost, largest : by ratio, RMS difference from the law's strains, and its largest strain, %.
+    shear : (least, largest) G per width over the shear strains, kN/m.
     """
 
     evaluation: Evaluation
@@ -315,24 +288,17 @@ class LawConstants:
 
     @property
     def rms(self) -> float:
-        """Return the RMS difference over all ratios, %."""
         return float(np.sqrt(np.mean(np.square([*self.lost.values()]))))
 
 
 def constants_of_law(
-    law: HypoelasticLaw,
-    thickness: float,
-    lowest: float,
-    highest: float,
-    shear_strain: float,
-    options: Options = USUAL,
-    ratios: Sequence[str] = RATIOS,
-) -> LawConstants:
+    law: HypoelasticLaw, thickness: float, lowest: float, highest: float, shear_strain: float,
+    options: Options = USUAL, ratios: Sequence[str] = RATIOS
+) -> LawConstants:  # fmt: skip
     """Evaluate a law as a test of five ratios is evaluated.
 
-    thickness : mm. lowest, highest : kN/m, of the larger load of each ratio. shear_strain : up to
-    which G is averaged. Raises InputError for loads that do not increase or that the law does not
-    carry.
+    lowest, highest : kN/m, of the larger load of each ratio. shear_strain : up to which G is
+    averaged.
     """
     if not 0 <= lowest < highest:
         problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
@@ -356,7 +322,6 @@ def constants_of_law(
 def _curve(
     law: HypoelasticLaw, thickness: float, ratio: str, lowest: float, highest: float
 ) -> tuple[Array, Array]:
-    """Return loads (n, 2) kN/m of a ratio and the law's strains (n, 2)."""
     larger = np.concatenate(
         [np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
          np.linspace(lowest, highest, STEPS + 1)]
@@ -382,21 +347,13 @@ def row_of(one: Evaluation) -> dict[str, Any]:
     c, o = one.constants, one.options
     direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
     return {
-        "minimise": o.minimise,
-        "reciprocal": o.reciprocal,
-        "unloaded_yarns": o.unloaded,
-        "ratios": " ".join(o.ratios) or "all",
-        "paths": one.paths,
-        "E_warp_kN_per_m": c.warp,
-        "E_fill_kN_per_m": c.fill,
-        "nu_warp": c.nu_warp,
-        "nu_fill": c.nu_fill,
-        "A_warp_kN_per_m": direct[0, 0],
-        "A_fill_kN_per_m": direct[1, 1],
-        "A_warp_fill_kN_per_m": direct[0, 1],
-        "A_fill_warp_kN_per_m": direct[1, 0],
-        "squares_percent2": one.squares,
-    }
+        "minimise": o.minimise, "reciprocal": o.reciprocal, "unloaded_yarns": o.unloaded,
+        "ratios": " ".join(o.ratios) or "all", "paths": one.paths, "E_warp_kN_per_m": c.warp,
+        "E_fill_kN_per_m": c.fill, "nu_warp": c.nu_warp, "nu_fill": c.nu_fill,
+        "A_warp_kN_per_m": direct[0, 0], "A_fill_kN_per_m": direct[1, 1],
+        "A_warp_fill_kN_per_m": direct[0, 1], "A_fill_warp_kN_per_m": direct[1, 0],
+        "squares_percent2": one.squares
+    }  # fmt: skip
 
 
 def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:

@@ -10,12 +10,10 @@ nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. One increm
 of each modulus over its own strain increment (`point_moduli`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,11 +35,10 @@ from .forms.base import (
     ratio_map,
 )
 from .forms.polynomial import CONSTANT, CUBIC
-from .forms.trilinear import TriLinear
+from .forms.spline import TriLinear
 from .point_law import SLOPES, membrane_stress, stress_update
 
 ThicknessChange = Literal["constant", "incompressible"]
-
 __all__ = ["COMPONENTS", "UNLIMITED", "HypoelasticLaw", "ThicknessChange"]
 #: Jump of a modulus at the end of a piece, over its size there, that is more than rounding.
 JUMP = 1e-6
@@ -51,12 +48,10 @@ JUMP = 1e-6
 class HypoelasticLaw:
     """Tangent moduli and Poisson's ratio of a coated fabric.
 
-    beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12) of
-    the range that beta holds for; beyond them, and below zero, a modulus keeps its end value.
-    thickness_change : "constant" (shells that keep it) or "incompressible" (resultant sigma t0 /
-    area ratio). form : how beta makes the moduli; cubics unless given. pieces : (3, P, 5) MPa, the
-    moduli as piecewise cubics (`forms.base.pieces_of`); made here. Raises InputError for what does
-    not fit.
+    beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12),
+    beyond which, and below zero, a modulus keeps its end value. thickness_change : "constant"
+    (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio). pieces : (3, P, 5)
+    MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here.
     """
 
     beta: Array
@@ -94,32 +89,21 @@ class HypoelasticLaw:
 
     @classmethod
     def linear(
-        cls,
-        e1: float,
-        e2: float,
-        g12: float,
-        nu12: float = 0.24,
-        thickness_change: ThicknessChange = "constant",
-    ) -> HypoelasticLaw:
-        """Return the linear orthotropic law of constant moduli (MPa)."""
+        cls, e1: float, e2: float, g12: float, nu12: float = 0.24,
+        thickness_change: ThicknessChange = "constant"
+    ) -> Self:  # fmt: skip
         beta = np.zeros(12)
         beta[[3, 7, 11]] = g12, e2, e1
         return cls(beta, nu12, None, thickness_change, CONSTANT)  # type: ignore[arg-type]
 
     @classmethod
     def trilinear(
-        cls,
-        e1: Sequence[float],
-        e2: Sequence[float],
-        g12: Sequence[float],
-        breaks: ArrayLike,
-        nu12: float = 0.24,
-        strain_range: ArrayLike | None = None,
-        thickness_change: ThicknessChange = "constant",
-    ) -> HypoelasticLaw:
-        """Return the law of moduli (MPa) that are constant in three regions of their strain.
+        cls, e1: Sequence[float], e2: Sequence[float], g12: Sequence[float], breaks: ArrayLike,
+        nu12: float = 0.24, strain_range: ArrayLike | None = None,
+        thickness_change: ThicknessChange = "constant"
+    ) -> Self:  # fmt: skip
+        """Return the law of (3,) moduli (MPa) that are constant in three regions of their strain.
 
-        e1, e2, g12 : (3,) moduli up to the first break, between the breaks, beyond the second.
         breaks : (3, 2) two strains for each of (eps1, eps2, gamma12).
         """
         for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
@@ -148,15 +132,11 @@ class HypoelasticLaw:
         """Return the power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
         return 1.0 if self.thickness_change == "constant" else 0.0
 
-    def with_beta(self, beta: ArrayLike) -> HypoelasticLaw:
-        """Return the same law with other coefficients (MPa)."""
+    def with_beta(self, beta: ArrayLike) -> Self:
         return replace(self, beta=np.asarray(beta, dtype=float))
 
     def modulus(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
-        """Return the tangent modulus (MPa) 'E1', 'E2' or 'G12' at strains of any shape.
-
-        ratio : the normalised load ratio of the modulus' own yarn; equal loads unless given.
-        """
+        """Return a tangent modulus (MPa) at strains of any shape and its yarn's load ratio."""
         pieces = self.pieces[COMPONENTS[name]]
         held = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
         c = pieces[np.searchsorted(pieces[:-1, 0], held), 1:]
@@ -174,24 +154,18 @@ class HypoelasticLaw:
         return bool(ratio_map(self.form).any())
 
     def E1(self, strain: ArrayLike) -> Array:
-        """Return the warp tangent modulus (MPa) of eps1."""
         return self.modulus("E1", strain)
 
     def E2(self, strain: ArrayLike) -> Array:
-        """Return the fill tangent modulus (MPa) of eps2."""
         return self.modulus("E2", strain)
 
     def G12(self, strain: ArrayLike) -> Array:
-        """Return the shear tangent modulus (MPa) of gamma12."""
         return self.modulus("G12", strain)
 
     def increment(
         self, strain_old: ArrayLike, strain_new: ArrayLike, stress_old: ArrayLike
     ) -> tuple[Array, Array]:
-        """Return stress (n, 3) MPa after one increment of strain (n, 3), and its tangent (n, 3, 3).
-
-        NaN in the rows where a modulus is not positive.
-        """
+        """Return stress (n, 3) MPa after an increment of strain, and its tangent, or NaN."""
         old, new, stress = (
             np.ascontiguousarray(np.atleast_2d(a), dtype=float)
             for a in (strain_old, strain_new, stress_old)
@@ -199,15 +173,12 @@ class HypoelasticLaw:
         return _increments(self.pieces, self.coupling, old, new, stress)
 
     def second_piola_kirchhoff(
-        self,
-        gradient: ArrayLike,
-        strain_old: ArrayLike | None = None,
-        stress_old: ArrayLike | None = None,
-    ) -> tuple[Array, Array, Array, Array]:
+        self, gradient: ArrayLike, strain_old: ArrayLike | None = None,
+        stress_old: ArrayLike | None = None
+    ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
         """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), log strain (n, 3), corotated stress (n, 3).
 
-        gradient : (n, k, 2), k = 2 or 3: columns are the images of the unit warp and fill vectors.
-        strain_old, stress_old : (n, 3) at the start; zero unless given.
+        gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors.
         """
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
@@ -260,8 +231,7 @@ def law_slopes(
 ) -> tuple[Array, Array]:
     """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling` (3, np).
 
-    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm, of a sheet that is `thickness`
-    mm thick); by any other they are zero.
+    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm); by any other they are zero.
     """
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
@@ -287,10 +257,10 @@ DEFINITE = 1.02
 def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Array:
     """Return (n, size) so that the law is positive definite in a pull where rows @ beta >= 0.
 
-    That is E1 E2 > (nu12 E2)^2. A fabric that is pulled contracts, so that the modulus across is
-    that at zero strain, and the condition is linear: E1(0) > nu12^2 E2(eps2) in a pull along the
-    fill, E1(eps1) > nu12^2 E2(0) along the warp. Moduli that go with the load ratio are those of
-    the pull, and those of equal loads without strain, where every path begins.
+    That is E1 E2 > (nu12 E2)^2. What is pulled contracts, so that the modulus across is that at
+    zero strain: E1(0) > nu12^2 E2(eps2) in a pull along the fill, E1(eps1) > nu12^2 E2(0) along the
+    warp. Moduli of the load ratio are those of the pull, and of equal loads, where every path
+    begins.
     """
     share = DEFINITE * nu12**2
     none, most = RATIO_ENDS

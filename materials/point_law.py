@@ -25,7 +25,6 @@ TINY = 1e-12
 
 @compiled()
 def _place(pieces: Array, component: int, x: float) -> int:
-    """Return the piece that holds at x; the last one beyond the range, the first below zero."""
     k, last = 0, pieces.shape[1] - 1
     while k < last and x > pieces[component, k, 0]:
         k += 1
@@ -34,7 +33,6 @@ def _place(pieces: Array, component: int, x: float) -> int:
 
 @compiled()
 def _means(a: float, b: float) -> tuple[float, float, float]:
-    """Return means of x^3, x^2 and x between a and b."""
     total, squares = a + b, a * a + b * b
     return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
 
@@ -48,7 +46,6 @@ def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) ->
 
 @compiled()
 def point_modulus(pieces: Array, component: int, x: float) -> float:
-    """Return the modulus at the strain x."""
     size = abs(x) if component == 2 else x
     held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
     k = _place(pieces, component, held)
@@ -96,11 +93,7 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
 def increment_modulus(
     pieces: Array, component: int, x: float, x_old: float
 ) -> tuple[float, float, float]:
-    """Return the mean modulus from x_old to x, and its derivatives by x and by x_old.
-
-    These are (E(x) - mean)/(x - x_old) and (mean - E(x_old))/(x - x_old). Inside one piece all
-    three are polynomials of both strains, so that nothing cancels however small the increment.
-    """
+    """Return the mean modulus from x_old to x, and its derivatives by x and by x_old."""
     a, b, sign = x_old, x, 1.0
     if component == 2 and x <= 0.0 and x_old <= 0.0:
         a, b, sign = -x_old, -x, -1.0
@@ -156,10 +149,7 @@ def _add_way(
 def by_pieces(
     pieces: Array, component: int, x: float, x_old: float, weights: Array
 ) -> tuple[int, int]:
-    """Write the derivative of the mean modulus by the coefficients of each piece to weights (P, 4).
-
-    Returns the first piece on the way and the one after the last; the others are not written.
-    """
+    """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
     a, b, whole = x_old, x, abs(x - x_old)
     if component == 2 and x * x_old >= 0.0:
         a, b = abs(x_old), abs(x)
@@ -190,20 +180,14 @@ def by_pieces(
 
 # The load ratio of one increment at one integration point, compiled.
 #
-# Stresses s1, s2 along warp and fill have the normalised load ratios
+# Stresses along warp and fill have the normalised load ratios gamma1 = s1 / sqrt(s1^2 + s2^2) =
+# cos(angle), gamma2 = sin(angle), from 0 (only the warp carries) to a right angle. They are ratios
+# of tension: a yarn that is pressed beside one that is pulled counts as one without load, where
+# both are pressed the ratios are those of |s2| : |s1|, and without any stress the ratio is 1:1.
 #
-#     gamma1 = s1 / sqrt(s1^2 + s2^2) = cos(angle),    gamma2 = s2 / sqrt(s1^2 + s2^2) = sin(angle),
-#
-# an angle from 0 (only the warp carries) to a right angle (only the fill does). They are ratios of
-# tension: a yarn that is pressed beside one that is pulled counts as one without load, where both
-# are pressed the ratios are those of |s2| : |s1| (so they stay continuous), and without any stress
-# the ratio is 1:1.
-#
-# An increment takes the ratio of its MEAN stress, (s_old + s_new)/2, so that a path on which the
-# stresses grow in proportion has constant moduli in any number of increments, and the error on
-# others goes with the square of the increment. s_new depends on the moduli and they on it: the
-# angle is the root of one equation, which there always is, because the angle of the mean stress is
-# between 0 and a right angle whatever the moduli.
+# An increment takes the ratio of its MEAN stress, (s_old + s_new)/2: proportional paths have
+# constant moduli in any number of increments, others an error of second order. s_new depends on the
+# moduli and they on it: the angle is the root of one equation, between 0 and a right angle.
 
 RIGHT = 0.5 * math.pi
 #: Steps to the angle; half the range each, where Newton's leave it.

@@ -56,10 +56,9 @@ ROUNDS = 50
 
 
 def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array, Array]:
-    """Return log strain (n, 3) and Cauchy stress (n, 3), MPa, of a bar pulled step by step.
+    """Return log strain and Cauchy stress (n, 3), MPa, of a bar pulled step by step.
 
-    pulled : 0 along the warp, 1 along the fill. log_strain : (n,) of the pulled direction, one
-    increment of the law each, from zero. Raises InputError where a modulus is not positive on the
+    pulled : 0 warp, 1 fill. log_strain : (n,) of it. InputError : a modulus is not positive on the
     way.
     """
     free = 1 - pulled
@@ -86,10 +85,7 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
 def uniaxial_curve(
     law: HypoelasticLaw, pulled: int, log_strain: ArrayLike, measure: Measure
 ) -> tuple[Array, Array]:
-    """Return strain (n,) and stress (n,), MPa, in `measure` at increasing (or falling) log strains.
-
-    The first log strain may be zero. Raises as `bar`.
-    """
+    """Return strain (n,) and stress (n,), MPa, in `measure` at monotonic log strains."""
     ends = np.asarray(log_strain, dtype=float)
     fine = _refined(ends)
     h, s = bar(law, pulled, fine)
@@ -110,9 +106,8 @@ def trellis_curve(
 ) -> tuple[Array, Array, Array]:
     """Return shear strain (n,), shear stress (n,) and stress along the yarns (n, 2), MPa.
 
-    The stress along the yarns, which a law of curves that do not couple leaves out, is 2nd
-    Piola-Kirchhoff stress whatever the measure. angle : (n,) increasing changes of the angle
-    between the yarns, radians. Raises InputError where a modulus is not positive on the way.
+    The last, which curves that do not couple leave out, is 2nd Piola-Kirchhoff stress whatever the
+    measure. angle : (n,) increasing changes of the angle between the yarns, radians.
     """
     ends = np.asarray(angle, dtype=float)
     fine = _refined(ends)
@@ -137,10 +132,7 @@ def trellis_curve(
 
 
 def trellis_angle(gamma12: float) -> float:
-    """Return the change of angle (radians) at which trellis shear has the log strain gamma12.
-
-    U of C = [[1, sin a], [sin a, 1]] gives gamma12 = atanh(sin a).
-    """
+    """Return the change of angle (radians) at a log strain gamma12 = atanh(sin a)."""
     return float(np.arcsin(np.tanh(gamma12)))
 
 
@@ -166,9 +158,9 @@ TOLERANCE = 1e-13
 class BiaxialResponse:
     """A patch at one load after the other.
 
-    strain : (n, 2) logarithmic, along warp and fill. stress : (n, 2) MPa, Cauchy. slope : (n, 2,
-    parameters) derivatives of the strain. reached : how many loads have an equilibrium; rows beyond
-    are NaN. stable : (n,) whether every small stretch of the patch takes work.
+    strain : (n, 2) logarithmic. stress : (n, 2) MPa, Cauchy. slope : (n, 2, parameters) of the
+    strain. reached : loads with an equilibrium; rows beyond are NaN. stable : every small stretch
+    takes work.
     """
 
     strain: Array
@@ -186,10 +178,9 @@ class BiaxialResponse:
 def biaxial_response(
     law: HypoelasticLaw, loads: ArrayLike, thickness: float, parameters: Sequence[str] = ()
 ) -> BiaxialResponse:
-    """Return the strains of a patch, from the unloaded state.
+    """Return the strains of a patch, unloaded at first, at loads (n, 2) N/mm.
 
-    loads : (n, 2) N/mm (kN/m) along warp and fill. thickness : mm, before the test. parameters : of
-    the derivatives: "beta_i" (per MPa), "nu12" and "thickness" (per mm).
+    parameters : of the derivatives: "beta_i" (per MPa), "nu12" and "thickness" (per mm).
     """
     asked = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
     rows, by_coupling = law_slopes(law, parameters, thickness)
@@ -207,8 +198,7 @@ def biaxial_response(
 def _forces(  # type: ignore[no-untyped-def]
     pieces, coupling, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
 ):
-    """Write forces per width less the load to rest (2,), derivatives by h to k (2, 2); False if
-    not."""
+    """Write forces per width less the load to rest (2,), derivatives to k (2, 2)."""
     if not stress_update(pieces, coupling, h, h_old, s_old, s, tangent, slopes):
         return False
     for i in range(2):
@@ -313,10 +303,7 @@ MOST, HALVINGS_BIAXIAL_REACH, LOADS = 1000.0, 50, 20
 def largest_load(
     law: HypoelasticLaw, thickness: float, shares: Sequence[tuple[float, float]], ends: ArrayLike
 ) -> float:
-    """Return the larger load (kN/m) up to which every ratio keeps within strains; 0 if none does.
-
-    shares : loads along warp and fill of each ratio, the larger 1. ends : (2,) logarithmic strains.
-    """
+    """Return the larger load (kN/m) at which every ratio keeps within strains (2,), or 0."""
     known = np.asarray(ends, dtype=float)
 
     def within(load: float) -> bool:
@@ -335,11 +322,7 @@ def largest_load(
 
 
 def curve_pieces(law: HypoelasticLaw, name: str) -> Array:
-    """Return (n, 5) pieces of a modulus, MPa, each once; raise InputError if of the load ratio.
-
-    A row is the upper end of a piece and its four coefficients, highest power of the strain first;
-    below zero strain and beyond the last end the modulus is held.
-    """
+    """Return (n, 5) pieces of a modulus, MPa: upper end, then coefficients, highest power first."""
     if law.of_load_ratio:
         problem = (
             f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
@@ -360,21 +343,12 @@ def piece_constants(law: HypoelasticLaw) -> tuple[float, ...]:
 
 #: Points from zero strain to the end of the range.
 POINTS = 121
-
-
-#: Where a table ends when the law's range does not: a law without a range holds its polynomials
-#: for any strain, a table cannot.
+#: Where a table ends when the law's range does not.
 REACH = 0.3
-
-
 #: Strain over which a table makes the jump of a modulus: a table takes one value a strain.
 JUMP = 1e-6
-
-
 #: Difference of two pieces where they meet, over the modulus there, that is more than rounding.
 ROUNDING = 1e-9
-
-
 #: Strains between two points at which the error of a table is looked for.
 BETWEEN = 16
 
@@ -383,10 +357,8 @@ BETWEEN = 16
 class ModulusTable:
     """One tangent modulus by its log strain; straight between points, held beyond both ends.
 
-    name : "E1", "E2" or "G12" (of the engineering shear, from -end to end: it is even in it).
-    strain, modulus : (n,), increasing strains and MPa. error : largest relative difference from the
-    law between the points, jumps left out. jumps : strains from 0 where the modulus jumps. reaches
-    : the table covers the law's whole range.
+    strain, modulus : (n,); G12 from -end to end. error : largest relative difference from the law
+    between the points. jumps : strains where it jumps. reaches : the law's whole range is covered.
     """
 
     name: str
@@ -404,10 +376,9 @@ class ModulusTable:
 def modulus_table(
     law: HypoelasticLaw, name: str, points: int = POINTS, reach: float = REACH
 ) -> ModulusTable:
-    """Return the table of one modulus.
+    """Return the table of one modulus: `points` equally spaced strains, and the ends of pieces.
 
-    points : equally spaced strains from 0 to the end; where one piece gives way to the next there
-    is one more, and two where it jumps. reach : the end where the law has no range.
+    reach : the end where the law has no range.
     """
     if points < 2:
         raise InputError(None, "points", f"expected at least 2, got {points}")
@@ -434,7 +405,6 @@ def modulus_table(
 def modulus_tables(
     law: HypoelasticLaw, points: int = POINTS, reach: float = REACH
 ) -> dict[str, ModulusTable]:
-    """Return the tables of E1, E2 and G12, by name; as `modulus_table`."""
     return {name: modulus_table(law, name, points, reach) for name in COMPONENTS}
 
 

@@ -281,10 +281,7 @@ def relaxed_membrane_stress(
     share: float, h_old: Array, s_old: Array, h: Array, he: Array, s_new: Array, pk2: Array,
     stiffness: Array, p: Array, law_tangent: Array, slopes: Array, pull: Array, work: Array,
 ) -> int:  # fmt: skip
-    """Compute as `membrane_stress`, for a membrane that wrinkles; returns as `relaxed_update`.
-
-    The stress resultant goes with the area of the fabric, not with that of the wrinkled surface.
-    """
+    """Return as `membrane_stress`, of a membrane that wrinkles; or -1."""
     if not log_strain(m, q, c, h, p):
         return -1
     carried, slope = np.empty(3), np.empty((3, 3))

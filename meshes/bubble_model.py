@@ -1,7 +1,5 @@
 """The inflated circular membrane (thesis chapter 4) as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -16,7 +14,6 @@ THICKNESS = "thickness"
 
 
 def changes_anything(known: Sequence[str], values: Mapping[str, float]) -> bool:
-    """Return whether values added to parameters change a model; InputError if unknown."""
     unknown = [name for name in values if name not in known]
     if unknown:
         raise InputError(None, "parameters", f"{unknown} not among {tuple(known)}")
@@ -28,11 +25,9 @@ class OfThickness:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Return what `with_parameters` changes: thickness (mm)."""
         return (THICKNESS,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """Return the model with `values` added to its `parameters`; itself where all are zero."""
         if not changes_anything(self.parameters, values):
             return self
         model: Any = self
@@ -42,12 +37,8 @@ class OfThickness:
 
 #: Pinned rim; symmetry lines where the mesh has them.
 RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
-    "rim": (0, 1, 2),
-    "symmetry_x": (0,),
-    "symmetry_y": (1,),
-}
-
-
+    "rim": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)
+}  # fmt: skip
 #: Parameters of the stress-free sheet beside its modes.
 SLACK = ("slack_warp", "slack_fill")
 PRESSURE_OFFSET = "pressure_offset"
@@ -57,18 +48,14 @@ PRESSURE_OFFSET = "pressure_offset"
 class BubbleModel:
     """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
-    mesh : mm; warp is x, fill is y, z the surface of the sheet in the reference picture, from which
-    displacements are counted. thickness : mm, in the reference state. pressures : MPa, increasing:
-    the frames to report. increments : MPa, increasing, containing every pressure: steps over which
-    the law is integrated; they hardly matter to the result (benchmarks/bench_law.py increments).
+    mesh : mm; warp is x, fill is y, z the surface in the reference picture, from which
+    displacements are counted. pressures : MPa, increasing: the frames. increments : MPa, containing
+    every pressure: steps of the law, which hardly matter (benchmarks/bench_law.py increments).
     supports : degrees of freedom held at zero, by node set; those of the rim where it moves. modes
     : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm. slack : how much
     longer the stress-free sheet is along x (warp) and y (fill), as a share. rim_motion :
     (increments, rim nodes, 3) mm from the reference picture at the end of every increment; None for
     a rim that stays.
-
-    Raises InputError for pressures that do not increase, increments without a pressure, supports on
-    unknown sets (symmetry sets excepted), wrong numbers of nodes, a slack of -1 or less.
     """
 
     mesh: Mesh
@@ -111,14 +98,10 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Return what `with_parameters` changes: MPa, mm, shares, and the modes (mm)."""
         return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)
 
-    def with_parameters(self, values: Mapping[str, float]) -> BubbleModel:
-        """Return the model with `values` added to its `parameters`; itself where all are zero.
-
-        Raises InputError for unknown names, or where pressure or thickness would not be positive.
-        """
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the model with `values` added to its `parameters`; itself where all are zero."""
         if not changes_anything(self.parameters, values):
             return self
         points = np.array(self.mesh.points, dtype=float)
@@ -129,17 +112,14 @@ class BubbleModel:
             own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
         )
         return replace(
-            self,
-            mesh=replace(self.mesh, points=points),
+            self, mesh=replace(self.mesh, points=points),
             thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
-            increments=[p + offset for p in self.increments],
-            slack=(warp, fill),
-        )
+            increments=[p + offset for p in self.increments], slack=(warp, fill)
+        )  # fmt: skip
 
     @property
     def stress_free(self) -> Array:
-        """Return (nodes, 3) mm, the nodes of the sheet without any stress."""
         warp, fill = self.slack
         return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
 
@@ -171,13 +151,11 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Return the index of each reported pressure in `increments`, (frames,)."""
         steps = np.array(self.increments)
         return np.array([int(np.argmin(np.abs(steps - p))) for p in self.pressures])
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Return held degrees of freedom, 3 * node + direction, sorted."""
         dofs = [
             3 * self.mesh.node_sets[name] + direction
             for name, directions in self.supports.items()
@@ -188,11 +166,7 @@ class BubbleModel:
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
-    """Return the pressures with small first steps, no step more than about 3 times the last.
-
-    22, 59, 97 ... kPa becomes 6, 22, 40, 59, 97 ... The two more are not for accuracy: from a flat
-    sheet Newton reaches a high first pressure in as many iterations as two lower ones.
-    """
+    """Return the pressures with small first steps, which help Newton from a flat sheet."""
     first = pressures[0]
     steps = [first * 6.0 / 22.0, *pressures]
     if len(pressures) > 1 and pressures[1] > 1.5 * first:

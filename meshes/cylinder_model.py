@@ -1,7 +1,5 @@
 """The inflated cylinder in three-point bending as plain data."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -14,8 +12,7 @@ from ..errors import InputError
 from .mesh import Array, Mesh
 from .tube import Refinement, cylinder_mesh
 
-#: Inner diameter and length (mm) of the collar by the largest diameter of cylinder it is for: those
-#: of thesis section 6.2, which goes no further.
+#: Inner diameter and length (mm) of the collar by the largest diameter of cylinder (thesis 6.2).
 COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
 
 
@@ -32,10 +29,7 @@ class RigidSupports:
 
 @dataclass(frozen=True)
 class Collar:
-    """A frictionless ring around the middle of the tube, its axis along z, pulled down, mm.
-
-    fillet : radius of its inner edges.
-    """
+    """A frictionless ring (mm) around the tube, pulled down; fillet : of its inner edges."""
 
     inner_diameter: float
     length: float
@@ -66,12 +60,23 @@ def _check(body: RigidSupports | Collar, name: str) -> None:
 
 
 @dataclass(frozen=True)
-class Gas:
-    """Air as the thesis has it; gauge pressures are above `ambient`.
+class ClosedGas:
+    """Gas of constant mass and temperature; amount : absolute pressure times volume."""
 
-    ambient : MPa, the pressure around and the reference of the density. temperature : K, constant.
-    density : kg/m^3 at ambient pressure and this temperature. Raises InputError unless positive.
-    """
+    amount: float
+    ambient: float
+
+    def pressure(self, volume: float) -> float:
+        return self.amount / volume - self.ambient
+
+    def stiffness(self, volume: float) -> float:
+        """Return the loss of pressure per volume, -dp/dV (MPa/mm^3)."""
+        return self.amount / volume**2
+
+
+@dataclass(frozen=True)
+class Gas:
+    """Air as the thesis has it; gauge pressures are above `ambient` (MPa), density kg/m^3 there."""
 
     ambient: float = 0.101
     temperature: float = 300.0
@@ -92,22 +97,6 @@ class Gas:
         return ClosedGas((gauge + self.ambient) * volume, self.ambient)
 
 
-@dataclass(frozen=True)
-class ClosedGas:
-    """Gas of constant mass and temperature; amount : absolute pressure times volume."""
-
-    amount: float
-    ambient: float
-
-    def pressure(self, volume: float) -> float:
-        """Return the gauge pressure (MPa) in `volume` (mm^3)."""
-        return self.amount / volume - self.ambient
-
-    def stiffness(self, volume: float) -> float:
-        """Return the loss of pressure per volume, -dp/dV (MPa/mm^3)."""
-        return self.amount / volume**2
-
-
 #: Unless given, in diameters of the cylinder: where loads are listed, and the deflection over which
 #: a slope is taken.
 PLACES, SLOPE_OVER = (0.25, 0.5, 1.0), 0.1
@@ -115,11 +104,9 @@ PLACES, SLOPE_OVER = (0.25, 0.5, 1.0), 0.1
 
 @dataclass(frozen=True)
 class CurveReading:
-    """Places at which a curve is read.
+    """Places at which a curve is read: mm of deflection, by label ("40 mm", "0.25 diameters").
 
-    places : mm of deflection, by label ("40 mm", "0.25 diameters"). slope_over : mm of deflection:
-    the initial stiffness is the slope up to here, and the knee is where the slope over as much has
-    fallen. Raises InputError for what is not above zero.
+    slope_over : mm: the initial stiffness is the slope up to here; the knee, where it has fallen.
     """
 
     places: Mapping[str, float]
@@ -151,22 +138,15 @@ NEEDED = ("support", "support_bottom", "mid_span", "top_line", "bottom_line")
 class CylinderModel:
     """A cylinder that is inflated, closed, and bent by a collar between two supports.
 
-    First the gauge pressure rises over `inflation`, the bottom held in height at the supports
-    (`held_on_inflation`). Then the gas is closed in, its mass constant, and the cylinder lies free
-    on the supports while the collar goes down. Reported: the inflated state, then every one of
-    `deflections`; load in N, pressure and volume, all of the WHOLE cylinder (`copies` of the mesh).
+    First the gauge pressure rises over `inflation` (MPa), the bottom held in height at the
+    supports. Then the gas is closed in, its mass constant, and the cylinder lies free on the
+    supports while the collar goes down. Reported: the inflated state, then every one of
+    `deflections` (mm of the collar since it touched); load in N, pressure and volume, all of the
+    WHOLE cylinder (`copies` of the mesh).
 
-    mesh : mm, as `cylinder_mesh` makes it: z along the axis, y up, seam at the bottom, `warp` in
-    each quad, and the rows `support` and `support_bottom` at z = span / 2. thickness : (quads,) mm
-    in the reference state; the seam is three times as thick. inflation : MPa, increasing increments
-    of gauge pressure to the one at which the gas is closed in. deflections : mm of the collar since
-    it touched the inflated cylinder, increasing: the frames. increments : mm, containing every
-    deflection: the steps of the law; the deflections unless given. reading : where the curve of
-    load over deflection is read, which changes no result.
-
-    Raises InputError for a mesh without warp directions or node sets, wrong thicknesses, pressures
-    or deflections that do not increase, supports that are not under the cylinder, a collar that
-    does not go around it or reaches the supports.
+    mesh : as `cylinder_mesh` makes it: z along the axis, y up, seam at the bottom, `warp` in each
+    quad, rows `support` and `support_bottom` at z = span / 2. thickness : (quads,) mm. increments :
+    mm, containing every deflection: the steps of the law. reading : changes no result.
     """
 
     mesh: Mesh
@@ -232,7 +212,6 @@ class CylinderModel:
 
     @property
     def diameter(self) -> float:
-        """Return the diameter (mm) before inflation."""
         return self.diameter_at(self.mesh.points)
 
     def diameter_at(self, points: Array) -> float:
@@ -246,17 +225,14 @@ class CylinderModel:
 
     @property
     def pressure(self) -> float:
-        """Return the gauge pressure of the inflated cylinder, MPa."""
         return self.inflation[-1]
 
     @property
     def copies(self) -> int:
-        """Return how many times the mesh makes the whole cylinder: 4 for a quarter."""
         return int(2 ** sum(f"symmetry_{axis}" in self.mesh.node_sets for axis in "xz"))
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        """Return the index of each reported deflection in `increments`, (frames - 1,)."""
         steps = np.array(self.increments)
         return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
 
@@ -264,8 +240,8 @@ class CylinderModel:
     def guides(self) -> Mapping[str, tuple[int, ...]]:
         """Return the directions held at zero throughout, by node set: the planes of symmetry.
 
-        On the whole cylinder top and bottom line stay in the plane x = 0 and the ring at mid-span
-        in z = 0, where symmetry has them anyway: frictionless supports hold it in height only.
+        Frictionless supports hold the whole cylinder in height only: lines of it stay in those
+        planes.
         """
         sideways = ("symmetry_x",) if self._cut("x") else ("top_line", "bottom_line")
         along = "symmetry_z" if self._cut("z") else "mid_span"
@@ -273,15 +249,8 @@ class CylinderModel:
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Return degrees of freedom held at zero throughout, 3 * node + direction, sorted."""
         held = [3 * self.mesh.node_sets[n] + k for n, ks in self.guides.items() for k in ks]
         return np.unique(np.concatenate(held)).astype(np.intp)
-
-    @property
-    def held_on_inflation(self) -> NDArray[np.intp]:
-        """Return degrees of freedom held at zero until the cylinder is inflated, sorted."""
-        bottom = 3 * self.mesh.node_sets["support_bottom"] + 1
-        return np.union1d(self.fixed, bottom).astype(np.intp)
 
     def _cut(self, axis: str) -> bool:
         return f"symmetry_{axis}" in self.mesh.node_sets
@@ -294,9 +263,8 @@ Vector = tuple[float, float, float]
 class RigidCylinder:
     """A rigid post (infinitely long) that the membrane lies on, or a ring around it, mm.
 
-    name : of its reaction in the history; bodies of one name are added up. axis : unit vector.
-    radius : outside of a post, inside of a ring. length, fillet : of a ring: length and rounding of
-    its mouth.
+    name : bodies of one name have one reaction. radius : outside of a post, inside of a ring.
+    length, fillet : of a ring and its mouth.
     """
 
     name: str
@@ -312,10 +280,9 @@ class RigidCylinder:
 class Bending:
     """Rigid cylinders that bend an inflated membrane with a constant mass of gas in it.
 
-    supports : bodies at rest, brought up along minus `direction` to touch first. collar : moves
-    along `direction`, brought down to touch first. displacements : mm of the collar from touching,
-    increasing: the increments. reported : index of each that is a frame; all unless given. released
-    : node set held only while inflating. penalty : MPa/mm of contact.
+    supports : at rest, brought to touch. collar : moves along `direction` from touching by
+    `displacements` (mm): the increments. reported : index of each that is a frame. released : node
+    set held only while inflating. penalty : MPa/mm of contact.
     """
 
     supports: Sequence[RigidCylinder]
@@ -332,14 +299,10 @@ class Bending:
 class InflatedModel:
     """A closed membrane of any shape, or the part of one that symmetry planes close.
 
-    mesh : mm; quads counter-clockwise seen from outside. thickness : mm, one or (elements,). warp :
-    (3,) or (elements, 3) direction of the warp yarn, projected on each facet. pressures : MPa,
-    increasing: increments of inflation, and frames where nothing bends it. supports : degrees of
-    freedom held at zero, by node set. copies : how many times the mesh makes the whole (4 for a
-    quarter), for which forces and volume are reported. bending : after inflation.
-
-    Raises InputError for steps that do not increase, a thickness that is not positive, unknown
-    sets.
+    mesh : quads counter-clockwise seen from outside. thickness : mm, one or (elements,). warp :
+    (3,) or (elements, 3), projected on each facet. pressures : MPa: increments of inflation, and
+    frames where nothing bends it. supports : degrees of freedom held at zero, by node set. copies :
+    of the mesh in the whole, of which forces and volume are reported.
     """
 
     mesh: Mesh
@@ -386,38 +349,26 @@ LENGTH, SEAM_WIDTH, SEAM_LAYERS = 3000.0, 40.0, 3
 DEFLECTION, FRAMES = 240.0, 60
 #: Equal increments of pressure on inflation.
 INFLATION = 10
-#: Sides around the tube over mm of an element. How deep the collar dents the round tube at first is
-#: what goes wrong with long ones, at its top and its sides alike (shorter ones at the top alone do
-#: not help): with sides of 25 mm the load of the first millimetres was 3 % off that of fine meshes.
+#: Sides around the tube over mm of an element: with sides of 25 mm the load of the first mm
+#: of the collar was 3 % off that of fine meshes.
 AROUND = 0.4
 #: Elements next to collar and supports: mm along the axis over mm elsewhere, and mm beyond the
-#: edge of the collar or to either side of a support in which they are that small. With half of it
-#: the collar's mouth, whose edge is round with 10 mm, took hold of the wall row by row: the load
-#: went up and down by 2 % with 25 mm elements, and fell by 4 % where the beam folds.
+#: collar or to either side of a support; with half of it the collar took hold row by row (2 %).
 FINER, BESIDE_COLLAR, BESIDE_SUPPORT = 0.25, 15.0, 40.0
 
 
 def inflated_cylinder(
-    diameter: float,
-    pressure: float,
-    thickness: float,
-    size: float,
-    length: float = LENGTH,
-    seam_width: float = SEAM_WIDTH,
-    supports: RigidSupports | None = None,
-    collar: Collar | None = None,
-    deflections: Sequence[float] | None = None,
-    symmetry: Literal["quarter", "full"] = "quarter",
-    cap_warp: Literal["x", "y"] = "x",
-    gas: Gas | None = None,
-    reading: CurveReading | None = None,
-) -> CylinderModel:
-    """Return a cylinder that is inflated and bent.
+    diameter: float, pressure: float, thickness: float, size: float, length: float = LENGTH,
+    seam_width: float = SEAM_WIDTH, supports: RigidSupports | None = None,
+    collar: Collar | None = None, deflections: Sequence[float] | None = None,
+    symmetry: Literal["quarter", "full"] = "quarter", cap_warp: Literal["x", "y"] = "x",
+    gas: Gas | None = None, reading: CurveReading | None = None
+) -> CylinderModel:  # fmt: skip
+    """Return a cylinder that is inflated and bent; lengths in mm before inflation, pressure in MPa.
 
-    diameter, length, seam_width : mm, before inflation. pressure : MPa, gauge. thickness : mm of
-    one layer; the seam has three. size : mm of an element; around the tube 0.4 of that, and along
-    it a quarter next to collar and supports. deflections : mm; 60 equal ones to 240 mm unless
-    given, each an increment. Raises InputError as `CylinderModel` and `cylinder_mesh`.
+    thickness : of one layer; the seam has three. size : of an element; around the tube 0.4 of that,
+    and along it a quarter next to collar and supports. deflections : 60 equal ones to 240 mm unless
+    given.
     """
     for name, value in (("pressure", pressure), ("thickness", thickness)):
         if not 0 < value < math.inf:
@@ -441,12 +392,6 @@ def inflated_cylinder(
         deflections = np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:].tolist()
     steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
     return CylinderModel(
-        mesh,
-        thickness * layers,
-        steps,
-        deflections,
-        collar,
-        supports,
-        gas or Gas(),
-        reading=reading or curve_reading(diameter),
-    )
+        mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas(),
+        reading=reading or curve_reading(diameter)
+    )  # fmt: skip

@@ -1,20 +1,16 @@
 """Quadrilateral meshes of the flat circular or elliptic specimen, whole or one quarter of it.
 
-The quarter of the unit disk has three structured blocks (an o-grid), by transfinite interpolation.
-The core is a square with its far corner K pulled towards the rim and two bulging sides; two ring
-blocks join those sides to the arc. Three quads meet in K, so the best any such mesh can do is 120
-degrees there: scaled Jacobian sin(120) = 0.866. The sides are arcs that leave the axes at right
-angles and turn just so far that all three angles in K are 120 degrees; every element of every count
-then has 0.866 or more.
+The quarter of the unit disk has three structured blocks (an o-grid), by transfinite interpolation:
+a core with its far corner K pulled towards the rim, and two ring blocks. Three quads meet in K, so
+the best is 120 degrees there: scaled Jacobian 0.866. The core's sides are arcs that leave the axes
+at right angles and turn just so far; every element of every count then has 0.866 or more.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from types import ModuleType
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +29,7 @@ RING_TO_CORE = 1.2
 def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
     """Mesh the quarter x, y >= 0 of the unit disk with n^2 + 2 n m quads.
 
-    n : divisions of the core. m : layers of the ring; the 2 n + 1 nodes of the rim lie at equal
-    angles. Returns points (p, 2), quads (q, 4) counter-clockwise.
+    n : divisions of the core. m : layers of the ring; the 2 n + 1 nodes of the rim lie evenly.
     """
     core, ring = _core_and_ring(n, m)
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
@@ -47,10 +42,7 @@ def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
 
 
 def divisions(elements: float) -> tuple[int, int]:
-    """Return core divisions n and ring layers m whose n^2 + 2 n m is nearest to `elements`.
-
-    Ties go to m nearest to n / 2, where sizes are most even; 200 gives (10, 5).
-    """
+    """Return core divisions n and ring layers m whose n^2 + 2 n m is nearest to `elements`."""
     best = (math.inf, math.inf, 1, 1)
     for n in range(1, math.isqrt(math.ceil(elements)) + 2):
         wanted = round((elements - n * n) / (2 * n))
@@ -115,20 +107,14 @@ NEAR = 1e-9
 
 
 def disk_mesh(
-    radius: float,
-    elements: int,
-    symmetry: Literal["full", "quarter"] = "full",
-    generator: Literal["blocks", "gmsh"] = "blocks",
-) -> Mesh:
-    """Mesh a disk of `radius` mm in the xy plane around the origin; warp is x, fill is y.
+    radius: float, elements: int, symmetry: Literal["full", "quarter"] = "full",
+    generator: Literal["blocks", "gmsh"] = "blocks"
+) -> Mesh:  # fmt: skip
+    """Mesh a disk of `radius` mm in the xy plane around the origin.
 
     elements : quads wanted on the FULL disk, 8 or more (the thesis: 800); the gap to the number
-    made is at most 16 below 200 and 7 % above. symmetry : the whole disk, or the quarter x, y >= 0
-    with a fourth of the elements. generator : `blocks` needs nothing; `gmsh` loads that library.
-
-    Quads are counter-clockwise (normal +z). Node sets: `rim`, `apex` (the centre); on a quarter
-    also `symmetry_x` (nodes on x = 0, where u_x = 0) and `symmetry_y`. Raises InputError for wrong
-    arguments, BubblefitError where gmsh cannot be loaded.
+    made is at most 16 below 200 and 7 % above. symmetry : the whole, or the quarter x, y >= 0. Node
+    sets: `rim`, `apex`; on a quarter also `symmetry_x` (x = 0, where u_x = 0) and `symmetry_y`.
     """
     _check(radius, elements, symmetry, generator)
     if generator == "gmsh":
@@ -183,9 +169,7 @@ def monomials(count: int) -> list[tuple[int, int]]:
 def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
     """Return the first `count` modes at points (n, 2) mm, (n,) each: z0_1, z0_x, z0_y, z0_xx ...
 
-    A mode is (1 - r^2) x^a y^b with all lengths over the radius (mm), so that z0_1 is the height of
-    a paraboloid at the centre. z0_1, z0_xx, z0_yy, z0_xxxx ... are doubly symmetric; the others are
-    not.
+    A mode is (1 - r^2) x^a y^b, all lengths over the radius (mm): z0_1 is a paraboloid's height.
     """
     x, y = points[:, 0] / radius, points[:, 1] / radius
     dome = 1.0 - x**2 - y**2
@@ -202,18 +186,14 @@ def doubly_symmetric(count: int) -> bool:
 
 @dataclass(frozen=True)
 class Outline:
-    """An ellipse in the plane of the sheet; warp is x, fill is y.
-
-    major, minor : mm, semi-axes; equal for a circle. angle : degrees from the warp towards the fill
-    to the major one.
-    """
+    """An ellipse in the sheet's plane: semi-axes (mm), degrees from the warp to the major."""
 
     major: float
     minor: float
     angle: float = 0.0
 
     @classmethod
-    def circle(cls, radius: float) -> Outline:
+    def circle(cls, radius: float) -> Self:
         return cls(radius, radius)
 
     @property
@@ -222,7 +202,6 @@ class Outline:
 
     @property
     def doubly_symmetric(self) -> bool:
-        """Return whether warp and fill are axes of symmetry."""
         return self.round or self.angle % 90.0 == 0.0
 
     @property
@@ -271,16 +250,10 @@ MOST_SLENDER = 4.0
 
 
 def elliptic_disk_mesh(
-    outline: Outline,
-    elements: int,
-    symmetry: Literal["full", "quarter"] = "full",
-    generator: Literal["blocks", "gmsh"] = "blocks",
-) -> Mesh:
-    """Mesh the sheet within an outline, in the xy plane; a circle has the mesh of `disk_mesh`.
-
-    Raises InputError for semi-axes that are not positive, too far apart or the wrong way round, a
-    quarter of an ellipse of which warp and fill are no axes; as `disk_mesh`.
-    """
+    outline: Outline, elements: int, symmetry: Literal["full", "quarter"] = "full",
+    generator: Literal["blocks", "gmsh"] = "blocks"
+) -> Mesh:  # fmt: skip
+    """Mesh the sheet within an outline, in the xy plane; a circle has the mesh of `disk_mesh`."""
     disk = disk_mesh(outline.major, elements, symmetry, generator)
     if outline.round:
         return disk
@@ -306,8 +279,7 @@ def quarter_disk_by_gmsh(elements: float) -> tuple[NDArray[np.float64], NDArray[
     """Mesh the quarter by gmsh, unstructured, to see if a result depends on the mesh.
 
     Triangles, each cut into three quads: worst scaled Jacobian 0.6, where gmsh's recombining of
-    triangles gave 0.3 to 0.5 (4.15, 50 to 200 quads) and two of its algorithms did not end. Returns
-    as `quarter_disk`, within some per cent of `elements`; raises BubblefitError where gmsh fails.
+    triangles gave 0.3 to 0.5 (4.15, 50 to 200 quads) and two of its algorithms did not end.
     """
     gmsh = _loaded()
     # A caller's own gmsh session is left as it was.
@@ -342,7 +314,6 @@ def _loaded() -> ModuleType:
 
 
 def _nearest(gmsh: ModuleType, elements: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the mesh, of some sizes tried, with the count nearest to the one wanted."""
     # Equilateral triangles of side h, three quads each, on an area of pi / 4.
     size = math.sqrt(math.pi / 4 * 3 / elements * 4 / math.sqrt(3))
     best = None

@@ -15,24 +15,15 @@ from .mesh import Array, Mesh
 
 
 def strip_mesh(
-    width: float,
-    length: float,
-    across: int,
-    along: int,
-    gauge_length: float | None = None,
-    symmetry: Literal["full", "half"] = "full",
-) -> Mesh:
+    width: float, length: float, across: int, along: int, gauge_length: float | None = None,
+    symmetry: Literal["full", "half"] = "full"
+) -> Mesh:  # fmt: skip
     """Mesh a rectangle in the xy plane, the middle of the width at x = 0, y from 0 to length.
 
-    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed; even across on
-    a whole strip, so that there are nodes on its middle line. gauge_length : mm between the two
-    gauge nodes on the middle line, at equal distance from both ends; the rows between them are
-    stretched or squeezed to meet it exactly. The whole length unless given. symmetry : the whole
-    strip, or the half x >= 0.
-
-    Quads are counter-clockwise (normal +z). Node sets: `bottom`, `top` (the ends), `gauge` (two
-    nodes, the lower first), `free_edges`; on a half also `symmetry_x` (x = 0, where u_x = 0).
-    Raises InputError for lengths, counts or a gauge that do not fit.
+    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed (half: x >= 0);
+    even across on a whole strip. gauge_length : mm between two nodes on the middle line, at equal
+    distance from both ends, which the rows between them meet exactly. Node sets: `bottom`, `top`,
+    `gauge` (the lower first), `free_edges`; on a half also `symmetry_x` (where u_x = 0).
     """
     gauge = length if gauge_length is None else gauge_length
     for name, value in (("width", width), ("length", length), ("gauge_length", gauge)):
@@ -56,22 +47,15 @@ def strip_mesh(
     quads = np.stack([first, first + 1, first + row + 1, first + row], axis=1).astype(np.intp)
     nodes = np.arange(len(points)).reshape(along + 1, row)
     sets = {
-        "bottom": nodes[0],
-        "top": nodes[-1],
-        "gauge": nodes[[lower, along - lower], middle],
-        "free_edges": nodes[:, -1] if symmetry == "half" else np.sort(nodes[:, [0, -1]].ravel()),
-    }
+        "bottom": nodes[0], "top": nodes[-1], "gauge": nodes[[lower, along - lower], middle],
+        "free_edges": nodes[:, -1] if symmetry == "half" else np.sort(nodes[:, [0, -1]].ravel())
+    }  # fmt: skip
     if symmetry == "half":
         sets["symmetry_x"] = nodes[:, 0]
     return Mesh(points, quads, sets)
 
 
 def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
-    """Return heights of the rows of nodes (along + 1,), and the row of the lower gauge node.
-
-    The gauge gets the number of rows, as odd or even as `along`, that keeps the quads nearest to
-    one height.
-    """
     if gauge == length:
         return np.linspace(0.0, length, along + 1), 0
     if along < 3:
@@ -112,17 +96,11 @@ WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
 class UniaxialModel(OfThickness):
     """A strip in its plane whose lower end is pulled down until the gauge has a given length.
 
-    The elongation of the gauge is prescribed, as measured; the displacement of the pulled end that
-    brings it about is part of the answer. mesh : mm, in the xy plane, pulled along y; node sets
-    `gauge` (two nodes), `bottom` and those in `supports`. warp : (3,) direction of the warp yarn;
-    the fill yarn is 90 degrees from it, counter-clockwise. thickness : mm, in the reference state.
-    elongations : mm of the gauge, increasing: the increments of the law, every one reported.
-    supports : degrees of freedom held at zero, by node set (every node stays in the plane). pulled
-    : the node set that moves along -y. load_factor : multiplies the reaction: 2 for one half of the
+    mesh : mm, in the xy plane, pulled along y; node sets `gauge` (two nodes), `bottom` and those in
+    `supports` (held at zero; every node stays in the plane). warp : (3,) direction of the warp
+    yarn. elongations : mm of the gauge, increasing: the increments of the law, every one reported.
+    pulled : the node set that moves along -y. load_factor : of the reaction: 2 for one half of the
     width.
-
-    Raises InputError for a missing node set, elongations that do not increase, a thickness or load
-    factor that is not positive, a pulled set that is also supported along y.
     """
 
     mesh: Mesh
@@ -152,36 +130,28 @@ class UniaxialModel(OfThickness):
 
     @property
     def gauge_length(self) -> float:
-        """Return the distance of the two gauge nodes, mm."""
         lower, upper = self.mesh.points[self.mesh.node_sets["gauge"]]
         return float(np.linalg.norm(upper - lower))
 
     @property
     def driven(self) -> NDArray[np.intp]:
-        """Return degrees of freedom that move with the pulled end, 3 * node + direction, sorted."""
         return np.sort(3 * self.mesh.node_sets[self.pulled] + 1).astype(np.intp)
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        """Return degrees of freedom held at zero, sorted, all out of the plane included."""
         held = [3 * self.mesh.node_sets[n] + k for n, ks in self.supports.items() for k in ks]
         return np.unique(np.concatenate([*held, 3 * np.arange(len(self.mesh.points)) + 2]))
 
 
 def straight_strip(
-    direction: Literal["warp", "fill"],
-    gauge_length: float,
-    final_length: float,
-    thickness: float,
-    width: float = WIDTH,
-    increments: int = INCREMENTS,
-    across: int = QUADS["straight"][0],
-    along: int = QUADS["straight"][1],
-) -> UniaxialModel:
+    direction: Literal["warp", "fill"], gauge_length: float, final_length: float, thickness: float,
+    width: float = WIDTH, increments: int = INCREMENTS, across: int = QUADS["straight"][0],
+    along: int = QUADS["straight"][1]
+) -> UniaxialModel:  # fmt: skip
     """Return a warp or fill test: half of the width over the gauge length (Fig. 3.5; 40 quads).
 
-    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1). width : mm, of the
-    whole strip, of which the load is. across, along : quads on the half.
+    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1). width : of the whole
+    strip.
     """
     if direction not in ("warp", "fill"):
         raise InputError(None, "direction", f"expected 'warp' or 'fill', got {direction!r}")
@@ -193,20 +163,13 @@ def straight_strip(
 
 
 def bias_strip(
-    gauge_length: float,
-    final_length: float,
-    thickness: float,
-    width: float = WIDTH,
-    length: float = GRIP_DISTANCE,
-    angle: float = 45.0,
-    increments: int = INCREMENTS,
-    across: int = QUADS["bias"][0],
-    along: int = QUADS["bias"][1],
-) -> UniaxialModel:
+    gauge_length: float, final_length: float, thickness: float, width: float = WIDTH,
+    length: float = GRIP_DISTANCE, angle: float = 45.0, increments: int = INCREMENTS,
+    across: int = QUADS["bias"][0], along: int = QUADS["bias"][1]
+) -> UniaxialModel:  # fmt: skip
     """Return a bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
 
-    gauge_length, final_length : mm, of the virtual strain gauge in the middle (Table 3.1). length :
-    mm, between the grips at the start. angle : degrees from the pull to the warp yarn.
+    length : mm between the grips. angle : degrees from the pull to the warp yarn.
     """
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
@@ -243,11 +206,7 @@ FAR_CORNER = 2
 
 @dataclass(frozen=True, eq=False)
 class PatchModel(OfThickness):
-    """A square of the sheet, warp along x and fill along y, with loads per width on its edges.
-
-    loads : (n, 2) N/mm (kN/m) along warp and fill over the width before the test: the increments of
-    the law, every one reported. thickness : mm, before the test. Raises InputError.
-    """
+    """A square of the sheet, warp along x; loads (n, 2) N/mm are over the width at rest."""
 
     loads: Array
     thickness: float
@@ -264,7 +223,6 @@ class PatchModel(OfThickness):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """Return one quad, for solvers that need a mesh."""
         points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
         return Mesh(
@@ -282,6 +240,5 @@ class PatchModel(OfThickness):
 
 
 def elongations(displacement: ArrayLike) -> Array:
-    """Return (n, 2, ...) elongations along warp and fill of displacements (n, 4, 3, ...) of a
-    patch."""
+    """Return (n, 2, ...) elongations of a patch's displacements (n, 4, 3, ...)."""
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE

@@ -21,7 +21,6 @@ from .disk import divided_quarter_disk
 from .mesh import Array, Mesh, snapped, with_mirror_image
 
 Numbers = NDArray[np.intp]
-
 NEAR = 1e-9  # in radii
 
 
@@ -92,11 +91,9 @@ SAMPLES = 20
 
 @dataclass(frozen=True)
 class Refinement:
-    """Small elements around a place on the axis, and a row of nodes exactly there.
+    """Small elements around a place on the axis, and a row of nodes (set `name`) exactly there.
 
-    name : of the node set that holds the row. position : mm from the middle, 0 or more. reach : mm
-    to either side in which the elements are small; beyond, they grow. size : mm along the axis.
-    Raises InputError.
+    position : mm from the middle. reach : mm to either side where elements are small. size : mm.
     """
 
     name: str
@@ -120,8 +117,8 @@ class Refinement:
 def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Array:
     """Return positions (rows,) from 0 to `end`, `size` apart (mm) and closer at the refinements.
 
-    Among them are 0, `end` and the position of every refinement. Raises InputError for a refinement
-    beyond the end, or nearer than half its size to the end or another.
+    Among them are 0, `end` and every refinement; InputError : one is beyond the end or near
+    another.
     """
     places = sorted({0.0, float(end)} | {float(r.position) for r in refinements})
     for r in refinements:
@@ -157,7 +154,6 @@ def _between(start: float, end: float, size: float, refinements: Sequence[Refine
 
 
 Masks = dict[str, NDArray[np.bool_]]
-
 MAX_ELEMENTS = 1_000_000
 #: Core divisions of a cap, at least: eight quads around half of the tube.
 FEWEST = 2
@@ -172,33 +168,22 @@ OTHER_SETS = ("body", "seam", "caps", "symmetry_x", "symmetry_z")
 
 
 def cylinder_mesh(
-    length: float,
-    diameter: float,
-    size: float,
-    seam_width: float = 0.0,
-    symmetry: Literal["quarter", "full"] = "quarter",
-    refinements: Sequence[Refinement] = (),
-    cap_warp: Literal["x", "y"] = "x",
-    around: float = 1.0,
-) -> Mesh:
+    length: float, diameter: float, size: float, seam_width: float = 0.0,
+    symmetry: Literal["quarter", "full"] = "quarter", refinements: Sequence[Refinement] = (),
+    cap_warp: Literal["x", "y"] = "x", around: float = 1.0
+) -> Mesh:  # fmt: skip
     """Mesh the middle surface of a cylinder with flat caps.
 
-    The nodes of the tube lie a little further out than the radius, so that its cross-sections and
-    the caps, which are polygons, have the area of the circle, and the cylinder its volume. length,
-    diameter : mm, of the whole cylinder before inflation. size : mm, of an element. seam_width : mm
-    around the tube, centred at the bottom; its edges are rows of nodes. symmetry : the quarter x, z
-    >= 0, or the whole: the quarter mirrored twice. refinements : places along the half z >= 0 with
-    smaller elements (supports, collar). cap_warp : axis that the warp yarn of the caps follows.
-    around : sides around the tube, in sizes: a whole number of quads, a multiple of eight, goes
-    around it, at most 5 % longer where the seam lets them.
+    The nodes of the tube lie a little further out than the radius, so that cross-sections, caps and
+    volume, of polygons, are those of the circle. length, diameter, size (of an element), seam_width
+    (centred at the bottom) : mm, before inflation. symmetry : the quarter x, z >= 0, or the whole.
+    refinements : along the half z >= 0. cap_warp : axis of the caps' warp. around : sides around
+    the tube, in sizes: a multiple of eight quads, at most 5 % longer where the seam lets them.
 
-    Normals point out; `warp` is z on the tube and as given on the caps. Element sets, which share
-    no quad: `body`, `seam` (where there is one), `caps`. Node sets: the nodes of each of them,
-    `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`, `bottom_line` and `side_line`
-    (along the tube), `cap_centres`, by the name of each refinement its row of nodes (on the whole
-    cylinder at z and -z), and NAME_bottom, the lowest of them; on a quarter also `symmetry_x`
-    (nodes on x = 0, where u_x = 0) and `symmetry_z`. Raises InputError for lengths, sizes, a seam
-    or refinements that do not fit.
+    Normals point out; `warp` is z on the tube. Element sets: `body`, `seam`, `caps`. Node sets: the
+    nodes of each, `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`, `bottom_line`,
+    `side_line`, `cap_centres`, by the name of each refinement its row, and NAME_bottom, the lowest
+    of it; on a quarter also `symmetry_x` (x = 0, where u_x = 0) and `symmetry_z`.
     """
     _check(length, diameter, size, seam_width, symmetry, cap_warp, around)
     radius = 0.5 * diameter
@@ -227,23 +212,15 @@ def cylinder_mesh(
         nodes |= {"symmetry_x": points[:, 0] == 0, "symmetry_z": points[:, 2] == 0}
     warp = np.where(elements["caps"][:, None], CAP_WARP[cap_warp], (0.0, 0.0, 1.0))
     return Mesh(
-        points,
-        quads,
-        {name: np.flatnonzero(mask) for name, mask in nodes.items()},
-        {name: np.flatnonzero(mask) for name, mask in elements.items()},
-        warp,
-    )
+        points, quads, {name: np.flatnonzero(mask) for name, mask in nodes.items()},
+        {name: np.flatnonzero(mask) for name, mask in elements.items()}, warp
+    )  # fmt: skip
 
 
 def _check(
-    length: float,
-    diameter: float,
-    size: float,
-    seam_width: float,
-    symmetry: str,
-    cap_warp: str,
-    around: float,
-) -> None:
+    length: float, diameter: float, size: float, seam_width: float, symmetry: str, cap_warp: str,
+    around: float
+) -> None:  # fmt: skip
     lengths = {"length": length, "diameter": diameter, "size": size, "seam_width": seam_width}
     for name, value in lengths.items():
         number = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
@@ -275,16 +252,12 @@ def _check(
 def _lines(
     count: int, grid: Numbers, points: Array, z: Array, refinements: Sequence[Refinement]
 ) -> Masks:
-    """Return node sets of the tube's rows and of the caps' centres."""
     middle = grid.shape[1] // 2
     members = {
-        "ends": grid[-1],
-        "mid_span": grid[0],
-        "bottom_line": grid[:, 0],
-        "side_line": grid[:, middle],
-        "top_line": grid[:, -1],
-        "cap_centres": np.flatnonzero((points[:, :2] == 0).all(axis=1)),
-    }
+        "ends": grid[-1], "mid_span": grid[0], "bottom_line": grid[:, 0],
+        "side_line": grid[:, middle], "top_line": grid[:, -1],
+        "cap_centres": np.flatnonzero((points[:, :2] == 0).all(axis=1))
+    }  # fmt: skip
     for r in refinements:
         row = grid[int(np.argmin(np.abs(z - r.position)))]
         fresh = {r.name: row, f"{r.name}_bottom": row[:1]}
@@ -331,8 +304,7 @@ def sphere_octant(n: int, radius: float) -> Mesh:
 def half_tube(across: int, along: int, radius: float, length: float, caps: bool = True) -> Mesh:
     """Mesh the x >= 0 half of a tube along z from 0 to length, closed at `length` by a flat cap.
 
-    `across` facets (a multiple of 4) around the half circle; set "end" at z = length, "foot" on the
-    lowest line.
+    across : a multiple of 4; set "end" at z = length, "foot" on the lowest line.
     """
     angle = np.linspace(-np.pi / 2, np.pi / 2, across + 1)
     circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -367,6 +339,5 @@ def half_tube(across: int, along: int, radius: float, length: float, caps: bool 
 
 
 def tube_warp(mesh: Mesh, length: float) -> np.ndarray:
-    """Return the warp along the tube, and along x in the cap."""
     cap = mesh.points[mesh.quads][..., 2].min(axis=1) > length - 1e-6
     return np.where(cap[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

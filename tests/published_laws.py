@@ -1,7 +1,5 @@
 """The cubic laws that the thesis identified: tables 3.2 and 4.2."""
 
-from __future__ import annotations
-
 #: GPa, of the strips of chapter 3.
 TABLE_3_2 = [
     -7.96599e-3, 7.49311e-1, -1.50931e-1, 2.05148e-2,

@@ -20,8 +20,7 @@ from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import NoiseIs
-from ...meshes.mesh import Mesh
-from ...meshes.reading import FacetReading, SmoothReading
+from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
 from ...solvers.base import History
 from .test import BubbleTest

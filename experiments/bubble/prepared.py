@@ -17,8 +17,7 @@ from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline
-from ...meshes.mesh import Mesh
-from ...meshes.reading import FacetReading, SmoothReading
+from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface, read_fields
 from ...readers.frames import FrameSource
 from .. import kinds

@@ -11,7 +11,7 @@ from pydantic import Field, StringConstraints
 
 from ...errors import InputError
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
-from ...meshes.reading import Facet
+from ...meshes.mesh import Facet
 from ...readers.sections import LengthUnit, Number, Positive, Section
 from ...readers.sections import Name as Name_of_sections
 from ..keys import ChannelSection

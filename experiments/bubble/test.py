@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
-from ...meshes.reading import Facet
+from ...meshes.mesh import Facet
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files

@@ -51,12 +51,10 @@ class Says:
 
     @property
     def notes(self) -> list[Note]:
-        """Return notes on all that is lost and all that is to be confirmed."""
         lost = [Note(LOSES, words) for words in self.loses]
         return [*lost, *(Note(CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
-        """Return lines of at most WIDTH characters."""
         found: list[str] = []
         for head, texts in (
             ("carries", self.carries),
@@ -109,7 +107,6 @@ def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
 
 
 def title_of(card: MaterialCard, most: int) -> str:
-    """Return the card's name as a title of at most so many letters of ASCII, on one line."""
     return one_line(_ascii(card.name))[:most] or "fabric"
 
 
@@ -118,7 +115,6 @@ def _ascii(text: str) -> str:
 
 
 def band_lines(card: MaterialCard) -> list[str]:
-    """Return lines on the uncertainty of the moduli at a few strains, for people."""
     sure, law = card.certainty, card.law
     if sure is None:
         return ["band of the moduli: not known, the card says nothing of it"]
@@ -148,14 +144,12 @@ def band_table(card: MaterialCard) -> str:
 
 
 def density_remarks(density: float | None) -> tuple[str, ...]:
-    """Return the remark of a format that needs a density (t/mm3)."""
     if density is not None:
         return ()
     return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
 
 
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
-    """Return the remark of a tabulated format on missing strain ranges."""
     if (card.law.strain_range < UNLIMITED).all():
         return ()
     return (
@@ -166,11 +160,7 @@ def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a format for a command.
-
-    help : one sentence; the default follows in brackets. kind : int, float or str. least : smallest
-    value. above, most : excluded and included end. choices : the values allowed, instead.
-    """
+    """An option of a format: help in one sentence, limits (`above` is excluded) or choices."""
 
     help: str
     kind: type = float
@@ -192,31 +182,21 @@ class NoOptions:
 
 @dataclass(frozen=True)
 class TableOptions:
-    """The options of every format with tables or curves."""
-
     points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
     reach: float = option(
-        REACH,
-        f"Log strain where a table ends if the card has no range [{REACH}].",
-        above=0,
-        most=10,
-    )
+        REACH, f"Log strain where a table ends if the card has no range [{REACH}].", above=0,
+        most=10
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class CurveOptions(TableOptions):
-    """The options of the fabric materials of explicit programs."""
-
     density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
 
 
 @dataclass(frozen=True)
 class Format:
-    """One way to write a card for another program.
-
-    write : from card and options to the files. options : frozen dataclass, each field with metadata
-    made by `option`. load_ratios : takes laws whose moduli depend on the load ratio.
-    """
+    """One way to write a card for another program; options : a dataclass made by `option`."""
 
     name: str
     write: Callable[[MaterialCard, Any], Export]
@@ -263,10 +243,9 @@ BIAXIAL, INCREMENTS = 0.05, 50
 
 @dataclass(frozen=True, eq=False)
 class FabricCurves:
-    """Strain and stress (MPa), (n, 2), of warp, fill and shear in one measure.
+    """Strain and stress (MPa), (n, 2), of warp, fill and shear (odd, from zero) in one measure.
 
-    Warp and fill from compression through zero; shear from zero, odd. Curves that do not couple
-    leave out: yarns, the largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone;
+    Left out: yarns, the largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone;
     softer, the share of the stress missing along warp and fill when both have the log strain
     biaxial.
     """
@@ -280,7 +259,6 @@ class FabricCurves:
 
     @property
     def uncoupled(self) -> str:
-        """Describe the cost of losing nu12."""
         warp, fill = (100 * share for share in self.softer)
         return (
             "under biaxial tension softer than the card, as the contraction of the strips is in "
@@ -329,12 +307,10 @@ def law_constants(law: HypoelasticLaw) -> tuple[float, ...]:
 
 
 def double(value: float) -> str:
-    """Return a double precision literal with every digit."""
     return f"{value:.16e}".replace("e", "d")
 
 
 def logical(value: bool) -> str:
-    """Return a logical literal."""
     return ".true." if value else ".false."
 
 

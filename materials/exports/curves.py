@@ -51,8 +51,6 @@ class Yarn:
 
 @dataclass(frozen=True)
 class Law58Options(CurveOptions):
-    """The options of curves."""
-
     points: int = field(
         default=POINTS, metadata=TableOptions.__dataclass_fields__["points"].metadata
     )
@@ -136,17 +134,9 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
 
 
 LAW58 = Format("radioss-law58", law58, Law58Options)
-
-
 MATERIAL = 1
-
-
 CURVES = {"warp": 101, "fill": 102, "shear": 103}
-
-
 MEASURE: Measure = "green"
-
-
 NAMES = {
     "green": "2nd Piola-Kirchhoff stress by Green-Lagrange strain (shear: engineering, 2 E12)",
     "nominal": "nominal stress by nominal strain (shear: change of angle, radians)",
@@ -193,20 +183,12 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     )
     e1, e2 = float(law.E1(0.0)), float(law.E2(0.0))
     text = render(
-        "ls-dyna/mat34.k.j2",
-        head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
-        title=title_of(card, 80),
-        material=MATERIAL,
-        density=DENSITY if options.density is None else options.density,
-        ea=e1,
-        eb=e2,
-        gab=float(law.G12(0.0)),
-        prab=law.nu12,
-        prba=law.nu12 * e2 / e1,
-        ids=CURVES,
-        curves={"warp": curves.warp, "fill": curves.fill, "shear": _odd(curves.shear)},
-        f10=_f10,
-    )
+        "ls-dyna/mat34.k.j2", head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
+        title=title_of(card, 80), material=MATERIAL,
+        density=DENSITY if options.density is None else options.density, ea=e1, eb=e2,
+        gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1, ids=CURVES,
+        curves={"warp": curves.warp, "fill": curves.fill, "shear": _odd(curves.shear)}, f10=_f10
+    )  # fmt: skip
     return Export({".k": text}, says)
 
 
@@ -215,7 +197,6 @@ def _odd(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _f10(value: float) -> str:
-    """Return as many digits as ten columns hold."""
     for digits in range(9, 0, -1):
         text = f"{value:.{digits}g}"
         if len(text) <= 10:
@@ -249,13 +230,10 @@ def fabric(card: MaterialCard, options: CurveOptions) -> Export:
         ),
     )
     text = render(
-        "abaqus/fabric.inp.j2",
-        head=heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
-        name=material_name(card),
-        density=DENSITY if options.density is None else options.density,
-        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())],
-        shear=curves.shear.tolist(),
-    )
+        "abaqus/fabric.inp.j2", head=heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
+        name=material_name(card), density=DENSITY if options.density is None else options.density,
+        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())], shear=curves.shear.tolist()
+    )  # fmt: skip
     return Export({".inp": text}, says)
 
 

@@ -25,8 +25,7 @@ from ..forms.base import UNLIMITED
 from ..responses import largest_load
 from .base import Export, Format, Says, heading, option
 
-#: Engineering shear strain up to which G is averaged where the card has no range; and the least
-#: range that is one: no test of the card's fit sheared the fabric where it ends before.
+#: Shear strain to which G is averaged without a range; a range that ends before is of no shear.
 SHEAR, SHEARED = 0.1, 1e-3
 #: Constants with a spread.
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
@@ -67,7 +66,6 @@ class Linear:
 
     @property
     def says(self) -> Says:
-        """Return what constants carry and lose."""
         found = self.found
         least, largest = found.shear
         unknown: tuple[str, ...] = ()
@@ -99,11 +97,7 @@ class Linear:
 
 
 def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
-    """Return the constants of a card.
-
-    Raises InputError without a known end of the loads, for a law that does not carry them, or for
-    nu_warp nu_fill of 1 or more.
-    """
+    """Return the constants of a card; InputError for loads that it does not carry."""
     law, thickness = card.law, card.thickness
     highest = options.highest
     if highest is None:
@@ -125,12 +119,10 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
 
 
 def evaluations(linear: Linear) -> list[Evaluation]:
-    """Return the requested evaluation, then the others."""
     return [linear.found.evaluation, *linear.found.others]
 
 
 def _end_of_range(card: MaterialCard) -> float:
-    """Return the largest load (kN/m) that every ratio carries within the card's strains."""
     ends = card.law.strain_range[:2]
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
@@ -215,7 +207,6 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
 
 
 def _text(value: Any) -> str:
-    """Format a value: yes or no, nine digits, words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.9g}" if isinstance(value, float) else str(value)

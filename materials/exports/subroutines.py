@@ -31,7 +31,6 @@ STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
 LEAST = 1e-3
 #: The check of a licence holder: engineering strain of one element, in equal increments.
 ELONGATION, INCREMENTS, SHEAR = 0.1, 100, 0.01
-
 SAYS = Says(
     carries=(
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
@@ -49,14 +48,11 @@ def hypela2(card: MaterialCard, options: NoOptions) -> Export:
 
 
 def hypela2_source(
-    laws: Mapping[int, HypoelasticLaw],
-    head: str = "! MSC Marc user subroutine HYPELA2",
-    own_state: bool = True,
-    symmetric: bool = True,
-) -> str:
-    """Return Fortran source, good as fixed and as free form.
+    laws: Mapping[int, HypoelasticLaw], head: str = "! MSC Marc user subroutine HYPELA2",
+    own_state: bool = True, symmetric: bool = True
+) -> str:  # fmt: skip
+    """Return Fortran source, good as fixed and as free form; laws by MATUS(1), one for all numbers.
 
-    laws : by user material identification number (MATUS(1)); a single one is for all numbers.
     own_state : strain and stress at the start from state variables, else from Marc's e and s.
     symmetric : hand over the symmetric part of the tangent, as Marc's default solver needs.
     """
@@ -70,18 +66,11 @@ def hypela2_source(
         for number, law in laws.items()
     ]
     return render(
-        "marc/hypela2.f.j2",
-        head=head,
-        laws=written,
-        bar=_check(next(iter(laws.values()))),
-        power=next(iter(laws.values())).area_power,
-        states=STATE_VARIABLES,
-        size=max(len(law["constants"]) for law in written),
-        own_state=own_state,
-        symmetric=symmetric,
-        double=double,
-        fortran=logical,
-    )
+        "marc/hypela2.f.j2", head=head, laws=written, bar=_check(next(iter(laws.values()))),
+        power=next(iter(laws.values())).area_power, states=STATE_VARIABLES,
+        size=max(len(law["constants"]) for law in written), own_state=own_state,
+        symmetric=symmetric, double=double, fortran=logical
+    )  # fmt: skip
 
 
 def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
@@ -95,16 +84,12 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
     shear, _ = law.increment(np.zeros(3), np.array([0.0, 0.0, SHEAR]), np.zeros(3))
     thinning = math.exp((law.area_power - 1) * (strain[-1, 0] + strain[-1, 1]))
     return {
-        "elongation": elongation,
-        "increments": INCREMENTS,
-        "stress": stress[-1, 0] * thinning,
-        "shear": float(shear[0, 2]),
-    }
+        "elongation": elongation, "increments": INCREMENTS, "stress": stress[-1, 0] * thinning,
+        "shear": float(shear[0, 2])
+    }  # fmt: skip
 
 
 HYPELA2 = Format("marc-hypela2", hypela2)
-
-
 #: Table numbers in the deck, by modulus.
 NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
 #: The modulus is held as far as this from the ends of its table, whether or not Marc extrapolates.
@@ -158,14 +143,11 @@ def _rows(table: ModulusTable) -> list[tuple[float, float]]:
 
 
 def _name(card: MaterialCard) -> str:
-    """Return a name of at most 24 characters that Marc takes."""
     kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
     return kept.strip("_")[:24] or "fabric"
 
 
 NLELAST = Format("marc", nlelast, TableOptions)
-
-
 #: Section Poisson's ratio: how Abaqus changes the thickness (0: not at all; 0.5: incompressible).
 SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 
@@ -188,12 +170,9 @@ def umat(card: MaterialCard, options: NoOptions) -> Export:
         ),
     )
     context = {
-        "name": material_name(card),
-        "constants": list(law_constants(card.law)),
-        "poisson": poisson,
-        "thickness": card.thickness,
-        "exact": repr,
-    }
+        "name": material_name(card), "constants": list(law_constants(card.law)), "poisson": poisson,
+        "thickness": card.thickness, "exact": repr
+    }  # fmt: skip
     source = render(
         "abaqus/umat.f.j2", head=heading(card, "Abaqus/Standard user subroutine UMAT", says, "!")
     )

@@ -1,10 +1,8 @@
 """Describe forms of the moduli, and register them: modules of this package, and plug-ins.
 
-A form says how the numbers beta of a law make the three tangent moduli. Whatever the form, a
-modulus is a PIECEWISE CUBIC of its own logarithmic strain, and its coefficients are linear in beta:
-the compiled law, the material libraries, the exports and the fit know no more than that. A form may
-also have `by_load_ratio`: its E1 and E2 are those cubics at equal loads along warp and fill, and
-gain more or less, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`).
+Whatever the form, a modulus is a PIECEWISE CUBIC of its own logarithmic strain, its coefficients
+linear in beta. A form may also have `by_load_ratio`: its E1 and E2 are those at equal loads, and
+gain, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`).
 
 A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which depends
 on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond the strain
@@ -28,7 +26,6 @@ from ...errors import BubblefitError, InputError
 from ...files import Group, PlugIn, names_with, plug_in_named
 
 Array = NDArray[np.float64]
-
 #: The strain component that each modulus depends on.
 COMPONENTS: Mapping[str, int] = {"E1": 0, "E2": 1, "G12": 2}
 #: The moduli in the order in which beta lists them.
@@ -42,9 +39,8 @@ STRAIN_NAMES = ("warp", "fill", "shear")
 EVEN, RATIO_ENDS = math.sqrt(0.5), (0.0, 1.0)
 #: A strain that is never reached.
 UNLIMITED = 1e9
-#: Strains at which a modulus of one piece is asked whether it is positive. Between two of them a
-#: cubic that is positive there can dip by no more than 0.7 % of its largest value (Markov's bound
-#: on its curvature).
+#: Strains at which a modulus of one piece is asked whether it is positive: between two of them a
+#: cubic can dip by no more than 0.7 % of its largest value (Markov's bound on its curvature).
 GRID = 31
 
 
@@ -52,9 +48,7 @@ GRID = 31
 class Form(Protocol):
     """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
 
-    name : in cards and projects. size : length of beta. labels : (size,) for histories and tables.
-    free : entries of beta that a fit may change; the others are zero. modulus_of : the modulus
-    ("G12", "E2" or "E1") of each free entry.
+    free : entries of beta that a fit may change; the others are zero. modulus_of : of each of them.
     """
 
     @property
@@ -73,11 +67,7 @@ class Form(Protocol):
     def modulus_of(self) -> tuple[str, ...]: ...
 
     def piece_map(self) -> Array:
-        """Return (3, P, 4, size), d (coefficients of each piece, highest power first) / d beta.
-
-        Coefficients are of powers of the strain itself. A component with fewer pieces repeats its
-        last.
-        """
+        """Return (3, P, 4, size), d (coefficients of each piece, highest power first) / d beta."""
         ...
 
     def uppers(self) -> Array:
@@ -89,11 +79,7 @@ class Form(Protocol):
         ...
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        """Return (free, free) so that free entries of beta = this @ moduli at control strains.
-
-        A fit works in these values: they have the size of a modulus and depend little on each
-        other.
-        """
+        """Return (free, free): free entries of beta by moduli at control strains."""
         ...
 
     def to_card(self) -> dict[str, Any]:
@@ -141,11 +127,9 @@ def map_in_range(form: Form, strain_range: Sequence[float]) -> Array:
 
 
 def pieces_of(form: Form, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
-    """Return (3, P, 5) MPa, read-only: the moduli as the compiled law reads them.
+    """Return (3, P, 5) MPa, read-only: upper end and coefficients of each piece.
 
-    Piece k of a component holds for strains up to `[component, k, 0]` with the coefficients
-    `[component, k, 1:]`, highest power of the strain first. The last upper end is that of the
-    strain range; a component with fewer pieces than another repeats its last one.
+    The last upper end is that of the range; a component with fewer pieces repeats its last one.
     """
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     pieces = np.empty((*uppers.shape, 5))
@@ -164,10 +148,7 @@ def held_strain(component: int, strain: ArrayLike, end: float) -> Array:
 def modulus_rows(
     form: Form, name: str, strain: ArrayLike, strain_range: Sequence[float], ratio: float = EVEN
 ) -> Array:
-    """Return (n, size), d modulus / d beta at strains (n,), held ones included.
-
-    ratio : the normalised load ratio of the modulus' own yarn.
-    """
+    """Return (n, size), d modulus / d beta at strains (n,), held ones included, at a load ratio."""
     component = COMPONENTS[name]
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     held = held_strain(component, strain, uppers[component, -1])
@@ -178,10 +159,7 @@ def modulus_rows(
 
 
 def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Return rows (n, size) for G12, E2, E1 on the form's own grids; rows @ beta are moduli.
-
-    At equal loads first, from zero strain on; then at the other load ratios of `ratios_of`.
-    """
+    """Return rows (n, size) by modulus on the form's own grids; equal loads come first."""
     found = {}
     for name in ORDER:
         strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
@@ -193,19 +171,13 @@ def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array
 
 
 GROUP: Group = "bubblefit.laws"
-
-
 #: From the name, the settings and the ends of the strain range (eps1, eps2, gamma12) to a form.
 Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
 
 
 @dataclass(frozen=True)
 class Offer:
-    """A form by name: its maker, and the settings it takes beside the name.
-
-    of_strain : its moduli depend on strain; a fit of others needs no range. of_load_ratio : they
-    depend on the ratio of the loads, which not every solver carries.
-    """
+    """A form by name: its maker, its settings, what its moduli depend on."""
 
     name: str
     make: Maker
@@ -218,7 +190,6 @@ _OFFERS: dict[str, Offer] = {}
 
 
 def register_form(offer: Offer) -> None:
-    """Add one of our own forms: the last statement of its module."""
     _OFFERS[offer.name] = offer
 
 
@@ -231,19 +202,16 @@ def form_names() -> tuple[str, ...]:
 
 
 def form_settings(name: str) -> tuple[str, ...]:
-    """Return the settings that a form takes beside its name; none for an unknown form."""
     offer, _ = _offer(name)
     return offer.settings if offer else ()
 
 
 def of_strain(name: str) -> bool:
-    """Return whether the moduli of a form depend on strain, as far as is known."""
     offer, _ = _offer(name)
     return getattr(offer, "of_strain", True)
 
 
 def of_load_ratio(name: str) -> bool:
-    """Return whether the moduli of a form depend on the ratio of the loads, as far as is known."""
     offer, _ = _offer(name)
     return getattr(offer, "of_load_ratio", False)
 
@@ -251,9 +219,7 @@ def of_load_ratio(name: str) -> bool:
 def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:
     """Return the form of that name, as a project's `[law]` or a card says it.
 
-    settings : what stands beside the name: `breaks`, `knots`. strain_range : ends (eps1, eps2,
-    gamma12); UNLIMITED where there is none. Raises InputError for an unknown name or bad settings,
-    PlugInFailure for a plug-in that does not work.
+    settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none.
     """
     offer, plug_in = _offer(name)
     if offer is None:
@@ -301,6 +267,5 @@ def _made(
 
 @cache
 def _import_forms() -> None:
-    """Import each module beside this one, which registers its forms."""
     for module in iter_modules([str(Path(__file__).parent)]):
         import_module(f".{module.name}", __package__)

@@ -1,23 +1,17 @@
-"""Moduli that are cubic splines; the unknowns are their values at the knots.
-
-Of the curves that are linear in these values the twice continuously differentiable one
-("not-a-knot") is taken. From four knots on it contains every cubic, so that it can say whatever a
-cubic can, and more.
-"""
-
-from __future__ import annotations
+"""Moduli in pieces: splines by their values at knots; tri-linear (Ambroziak and Klosowski)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import comb
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from .base import COMPONENTS, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer, register_form
+from .base import COMPONENTS, GRID, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer, register_form
 
 #: Parts of a piece between which positivity and bounds are asked: a cubic that is positive at
 #: their ends can dip between them by no more than 4 % of its largest value in the piece.
@@ -29,8 +23,8 @@ MOST_KNOTS = 50
 class Spline:
     """Moduli (MPa) at knots: beta lists G12 at its knots, then E2, then E1.
 
-    A straight line between two knots, a parabola through three, a cubic spline from four on. Beyond
-    its last knot a modulus is held. knots : increasing strains from 0, of eps1, eps2, gamma12.
+    A line between two knots, a parabola through three, a cubic spline from four on, which contains
+    every cubic; held beyond the last. knots : increasing strains from 0, of eps1, eps2, gamma12.
     """
 
     knots: tuple[tuple[float, ...], ...]
@@ -38,7 +32,7 @@ class Spline:
     name = "spline"
 
     @classmethod
-    def at(cls, knots: Sequence[Sequence[float]]) -> Spline:
+    def at(cls, knots: Sequence[Sequence[float]]) -> Self:
         """Return the form with these knots; raise InputError unless they increase from 0."""
         if len(knots) != 3:
             raise InputError(None, "knots", f"expected those of 3 strains, got {len(knots)}")
@@ -122,7 +116,6 @@ def _coefficients(knots: Sequence[float]) -> Array:
 
 
 def _digits(knots: Sequence[float]) -> int:
-    """Return the digits after the point that keep the knots apart, at least three."""
     return next(
         n for n in range(3, 18) if n == 17 or len({f"{k:.{n}f}" for k in knots}) == len(knots)
     )
@@ -140,12 +133,7 @@ def _increasing(row: Any) -> bool:
 
 
 def spline_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Spline:
-    """Return the form of the setting `knots`.
-
-    `knots = 6`: as many for each modulus, evenly spaced over the strain range. `knots = [0, 0.02,
-    ...]`: the same strains for each. `knots = {warp = [0, 0.02, ...], fill = 5, shear = ...}`:
-    strains or a number for each. Raises InputError.
-    """
+    """Return the form of `knots`: a number, strains, or either by direction."""
     given = settings.get("knots")
     if given is None:
         raise InputError(None, "knots", "a spline needs knots = 6, or {warp = [0, ...], ...}")
@@ -185,3 +173,111 @@ def _row(own: Any, field: str, end: float) -> list[float]:
 
 
 register_form(Offer("spline", spline_named, ("knots",)))
+
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class TriLinear:
+    """Three moduli up to the first break, between the breaks, and beyond the second.
+
+    G12 is beta_3 to beta_1, E2 beta_7 to beta_5, E1 beta_11 to beta_9; a break belongs to the
+    region below it. pairs : the two breaks of eps1, of eps2 and of gamma12.
+    """
+
+    pairs: tuple[Pair, Pair, Pair]
+
+    name = "trilinear"
+    size = 12
+    labels = tuple(f"beta_{i}" for i in range(12))
+    free = (1, 2, 3, 5, 6, 7, 9, 10, 11)
+    modulus_of = tuple(name for name in ORDER for _ in range(3))
+
+    @classmethod
+    def at(cls, breaks: ArrayLike) -> Self:
+        """Return the form with breaks (3, 2); raise InputError unless positive and increasing."""
+        try:
+            pairs = np.array(breaks, dtype=float)
+        except (TypeError, ValueError):
+            pairs = np.empty(0)
+        good = pairs.shape == (3, 2) and np.isfinite(pairs).all()
+        if not good or not (pairs[:, 0] > 0).all() or not (np.diff(pairs) > 0).all():
+            raise InputError(
+                None,
+                "breaks",
+                "expected two positive, increasing strains for each of (eps1, eps2, gamma12), "
+                f"got {' '.join(str(breaks).split())}",
+            )
+        first, second, third = ((float(a), float(b)) for a, b in pairs)
+        return cls((first, second, third))
+
+    @property
+    def breaks(self) -> Array:
+        breaks = np.array(self.pairs)
+        breaks.flags.writeable = False
+        return breaks
+
+    def piece_map(self) -> Array:
+        whole = np.zeros((3, 3, 4, 12))
+        for block, name in enumerate(ORDER):
+            for piece in range(3):
+                whole[COMPONENTS[name], piece, 3, 4 * block + 3 - piece] = 1.0
+        return whole
+
+    def uppers(self) -> Array:
+        return np.column_stack([self.breaks, np.full(3, UNLIMITED)])
+
+    def grid(self, component: int, end: float) -> Array:
+        """Return as many strains in a narrow region as in a wide one."""
+        breaks = self.breaks[component]
+        knots = np.concatenate([[0.0], breaks[breaks < end], [end]])
+        at = np.linspace(0.0, len(knots) - 1, GRID)
+        return np.interp(at, np.arange(len(knots)), knots)
+
+    def from_values(self, strain_range: Sequence[float]) -> Array:
+        return np.eye(len(self.free))
+
+    def to_card(self) -> dict[str, Any]:
+        return {"breaks": dict(zip(STRAIN_NAMES, self.breaks.tolist(), strict=True))}
+
+    def describe(self) -> str:
+        return (
+            "Tri-linear moduli, beyond the second break, between the breaks, up to the first: "
+            "beta_1..3: G12 of |gamma12|, beta_5..7: E2 of eps2, beta_9..11: E1 of eps1; the "
+            "others are 0."
+        )
+
+
+def trilinear_named(
+    name: str, settings: Mapping[str, Any], strain_range: Sequence[float]
+) -> TriLinear:
+    """Return the form of `breaks`, {warp = [first, second], fill = ..., shear = ...}."""
+    breaks = settings.get("breaks")
+    if not isinstance(breaks, Mapping):
+        problem = "a trilinear law needs breaks = {warp = [first, second], fill = ..., shear = ...}"
+        raise InputError(None, "breaks", problem)
+    for key in breaks:
+        if key not in STRAIN_NAMES:
+            problem = f"unknown direction; allowed: {', '.join(STRAIN_NAMES)}"
+            raise InputError(None, f"breaks.{key}", problem)
+    pairs = []
+    for key in STRAIN_NAMES:
+        if key not in breaks:
+            raise InputError(None, f"breaks.{key}", "this key is missing")
+        pair = breaks[key]
+        if not _rising(pair):
+            problem = f"expected [first, second], 0 < first < second, got {pair}"
+            raise InputError(None, f"breaks.{key}", problem)
+        pairs.append(pair)
+    return TriLinear.at(pairs)
+
+
+def _rising(pair: Any) -> bool:
+    numbers = isinstance(pair, (list, tuple)) and len(pair) == 2
+    if not numbers or not all(type(x) in (int, float) for x in pair):
+        return False
+    return bool(0 < pair[0] < pair[1] < UNLIMITED)
+
+
+register_form(Offer("trilinear", trilinear_named, ("breaks",)))

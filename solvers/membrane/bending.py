@@ -1,7 +1,5 @@
 """Bending of an inflated membrane: gas of constant mass, rigid bodies, a collar that moves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -32,7 +30,6 @@ WRINKLES = NoteKind("wrinkle stiffness")
 
 
 Array = NDArray[np.float64]
-
 #: Viscosity over pressure over the size of a facet: in the first step, which hardly moves; factors
 #: after a step that was found, and one that was not; the most steps of both kinds.
 FIRST, DOWN, UP, MOST_STEPS = 20.0, 0.3, 8.0, 60
@@ -54,9 +51,8 @@ MOST_GROWTH_INFLATED = 0.1
 def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
     """Return the equilibrium (n, 3) to which the membrane alone moves from `start`, or None.
 
-    Backward Euler steps of a viscous motion, residual(u) + viscosity area (u - u_before) = 0, each
-    an equilibrium of a membrane that cannot jump. The viscosity vanishes as the motion dies down:
-    the result is in equilibrium without it. The law sees the way there as one increment.
+    Backward Euler steps of a viscous motion, residual(u) + viscosity area (u - u_before) = 0; the
+    viscosity vanishes as the motion dies down. The law sees the way there as one increment.
     """
     facet = float(np.sqrt(np.median(membrane.elements.area.sum(axis=1))))
     unit = membrane.pressure / facet
@@ -90,9 +86,9 @@ def analyse(
 ) -> History:  # fmt: skip
     """Return the frames of the bending: the inflated state and every reported displacement.
 
-    `load` is the force (N) of the collar on the whole membrane along its way, `reactions` those of
-    all bodies on it, `wrinkled` a share of `sides` (elements,). Where no equilibrium is found on
-    the way, the history ends early with the last good frame; SolverFailure without any.
+    `load` is the force (N) of the collar on the whole membrane along its way, `wrinkled` a share of
+    `sides` (elements,). Without an equilibrium on the way the history ends with the last good
+    frame.
     """
     plan = model.bending
     assert plan is not None
@@ -199,11 +195,7 @@ class Moving(Loading):
 
 
 def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float) -> Array | None:
-    """Return the equilibrium at `level` beyond a limit pressure, from that at `before` (MPa).
-
-    Under pressure alone the membrane would jump. The law needs the strain path in between, so every
-    step of the volume is an increment of it and is accepted.
-    """
+    """Return the equilibrium at `level` beyond a limit pressure, led there by the volume."""
     outside = OVERPRESSURE * level
     first, _ = membrane.cavity.measure(membrane.reference + u)
     volume, pressure, step, slope = first, before, STEP, np.zeros_like(u)
@@ -234,13 +226,7 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
 def analyse_inflated(
     membrane: ClosedMembrane, model: InflatedModel, asked: Asked
 ) -> tuple[History, Array]:
-    """Return the history of the inflation, or of the bending; derivatives are empty.
-
-    The membrane is fresh: no strain, no stress.
-
-    Raises InputError : derivatives or a guess was asked for. SolverFailure : an increment of the
-    pressure has no equilibrium.
-    """
+    """Return the history of inflation or bending of a fresh membrane; no derivatives."""
     if asked.parameters or asked.guess is not None:
         raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
     levels = np.array(model.pressures)
@@ -281,7 +267,6 @@ def analyse_inflated(
 
 
 def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
-    """Return (elements,) all but the set "caps": a flat cap is folded from the first kPa on."""
     sides = np.ones(len(model.mesh.quads), dtype=bool)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     return sides
@@ -358,16 +343,11 @@ def prepare(
 def analyse_cylinder(
     membrane: ClosedMembrane, model: CylinderModel, asked: Asked
 ) -> tuple[History, Array]:
-    """Return `analyse_inflated` of the cylinder's closed membrane."""
     return analyse_inflated(membrane, closed_membrane_of(model), asked)
 
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:
-    """Return the cylinder with its posts and ring; all that is held, reported and closed in stays.
-
-    A quarter has the support at z = span / 2 and half of the ring; the whole cylinder has both
-    supports, whose forces are reported as one.
-    """
+    """Return the cylinder with its posts, whose forces are reported as one, and its ring."""
     half, radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
     sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
     size = model.collar

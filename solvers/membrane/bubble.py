@@ -1,7 +1,5 @@
 """Inflation of a membrane, increment by increment."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,10 +32,9 @@ from .newton import (
 class Wall:
     """Behaviour of a closed membrane's wall where it is pressed together.
 
-    wrinkle_stiffness : share of its stiffness that is left across a wrinkle (a tension field, see
-    materials/wrinkles.py); None: it carries compression as it carries tension, and folds where that
-    makes it unstable. bending_stiffness : share of the wall's own, E t^3/12, where rigid bodies
-    bend the membrane; with none, folds are as fine as the mesh.
+    wrinkle_stiffness : share of its stiffness left across a wrinkle (a tension field, see
+    materials/wrinkles.py); None: it carries compression. bending_stiffness : share of E t^3/12
+    where rigid bodies bend the membrane; with none, folds are as fine as the mesh.
     """
 
     wrinkle_stiffness: float | None = None
@@ -61,8 +58,7 @@ FIRST_HEIGHTS, HIGHER = (1.0, 1.5, 0.75, 2.0, 1.25, 0.5), (3.0, 10.0)
 #: Names of the walls: both ends of the band, or one of them alone.
 Walls = Literal["band", "tension field", "stiff"]
 #: Share of its stiffness that a tension field keeps across a wrinkle, with about one per cent of
-#: the load. With a third of it a beam of 25 mm elements collapses where finer ones do not (150 mm,
-#: 140 kPa, card "bubble 1": 4 % less load at 240 mm), at three times the work.
+#: the load. With a third of it a beam of 25 mm elements collapses where finer ones do not.
 LEFT = 3e-4
 #: A coated fabric, which bends far more easily than a solid sheet of its thickness, and that sheet.
 TENSION_FIELD, STIFF = Wall(wrinkle_stiffness=LEFT), Wall()
@@ -87,13 +83,7 @@ BAND = (
 def chosen_wall(
     name: Walls, wrinkle_stiffness: float | None, bending_stiffness: float | None
 ) -> Wall | None:
-    """Return the one wall of the settings; None: the band.
-
-    wrinkle_stiffness, bending_stiffness : as `Wall` has them, None where they are not given. With
-    one of them there is no band: the wall is a tension field if it has the first.
-
-    Raises InputError : as `Wall`; an unknown name, a stiff wall with wrinkles.
-    """
+    """Return the one wall of the settings; None: the band, without both stiffnesses."""
     if name not in ("band", "tension field", "stiff"):
         problem = f"expected 'band', 'tension field' or 'stiff', got {name!r}"
         raise InputError(None, "wall", problem)
@@ -108,7 +98,6 @@ def chosen_wall(
 
 
 def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    """Build the membrane of a sheet, whose wall is not bent; it serves every law."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
@@ -120,10 +109,7 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
 
 
 def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[History, Array]:
-    """Return the history, and the derivatives by the parameters in the reported frames.
-
-    The membrane is fresh: no strain, no stress.
-    """
+    """Return the history of a fresh membrane, and the derivatives in the reported frames."""
     levels = np.array(model.increments)
     shape = membrane.reference.shape
     derivatives = None

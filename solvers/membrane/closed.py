@@ -1,7 +1,5 @@
 """A membrane around a cavity: gas pressure, start from the slack state, rigid bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -26,9 +24,8 @@ STRAIGHT = 0.7
 TOUCH, WAYS = 1e-9, 500
 #: The slack state's artificial stiffness is multiplied by this in every iteration.
 FADE = 0.6
-#: Artificial stress of the slack state, as multiples of the one with a first step as large as the
-#: result for a flat part (a cap): it bulges by h = 0.66 R (s/E)^(1/3), s = p R/t, and under the
-#: artificial stress alone it would by p R^2/(4 t stress).
+#: Artificial stress of the slack state over that with which a cap's first step, p R^2/(4 t stress),
+#: is as large as the result, 0.66 R (p R/(t E))^(1/3).
 SLACK_SHARES = (4.0, 0.4, 40.0)
 
 
@@ -36,10 +33,9 @@ SLACK_SHARES = (4.0, 0.4, 40.0)
 class Cavity:
     """A closed surface, or the part of one that symmetry planes close.
 
-    weight, origin (3,): see `volume_and_gradient`. A plane x_k = origin_k adds nothing to direction
-    k, and nothing to any other because its normal is along k; where two planes share a direction (a
-    slice of a long tube) that direction gets no weight. symmetric (3,): directions with a plane;
-    planes (n, 3): nodes of open edges in one, by its normal.
+    weight, origin (3,): see `volume_and_gradient`; where two planes share a direction (a slice of a
+    long tube) it gets no weight. symmetric (3,): directions with a plane; planes (n, 3): nodes of
+    open edges in one, by its normal.
     """
 
     quads: NDArray[np.intp]
@@ -55,10 +51,9 @@ class Cavity:
 
 
 def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp]) -> Cavity:
-    """Find the symmetry planes that close the surface.
+    """Find the symmetry planes that close the surface, of unknowns held (3 * node + direction).
 
-    fixed : held unknowns, 3 * node + direction. InputError : an open edge in no plane in which its
-    nodes are held.
+    InputError : an open edge in no plane in which its nodes are held.
     """
     sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
@@ -91,22 +86,19 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
 # Bending stiffness of the wall, which keeps a wrinkle from being as fine as the mesh.
 #
 # No rotations: the curvature along a line of the mesh is the second difference of three positions,
-#
-#     curvature = [(x_+ - x_0)/l_+ - (x_0 - x_-)/l_-] / h,   h = (l_+ + l_-)/2,
-#
-# (l reference lengths), a vector that turns with the wall, and the energy of a node's share of the
-# surface is D/2 |curvature|^2 (the quadratic bending of Bergou et al., Symposium on Geometry
-# Processing 2006, on the lines of a grid). It is quadratic in the positions, so that its stiffness
-# is one constant matrix. The sheet is flat when it is free; twist has no stiffness.
+#     [(x_+ - x_0)/l_+ - (x_0 - x_-)/l_-] / h,   h = (l_+ + l_-)/2,
+# a vector that turns with the wall, and the energy of a node's share of the surface D/2 times its
+# square (Bergou et al., Symposium on Geometry Processing 2006, on lines of a grid): quadratic in
+# the positions, with one constant matrix. The sheet is flat when it is free; no twist.
 
 
 @dataclass(frozen=True, eq=False)
 class Flexure:
     """Lines of a mesh through its nodes.
 
-    nodes (h, 3): before, at and after the node; where a plane of symmetry ends the line the node
-    after it twice, once mirrored. differences (h, 3, 3): by node and component, 1/mm^2, of the
-    curvature. shares (h, 2) mm^2 mm^3: surface times thickness^3/12 that bends along warp, fill.
+    nodes (h, 3): before, at, after; a plane of symmetry mirrors the node after. differences (h, 3,
+    3): by node and component, 1/mm^2, of the curvature. shares (h, 2) mm^2 mm^3: surface times
+    thickness^3/12 that bends along warp, fill.
     """
 
     nodes: Numbers
@@ -132,10 +124,9 @@ class Flexure:
 def flexure_of(
     points: Array, quads: Numbers, warp: Array, thickness: Array, planes: NDArray[np.bool_]
 ) -> Flexure:
-    """Return the lines through every node of a mesh.
+    """Return the lines through every node of a mesh; thickness mm, one or (quads,).
 
-    points : (n, 3) mm. warp : (quads, 3). thickness : mm, one or (quads,). planes : (n, 3) whether
-    an open edge at the node lies in a plane of symmetry, by its normal.
+    planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
     """
     share, inertia, along = _of_nodes(points, quads, warp, thickness)
     nodes, differences, shares = [], [], []
@@ -185,10 +176,7 @@ def _of_nodes(
 def _lines(
     points: Array, quads: Numbers, planes: NDArray[np.bool_]
 ) -> Iterator[tuple[int, int, int, Array]]:
-    """Yield (before, node, after, mirror (3,)): neighbours that continue each other through a node.
-
-    Where a plane of symmetry ends a line, the node before is also the one after, mirrored.
-    """
+    """Yield (before, node, after, mirror (3,)): neighbours in line through a node."""
     beside: list[dict[int, set[int]]] = [{} for _ in points]
     for e, quad in enumerate(quads.tolist()):
         for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
@@ -213,10 +201,10 @@ def _lines(
 
 
 def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
-    """Return distance (n,) mm of points (n, 3) from a body, gradient (n, 3) and Hessian (n, 3, 3).
+    """Return distance (n,) mm of points from a body, gradient (n, 3) and Hessian (n, 3, 3).
 
-    Negative inside the body. A ring's mouth is rounded by its fillet: there the distance is that
-    from the circle through the fillet's centre, less its radius.
+    Negative inside. In a ring's mouth it is that from the circle through the fillet's centre, less
+    its radius.
     """
     axis = np.asarray(body.axis, dtype=float)
     arm = position - np.asarray(body.centre, dtype=float)
@@ -260,7 +248,6 @@ def contact_forces(
 
 
 def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
-    """Return the few nodes that may be inside the body, without their distances."""
     arm = position - np.asarray(body.centre, dtype=float)
     along = arm @ np.asarray(body.axis, dtype=float)
     square = np.einsum("ni,ni->n", arm, arm) - along**2
@@ -273,10 +260,7 @@ def _within_reach(body: RigidCylinder, position: Array) -> NDArray[np.intp]:
 def brought_to_touch(
     body: RigidCylinder, position: Array, direction: Array, bite: float
 ) -> RigidCylinder:
-    """Return the body moved along `direction` until it is `bite` (mm) into the surface.
-
-    InputError : no node lies on its way.
-    """
+    """Return the body moved along `direction` until it is `bite` (mm) into the surface."""
     centre, axis = np.asarray(body.centre, dtype=float), np.asarray(body.axis, dtype=float)
     arm = position - centre
     if body.ring:
@@ -306,15 +290,12 @@ def brought_to_touch(
 
 @dataclass(eq=False, kw_only=True)
 class ClosedMembrane(Membrane):
-    """A membrane with a cavity. `tangent` is a `BorderedTangent`.
+    """A membrane with a cavity; `tangent` is a `BorderedTangent`.
 
-    gas : where given, the pressure follows from the volume and the given level is ignored. bodies,
-    penalty : rigid bodies at their present place, and their stiffness in MPa/mm. slack : MPa of
-    artificial isotropic stress in the next tangent; it fades with every tangent and is in no
-    residual, so that no equilibrium depends on it. viscosity, anchor : see `drag`. flexure,
-    line_slot : lines of the mesh that resist bending, and the places (lines, 144) of their
-    stiffness in the tangent, each a quad of before, node, after, node. pressure, volume : at the
-    last evaluation.
+    gas : sets the pressure by the volume. penalty : MPa/mm, of `bodies` at their present place.
+    slack : MPa of artificial isotropic stress in the next tangent, in no residual; it fades with
+    every tangent. line_slot : (lines, 144) places of the flexure's stiffness in the tangent, each a
+    quad of before, node, after, node. pressure, volume : at the last evaluation.
     """
 
     cavity: Cavity
@@ -377,7 +358,6 @@ class ClosedMembrane(Membrane):
         return self._stiff[1], self._stiff[2]
 
     def equilibrium(self, u: Array, pressure: float) -> Array | None:
-        """Return the equilibrium; with a line search where rigid bodies may touch the membrane."""
         if self.bodies:
             return searched_equilibrium(self, u, pressure)
         return super().equilibrium(u, pressure)
@@ -411,10 +391,7 @@ class ClosedMembrane(Membrane):
         self.viscosity, self.anchor = viscosity, anchor
 
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
-        """Return the share of the surface of `sides` (elements,) without tension in a direction.
-
-        There a wall without bending stiffness wrinkles.
-        """
+        """Return the share of the surface of `sides` (elements,) without tension in a direction."""
         area, s = self.elements.area[sides], self.stress_new[sides]
         least = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(0.5 * (s[..., 0] - s[..., 1]), s[..., 2])
         folded = (self.wrinkle[sides] != 0.0).any(axis=2) | (least < 0.0)
@@ -423,8 +400,7 @@ class ClosedMembrane(Membrane):
     def wrinkle_work(self, wrinkle: Array) -> float:
         """Return the work (N mm, of the meshed part) on the stiffness that is left to wrinkles.
 
-        From the last `accept` (before the next one), where they were `wrinkle` (elements, 4, 3), to
-        the last evaluation.
+        From the last `accept`, where they were `wrinkle` (elements, 4, 3), to the last evaluation.
         """
         if not self.wrinkle_stiffness:
             return 0.0
@@ -456,14 +432,12 @@ class ClosedMembrane(Membrane):
 def prepare(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, wall: Wall | None
 ) -> ClosedMembrane:
-    """Build the membrane of a model; a stiff wall unless another is given."""
     return closed_membrane(model, law, tolerance, model.fixed(), wall or STIFF)
 
 
 def closed_membrane(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
-    """Build the membrane of a model with these unknowns held."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))

@@ -1,11 +1,8 @@
 """The tangent matrix and its factorisation, by a library.
 
-Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, assembled straight into band
-storage, which is faster there (benchmarks/bench_cost.py growth). Large ones: SuperLU. Both are
-unsymmetric, because the hypoelastic tangent is, and exact sensitivities need all of it.
+Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, which is faster there
+(benchmarks/bench_cost.py growth); large ones: SuperLU. Both unsymmetric, as the tangent is.
 """
-
-from __future__ import annotations
 
 from typing import Any, Protocol
 
@@ -18,18 +15,13 @@ from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
-
 NEAR = 1e-9  # of the length
 # Above this many doubles the band no longer pays against SuperLU's fill (see benchmarks/).
 LARGEST_BAND = 8_000_000
 
 
 def swept(quads: Numbers, points: Array) -> list[Numbers]:
-    """Return orders of the nodes (n,), swept from either end of the longest axis.
-
-    Cuthill and McKee start at one node, so that on a tube their fronts lie askew and are up to
-    twice as long as a ring; started at all nodes of an end they are the rings.
-    """
+    """Return orders of the nodes (n,) by rings, swept from either end of the longest axis."""
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
     near = NEAR * float(np.ptp(along))
@@ -61,8 +53,6 @@ class SingularTangent(Exception):
 
 
 class Tangent(Protocol):
-    """Storage to assemble into, and the solve."""
-
     data: Array
     slot: NDArray[np.int64]
 
@@ -72,9 +62,9 @@ class Tangent(Protocol):
     def definite(self) -> bool:
         """Return whether the symmetric part of `data` is positive definite: stability.
 
-        Then every small motion away takes work (Hill, J. Mech. Phys. Solids 6 (1958) 236). The part
-        stands for all of the hypoelastic tangent: they differ by 1 to 5 %, their least eigenvalues
-        by a few tenths of a per cent (measured on strips and bubbles).
+        Then every small motion away takes work (Hill, J. Mech. Phys. Solids 6 (1958) 236). The
+        hypoelastic tangent differs from it by 1 to 5 %, its least eigenvalue by a few tenths of a
+        per cent.
         """
 
     def solve(self, rhs: Array) -> Array:
@@ -84,10 +74,7 @@ class Tangent(Protocol):
 def tangent_for(
     quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
 ) -> Tangent:
-    """Return storage for the tangent of `quads` restricted to the `free` of `size` unknowns.
-
-    points : (n, 3) mm, of a long surface: it may be ordered along its length.
-    """
+    """Return storage for the tangent of `quads` on `free` unknowns; points (n, 3) of a tube."""
     dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
     place = np.full(size, -1, dtype=np.int64)
     place[free] = np.arange(len(free))
@@ -188,22 +175,17 @@ class SparseTangent:
 
 
 class BorderedTangent:
-    """A sparse tangent plus c v v', solved by Sherman and Morrison's formula.
-
-    A gas couples all nodes: dp/du = -c v with v = dV/du, which would fill the matrix.
-    """
+    """A sparse tangent plus c v v' (a gas: dp/du = -c dV/du), by Sherman and Morrison's formula."""
 
     def __init__(self, inner: Tangent) -> None:
         self.inner, self.data, self.slot = inner, inner.data, inner.slot
         self.stiffness, self.border = 0.0, np.empty(0)
 
     def factor(self) -> None:
-        """Factorise the sparse part."""
         self.inner.factor()
         self.answer = self.inner.solve(self.border) if self.stiffness else self.border
 
     def definite(self) -> bool:
-        """Return whether the sparse part is (the rest is never negative)."""
         return self.inner.definite()
 
     def solve(self, rhs: Array) -> Array:

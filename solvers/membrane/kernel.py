@@ -1,18 +1,12 @@
 """Residual and consistent tangent of the membrane and their derivatives, compiled.
 
 Total Lagrangian: with base vectors F1, F2 (images of the unit warp and fill vectors) the virtual
-strains are B_n = a_n A0 + d_n A1, a_n and d_n being the derivatives of shape function n, and A0, A1
-(3 strains x 3 directions) built from F1 and F2. So the tangent of a node pair is a_n (a_m K00 + d_m
-K01) + d_n (a_m K10 + d_m K11), with four 3 x 3 blocks a Gauss point: `assemble`.
-
-Direct differentiation through the strain path, for every parameter b: K du/db = -dR/db at fixed
-displacement, where dR/db carries the explicit dependence on b and the derivatives of strain and
-stress at the start of the increment (`explicit`; `by_sheet` for parameters of the stress-free
-shape, which change places, areas and slopes of shape functions). After the solve, `advance` takes
-strain and stress derivatives to the end of the increment.
+strains are B_n = a_n A0 + d_n A1, a_n and d_n the derivatives of shape function n. So the tangent
+of a node pair is a_n (a_m K00 + d_m K01) + d_n (a_m K10 + d_m K11), four 3 x 3 blocks a Gauss
+point: `assemble`. Direct differentiation through the strain path, for every parameter b: K du/db =
+-dR/db at fixed displacement (`explicit`; `by_sheet` for parameters of the stress-free shape); after
+the solve, `advance` takes strain and stress derivatives to the end of the increment.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -98,15 +92,11 @@ def assemble(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write internal minus pressure forces at `position`, and the tangent.
 
-    position (n, 3) mm; thickness (elements,) mm; h_*, s_* (elements, 4, 3) log strain and stress
-    before (old) and at this position (new, written); slot (elements, 144) place of each element
-    entry in the sparse `data` (-1: held), written when `with_tangent`; residual (3 n,) written;
-    share : of the stiffness, left to wrinkles; below 0 the membrane does not wrinkle, otherwise
-    strain and stress are those of the fabric and wrinkle (elements, 4, 3), its strain less that of
-    the surface, is written (see materials/wrinkles.py).
-
-    Returns the largest nodal pressure force of an element (N), or -1 without valid stress at a
-    point.
+    h_*, s_* (elements, 4, 3) log strain and stress before (old) and here (new, written); slot
+    (elements, 144) place of each element entry in `data` (-1: held); share : left to wrinkles;
+    below 0 the membrane does not wrinkle, otherwise wrinkle (elements, 4, 3), the strain of the
+    fabric less that of the surface, is written. Returns the largest nodal pressure force of an
+    element (N), or -1 without valid stress at a point.
     """
     residual[:] = 0.0
     if with_tangent:
@@ -219,8 +209,8 @@ def assemble(  # type: ignore[no-untyped-def]
 class ReferenceElements:
     """Shape functions and their derivatives in each facet's material frame.
 
-    values (4 points, 4 nodes); slopes (elements, 4 points, 2, 4) d N/d (warp, fill) in 1/mm;
-    area (elements, 4 points) mm^2 of reference surface at each Gauss point.
+    values (4 points, 4 nodes); slopes (elements, 4 points, 2, 4) 1/mm; area (elements, 4 points)
+    mm^2.
     """
 
     values: Array
@@ -231,10 +221,10 @@ class ReferenceElements:
 def reference_elements(
     points: Array, quads: NDArray[np.intp], warp: Array | None = None
 ) -> ReferenceElements:
-    """Evaluate the bilinear shape functions on a flat or faceted surface.
+    """Evaluate the bilinear shape functions on a flat or faceted surface (n, 2) or (n, 3) mm.
 
-    points : (n, 2) or (n, 3) mm. quads : (m, 4). warp : (m, 3) direction of the warp yarn in each
-    facet; x unless given. InputError : a quad that is inside out, or a warp normal to its facet.
+    warp : (m, 3) direction of the yarn in each facet; x unless given. InputError : a quad inside
+    out.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -265,11 +255,9 @@ def explicit(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write the derivative of the residual at fixed displacement.
 
-    rows (3, P, 4, np) derivatives of the pieces' coefficients by the parameters, by_coupling (3,
-    np) those of the coupling of warp and fill, push the number of the parameter that is a pressure,
-    or -1; dh_old, ds_old (elements, 4, 3, np) derivatives at the start of the increment; writes
-    ds_new (same shape; the part at fixed displacement), point (elements, 4, POINT) and rate (3 n,
-    np).
+    rows (3, P, 4, np), by_coupling (3, np) of `law_slopes`; push the number of the parameter that
+    is a pressure, or -1; dh_old, ds_old (elements, 4, 3, np) at the start of the increment. Writes
+    ds_new (the part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
     """
     nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
@@ -396,9 +384,8 @@ def by_sheet(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write the derivative of the residual at fixed displacement and fixed strain at the start.
 
-    surface (k, n, 3), slopes_by (k, elements, 4, 2, 4), area_by (k, elements, 4): derivatives of
-    the reference places, of the shape functions' slopes and of the area by k parameters; writes
-    green (elements, 4, 3, k), of the Green-Lagrange strain (E11, E22, 2 E12), and rate (3 n, k).
+    surface (k, n, 3), slopes_by (k, elements, 4, 2, 4), area_by (k, elements, 4): derivatives by k
+    parameters; writes green (elements, 4, 3, k), of (E11, E22, 2 E12), and rate (3 n, k).
     """
     count = len(surface)
     rate[:] = 0.0
@@ -471,12 +458,7 @@ def by_sheet(  # type: ignore[no-untyped-def]
 
 
 def element_slopes(points: Array, quads: NDArray[np.intp], direction: Array) -> tuple[Array, Array]:
-    """Return derivatives of `reference_elements` where the points move along a direction.
-
-    The warp yarn is x, laid onto each facet. points : (n, 3) mm, without stress. quads : (m, 4).
-    direction : (n, 3) mm per unit. Returns those of slopes (m, 4 points, 2, 4 nodes), 1/mm per
-    unit, and of area (m, 4), mm^2 per unit.
-    """
+    """Return derivatives of `reference_elements`, slopes and area, along a direction (n, 3)."""
     base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
     base_by = np.einsum("pan,mnk->mpak", NATURAL, direction[quads])
     normal = np.cross(base[:, :, 0], base[:, :, 1])

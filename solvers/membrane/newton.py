@@ -1,10 +1,7 @@
 """Equilibria of a membrane: one level (Newton, line search), level after level, derivatives.
 
-The strain history is committed at the levels only and not at steps in between, so that the path
-integral of the law, and with it the result, does not depend on how a level was reached.
+Strain is committed at levels only: the result does not depend on how a level was reached.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,16 +17,13 @@ from .factorisation import SingularTangent, Tangent
 from .kernel import POINT, ReferenceElements, advance, assemble, by_sheet, element_slopes, explicit
 
 Array = NDArray[np.float64]
-
 MOST_ITERATIONS, MOST_BACKTRACKS = 40, 8
 # Below this residual, a step that shrank the residual this much is followed by a chord step
 # (no new tangent): it costs a quarter of a Newton step and still gains one to two digits.
 CHORD_BELOW, CHORD_GAIN = 1e-2, 0.15
-# Below this residual Newton gains digits in every step. Where it no longer does, the residual is
-# rounding (fine meshes at low pressure reach 1e-8): the iterate is as good as it gets.
+# Below this residual, steps that gain no digits are rounding (fine meshes at low pressure).
 ROUNDING_BELOW, MOST_IDLE = 1e-6, 3
-# Where a modulus jumps (a tri-linear one at a break) so does the tangent, and full steps can go to
-# and fro between two sides for ever. After this many without progress every step has to make some.
+# Where a modulus jumps full steps go to and fro: after this many, every step has to gain.
 MOST_FRUITLESS = 3
 #: Steps of a line search: after as many without equilibrium, half the way is tried instead.
 MOST_STEPS = 16
@@ -47,12 +41,10 @@ SheetSlopes = Mapping[str, tuple[Array, Array]]
 class Membrane:
     """State of an equilibrium iteration: strain and stress at start and end of an increment.
 
-    reference (n, 3) mm; thickness mm, one or (elements,), which section (elements,) repeats;
-    strain_*, stress_* (elements, 4, 3); step_limit mm: the largest nodal correction of one
-    iteration; keep_tangent: end every increment with the tangent of its equilibrium assembled (for
-    sensitivities; in a chord step it costs little more); wrinkle_stiffness: share of the stiffness
-    left to wrinkles; None: the membrane carries compression as it carries tension; wrinkle
-    (elements, 4, 3): strain of the fabric less that of the surface at the last evaluation.
+    reference (n, 3) mm; thickness mm, one or (elements,), as section; strain_*, stress_*, wrinkle
+    (elements, 4, 3), the last the strain of the fabric less that of the surface; step_limit mm: the
+    largest nodal correction of one iteration; keep_tangent: end every increment with its tangent
+    assembled; wrinkle_stiffness: share left to wrinkles; None: the membrane carries compression.
     """
 
     reference: Array
@@ -106,7 +98,6 @@ class Membrane:
         """Add forces beside stress and pressure to `residual` (and the tangent): none here."""
 
     def accept(self) -> None:
-        """Take the strain and stress of the last evaluation as the start of the next increment."""
         self.strain_old[:] = self.strain_new
         self.stress_old[:] = self.stress_new
 
@@ -186,11 +177,7 @@ class NoEquilibrium(SolverFailure):
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Options of an analysis beside its model.
-
-    parameters : of the derivatives. guess : (increments, nodes, 3) displacements to start each
-    increment from. tell : called with every increment that is done.
-    """
+    """Options of an analysis; guess : (increments, nodes, 3) to start each increment from."""
 
     parameters: Sequence[str] = ()
     guess: Array | None = None
@@ -199,8 +186,6 @@ class Asked:
 
 @dataclass(frozen=True)
 class Done:
-    """Progress of a run in increments of the model."""
-
     time: float
 
 
@@ -222,14 +207,10 @@ class Loading:
         raise NotImplementedError
 
     def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
-        """Return a start inside a step that is halved, straight on from u at another level.
-
-        before : the displacement as far back, where there is one.
-        """
+        """Return a start inside a halved step, straight on from u; before : as far back, if any."""
         return u if before is None else np.asarray(2.0 * u - before)
 
     def guessed(self, guess: Array) -> Array:
-        """Return a guess as an admissible start."""
         return guess
 
     def reached(
@@ -249,8 +230,8 @@ def march(
 ) -> Iterator[Array]:  # fmt: skip
     """Yield the displacement (nodes, 3) at each level; the caller accepts it before the next one.
 
-    begun : level and displacement to start from; the unloaded membrane otherwise. done : earlier
-    increments of the model. NoEquilibrium : a level cannot be reached.
+    begun : level and displacement to start from, else unloaded. done : earlier increments of the
+    model.
     """
     known, path = ([begun[0]], [begun[1]]) if begun is not None else ([], [])
     for i, level in enumerate(float(value) for value in levels):
@@ -311,11 +292,7 @@ def lagrange(x: Array, known: Array, at: float) -> Array:
 
 
 class Record:
-    """Record of an analysis' increments.
-
-    path (increments, nodes, 3) mm; forces likewise, N, of the nodes on their supports; low, high
-    (3,) extremes of the strain components.
-    """
+    """Record of increments: path (increments, nodes, 3) mm, forces N, extremes of strain (3,)."""
 
     def __init__(self, membrane: Membrane, count: int) -> None:
         self.membrane = membrane
@@ -323,7 +300,6 @@ class Record:
         self.low, self.high = np.zeros(3), np.zeros(3)
 
     def accept(self, i: int, u: Array) -> None:
-        """Accept increment i, whose displacement is u (nodes, 3)."""
         self.membrane.accept()
         self.path[i] = u
         self.forces[i] = self.membrane.residual.reshape(u.shape)
@@ -333,15 +309,12 @@ class Record:
 
 # Newton's iteration with a line search, for contact and wrinkles: their stiffness jumps.
 #
-# A full step from a tangent without a node's contact, or with a wrinkle's next to nothing, lands
-# far inside a body. The residual's largest entry then says little, but its work along the step
-# does: it changes its sign where the energy along the step is least (Matthies and Strang, Int. J.
-# Numer. Methods Eng. 14 (1979) 1613). Gas, contact and an increment of the law are nearly
-# conservative.
+# A full step from a tangent without a node's contact lands far inside a body. The residual's work
+# along the step changes its sign where the energy is least (Matthies and Strang, Int. J. Numer.
+# Methods Eng. 14 (1979) 1613); gas, contact and an increment of the law are nearly conservative.
 
 
 def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array | None:
-    """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
     u = u.copy()
     norm = membrane.unbalance(u, pressure, with_tangent=True)
     least, idle = np.inf, 0
@@ -402,9 +375,9 @@ def named(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
 class Derivatives:
     """Derivatives of displacement, strain and stress, carried along the strain path.
 
-    parameters : "beta_i" (entry i of the law's beta), "nu12", "pressure_offset", "thickness" (of a
-    sheet of one thickness), and those of `sheet`. stress_free : (n, 3) mm, places of the nodes
-    without stress; needed with `sheet` only. sheet : slopes of the sheet's own parameters.
+    parameters : "beta_i", "nu12", "pressure_offset", "thickness", and those of `sheet`: slopes of
+    the sheet's own parameters, which need stress_free (n, 3) mm, places of the nodes without
+    stress.
     """
 
     def __init__(
@@ -470,7 +443,6 @@ class Sheet:
         self.rate = np.empty((membrane.reference.size, len(columns)))
 
     def at_fixed_displacement(self, u: Array, pressure: float) -> Array:
-        """Return the derivative of the residual, (3 n, columns)."""
         m, e, law = self.membrane, self.membrane.elements, self.membrane.law
         by_sheet(
             m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure, law.pieces,

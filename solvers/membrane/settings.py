@@ -1,7 +1,5 @@
 """`[solver.membrane]` of a project file."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """The embedded membrane solver: it picks the analysis of a model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,7 +40,6 @@ ANALYSES: dict[type, Analysis] = {
     CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
     PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
 }
-
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
 BLAS = ThreadpoolController()
@@ -51,10 +48,9 @@ BLAS = ThreadpoolController()
 class MembraneSolver:
     """In-process finite element solver with exact sensitivities (needs no other program).
 
-    tolerance : largest residual force over the largest nodal pressure force (a strip: over the
-    largest reaction of a node). wrinkle_stiffness, bending_stiffness : see `Wall`. wall : of a bent
-    cylinder: "tension field" or "stiff". Without it and the shares, `band` names both walls, and
-    `run` takes the tension field.
+    tolerance : largest residual force over the largest nodal pressure force (a strip: reaction).
+    wall, wrinkle_stiffness, bending_stiffness : of a bent cylinder, see `Wall`; without them `band`
+    names both walls, and `run` takes the tension field.
     """
 
     name = "membrane"
@@ -72,16 +68,13 @@ class MembraneSolver:
 
     @property
     def identity(self) -> str:
-        """Return the tolerance and the wall of a closed membrane."""
         wall = self.wall or TENSION_FIELD
         return in_words(self.name, __version__, tolerance=self.tolerance, wall=wall)
 
     def band(self, model: Any) -> Sequence[BandEnd]:
-        """Return both walls of a bent cylinder, where none was given."""
         return BAND if self.wall is None and isinstance(model, CylinderModel) else ()
 
     def check(self) -> SolverCheck:
-        """Return a check that always passes: the law is its own."""
         return SolverCheck(self.name, True, __version__, True)
 
     def run(
@@ -91,7 +84,6 @@ class MembraneSolver:
         """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
         guess : (increments, nodes, 3) displacements to start each increment from, mm.
-        SolverFailure : an increment has no equilibrium that Newton and cut-back can find.
         """
         return self._analyse(model, law, (), guess)[0]
 
@@ -101,9 +93,8 @@ class MembraneSolver:
     ) -> tuple[History, Array]:  # fmt: skip
         """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
 
-        The parameters are every entry of the law's beta unless given. Derivatives are per MPa, by
-        the model's own parameters per unit of theirs. Those of a strip's load are in the history
-        (`load_slope`). InputError : a parameter that law and model do not have.
+        The parameters are every entry of the law's beta (per MPa) unless given; those of the model
+        are per unit of theirs. Derivatives of a strip's load are in the history (`load_slope`).
         """
         known = parameters_of(law, model)
         if parameters is None:
@@ -115,10 +106,7 @@ class MembraneSolver:
 
     @property
     def stress(self) -> Array:
-        """Return the Cauchy stress (quads, points of a quad, 3) MPa at the end of the last run.
-
-        Along warp, fill and in shear. LookupError : nothing was run yet.
-        """
+        """Return Cauchy stress (quads, 4, 3) MPa of warp, fill, shear after the last run."""
         if self._prepared is None:
             raise LookupError("no run yet: there is no stress")
         return self._prepared[1].stress_old.copy()
@@ -132,7 +120,6 @@ class MembraneSolver:
         return analyse(self._membrane(model, law), model, asked)
 
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch:
-        """Return a fresh membrane; geometry and sparsity are computed once a model."""
         if self._prepared is None or self._prepared[0] is not model:
             prepare = analysis_of(ANALYSES, model, self.name).prepare
             self._prepared = (model, prepare(model, law, self.tolerance, self.wall))

@@ -1,7 +1,5 @@
 """A strip pulled in its plane, increment by increment of its gauge."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -31,7 +29,6 @@ from .newton import (
 )
 
 Array = NDArray[np.float64]
-
 MOST_CORRECTIONS = 12
 #: mm of gauge elongation over mm of gauge length.
 GAUGE_TOLERANCE = 1e-10
@@ -40,11 +37,7 @@ LOOK_BACK = 4
 
 
 class DrivenTangent:
-    """The factorisable tangent of the free unknowns, and beside it that of the driven ones.
-
-    Both lie in one array, so that one assembly fills them: first that of `free`, then every element
-    entry with a driven row or column. driven : unknowns that move together; none of them free.
-    """
+    """The tangent of the free unknowns and, in the same array, every entry of the driven ones."""
 
     def __init__(
         self, quads: NDArray[np.intp], size: int, free: NDArray[np.intp], driven: NDArray[np.intp]
@@ -77,10 +70,9 @@ class DrivenTangent:
 
 
 class Pull:
-    """A set of unknowns that moves together by one amount, and the gauge that it opens.
+    """A set of unknowns that moves together by one amount, and the gauge (two nodes) that it opens.
 
-    direction : (3 n,) displacement of every driven unknown for one mm of pull, zero elsewhere.
-    gauge : its two nodes.
+    direction : (3 n,) displacement for one mm of pull, zero at unknowns that are not driven.
     """
 
     def __init__(
@@ -108,11 +100,7 @@ class Pull:
         return w
 
     def equilibrium(self, u: Array, elongation: float) -> Array | None:
-        """Return the equilibrium (n, 3) with this elongation of the gauge, from u; or None.
-
-        Newton on the pull: between two equilibria the whole strip follows its tangent, so that the
-        second one is near.
-        """
+        """Return the equilibrium (n, 3) with this elongation, by Newton on the pull; or None."""
         m = self.membrane
         for _ in range(MOST_CORRECTIONS):
             found = m.equilibrium(u, 0.0)
@@ -133,7 +121,6 @@ class Pull:
 
 
 def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
-    """Build the membrane of a strip, whose wall is not bent; it serves every law."""
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     held = np.concatenate([model.fixed, model.driven])
@@ -147,15 +134,13 @@ def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: W
 
 
 def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[History, Array]:
-    """Return the history, and the derivatives by the parameters in every increment.
+    """Return the history of a fresh membrane, and the derivatives in every increment.
 
-    The membrane is fresh: no strain, no stress. Direct differentiation through the gauge: the strip
-    at a fixed pull moves by a, for one mm of pull by w, and the pull changes so that the gauge does
-    not: du = a - w (g a)/(g w), g the derivative of its length. The load's derivative is that of
-    the residual at the driven unknowns.
-
-    An increment is stable where the sheet between fixed grips is, in its plane: a machine
-    prescribes their distance, not the load.
+    Direct differentiation through the gauge: the strip at a fixed pull moves by a, for one mm of
+    pull by w, and the pull changes so that the gauge does not: du = a - w (g a)/(g w), g the
+    derivative of its length. The load's derivative is that of the residual at the driven unknowns.
+    An increment is stable where the sheet between fixed grips is: a machine prescribes their
+    distance, not the load.
     """
     parameters = asked.parameters
     initial_moduli(membrane.law)
@@ -196,8 +181,6 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
 
 
 class Pulling(Loading):
-    """A strip with a gauge that opens by a length (mm)."""
-
     def __init__(self, pull: Pull) -> None:
         self.pull = pull
 
@@ -232,7 +215,6 @@ class Pulling(Loading):
         return moved.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
-        """Return the strip stretched evenly along y: the start of the first increment."""
         reference = self.pull.membrane.reference
         u = np.zeros_like(reference)
         share = elongation / self.pull.gauge_length
@@ -257,10 +239,6 @@ def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall
 
 
 def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[History, Array]:
-    """Return the history, and the derivatives by the parameters at every load.
-
-    SolverFailure : the law has no strain for a load.
-    """
     found = biaxial_response(patch.law, model.loads, model.thickness, asked.parameters)
     if found.reached < len(model.loads):
         warp, fill = model.loads[found.reached]

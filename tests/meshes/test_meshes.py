@@ -21,45 +21,62 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from .. import needs
-from ..mesh_quality import edges, scaled_jacobian
 
-RADIUS = 100.0
+
+def scaled_jacobian(mesh):
+    """Scaled Jacobian of each quadrilateral (m,), as Verdict and ParaView define it."""
+    corner = mesh.points[mesh.quads]
+    onward, back = (np.roll(corner, by, axis=1) - corner for by in (-1, 1))
+    # The normal at the centre is half the cross product of the diagonals.
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    normal = over(normal, np.linalg.norm(normal, axis=1)[:, None])
+    area = np.einsum("mcx,mx->mc", np.cross(onward, back), normal)
+    return over(area, np.linalg.norm(onward, axis=2) * np.linalg.norm(back, axis=2)).min(axis=1)
+
+
+def edges(mesh):
+    ends = np.stack([mesh.quads, np.roll(mesh.quads, -1, axis=1)], axis=-1).reshape(-1, 2)
+    return np.unique(np.sort(ends, axis=1), axis=0, return_counts=True)
+
+
+def least_scaled_jacobian(mesh):
+    quality = scaled_jacobian(mesh)
+    sets = {name: quality[numbers] for name, numbers in mesh.element_sets.items() if len(numbers)}
+    return {name: values.min() for name, values in ({"all": quality} | sets).items()}
+
+
+def over(value, by):
+    return np.divide(value, by, out=np.zeros_like(value), where=by > 0)
+
+
+RADIUS, TURNED = 100.0, Outline(120.0, 80.0, 30.0)
 BEST = np.sin(np.deg2rad(120))  # three quads meet in a node of each quarter
 
 
-def areas(mesh: Mesh) -> np.ndarray:
-    """Signed area of each quad of a flat mesh: positive is counter-clockwise."""
+def areas(mesh):
     p = mesh.points[mesh.quads]
     return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2]
 
 
-def check_sound(mesh: Mesh, symmetry: str, radius: float = RADIUS) -> None:
-    """Everything that any disk mesh must satisfy."""
+def check_sound(mesh, symmetry, radius=RADIUS):
+    p, sets = mesh.points, mesh.node_sets
     assert (areas(mesh) > 0).all()
-    assert (mesh.points[:, 2] == 0).all()
-    assert set(mesh.quads.ravel()) == set(range(len(mesh.points)))
-    assert len(np.unique(np.round(mesh.points / radius, 9), axis=0)) == len(mesh.points)
-
+    assert (p[:, 2] == 0).all()
+    assert set(mesh.quads.ravel()) == set(range(len(p)))
+    assert len(np.unique(np.round(p / radius, 9), axis=0)) == len(p)
     ends, owners = edges(mesh)
     assert set(owners) <= {1, 2}
-    # Euler: one piece without holes.
-    assert len(mesh.points) - len(ends) + len(mesh.quads) == 1
-    on_edge = np.unique(ends[owners == 1])
-    at_rim = np.isclose(np.hypot(*mesh.points[:, :2].T), radius, rtol=1e-12)
-    sets = mesh.node_sets
+    assert len(p) - len(ends) + len(mesh.quads) == 1
+    at_rim = np.isclose(np.hypot(*p[:, :2].T), radius, rtol=1e-12)
     np.testing.assert_array_equal(sets["rim"], np.flatnonzero(at_rim))
-    assert sets["apex"].shape == (1,)
-    assert (mesh.points[sets["apex"]] == 0).all()
-    if symmetry == "full":
-        assert set(sets) == {"rim", "apex"}
-        np.testing.assert_array_equal(on_edge, sets["rim"])
-    else:
-        assert set(sets) == {"rim", "apex", "symmetry_x", "symmetry_y"}
-        assert (mesh.points >= 0).all()
-        for axis, name in enumerate(("symmetry_x", "symmetry_y")):
-            np.testing.assert_array_equal(sets[name], np.flatnonzero(mesh.points[:, axis] == 0))
-        named = np.concatenate([sets["rim"], sets["symmetry_x"], sets["symmetry_y"]])
-        np.testing.assert_array_equal(on_edge, np.unique(named))
+    assert sets["apex"].shape == (1,) and (p[sets["apex"]] == 0).all()
+    lines = [] if symmetry == "full" else ["symmetry_x", "symmetry_y"]
+    assert set(sets) == {"rim", "apex", *lines}
+    assert symmetry == "full" or (p >= 0).all()
+    for axis, name in enumerate(lines):
+        np.testing.assert_array_equal(sets[name], np.flatnonzero(p[:, axis] == 0))
+    named = np.concatenate([sets["rim"], *(sets[name] for name in lines)])
+    np.testing.assert_array_equal(np.unique(ends[owners == 1]), np.unique(named))
 
 
 @settings(deadline=None, max_examples=60)
@@ -86,7 +103,6 @@ def test_area_converges_to_that_of_the_circle_with_second_order():
     assert gaps[1] < 1.1e-3
     order = 2 * np.diff(np.log(gaps)) / -np.diff(np.log(counts))
     np.testing.assert_allclose(order, 2.0, atol=0.05)
-    # The polygon through the rim nodes, exactly.
     mesh = disk_mesh(RADIUS, 800)
     n = len(mesh.node_sets["rim"])
     assert areas(mesh).sum() == pytest.approx(n / 2 * np.sin(2 * np.pi / n) * RADIUS**2, rel=1e-12)
@@ -99,19 +115,23 @@ def test_the_full_disk_is_the_quarter_mirrored():
     assert {tuple(p) for p in full.points} == mirrored
 
 
-NONSENSE = {
-    "elements": [7, 0, -800, 800.0, True, None, 10**12],
-    "radius": [0.0, -1.0, float("nan"), float("inf"), "100"],
-    "symmetry": ["half"], "generator": ["abaqus"],
-}  # fmt: skip
+NONSENSE = [
+    *((disk_mesh, {key: value}, key) for key, some in {
+        "elements": [7, 0, -800, 800.0, True, None, 10**12], "symmetry": ["half"],
+        "radius": [0.0, -1.0, np.nan, np.inf, "100"], "generator": ["abaqus"],
+    }.items() for value in some),
+    (elliptic_disk_mesh, {"outline": TURNED, "symmetry": "quarter"}, "symmetry"),
+    *((elliptic_disk_mesh, {"outline": Outline(*axes)}, "minor")
+      for axes in ((80.0, 120.0), (120.0, -80.0), (120.0, 29.0))),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("field", "value"), [(k, v) for k, some in NONSENSE.items() for v in some])
-def test_nonsense_is_refused_by_name(field, value):
+@pytest.mark.parametrize(("mesh", "values", "field"), NONSENSE)
+def test_nonsense_is_refused_by_name(mesh, values, field):
+    good = {"radius": RADIUS} if mesh is disk_mesh else {}
     with pytest.raises(InputError) as caught:
-        disk_mesh(**{"radius": RADIUS, "elements": 800, "symmetry": "full", field: value})
+        mesh(**good | {"elements": 800} | values)
     assert caught.value.field == field
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -120,19 +140,16 @@ def test_nonsense_is_refused_by_name(field, value):
         ([(0, 0), (2, 0), (2, 1), (0, 1)], 1.0),
         ([(0, 0), (1, 0), (1.5, np.sqrt(3) / 2), (0.5, np.sqrt(3) / 2)], np.sqrt(3) / 2),
         ([(0, 0), (1, 0), (1, 0), (0, 1)], 0.0),  # a collapsed edge
-        ([(0, 0), (0, 0), (0, 0), (0, 0)], 0.0),  # a collapsed element
         ([(0, 0), (4, 0), (1, 1), (0, 4)], -0.8),  # a corner that turns in
     ],
 )
 def test_scaled_jacobian_of_known_shapes(corners, wanted):
-    points = np.array([(x, y, 0) for x, y in corners], float)
     turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
-    for placed in (points, 7 * points @ turn.T + 3):
-        mesh = Mesh(placed, np.array([[0, 1, 2, 3]]), {})
-        assert scaled_jacobian(mesh) == pytest.approx([wanted], abs=1e-12)
+    placed = 7 * np.array([(x, y, 0) for x, y in corners], float) @ turn.T + 3
+    mesh = Mesh(placed, np.array([[0, 1, 2, 3]]), {})
+    assert scaled_jacobian(mesh) == pytest.approx([wanted], abs=1e-12)
 
 
-# gmsh
 def test_gmsh_makes_a_sound_mesh_too():
     gmsh = needs.library("gmsh")
     for symmetry in ("full", "quarter"):
@@ -145,10 +162,7 @@ def test_gmsh_makes_a_sound_mesh_too():
 
 @pytest.mark.parametrize(
     "failure",
-    [
-        ImportError("No module named 'gmsh'"),
-        OSError("libGLU.so.1: cannot open shared object file: No such file or directory"),
-    ],
+    [ImportError("No module named 'gmsh'"), OSError("libGLU.so.1: cannot open shared object file")],
 )
 def test_without_gmsh_the_message_says_what_to_do(monkeypatch, failure):
     plain = builtins.__import__
@@ -179,15 +193,16 @@ def test_slow_packages_are_loaded_only_when_used():
     assert done.stdout.strip() == "[]", done.stderr
 
 
-TURNED = Outline(120.0, 80.0, 30.0)
-
-
 @pytest.mark.parametrize("symmetry", ["full", "quarter"])
 def test_equal_semi_axes_give_the_disk(symmetry):
     own = elliptic_disk_mesh(Outline(90.0, 90.0, 20.0), 192, symmetry)
     disk = disk_mesh(90.0, 192, symmetry)
     np.testing.assert_array_equal(own.points, disk.points)
     np.testing.assert_array_equal(own.quads, disk.quads)
+    slender = elliptic_disk_mesh(Outline(120.0, 80.0, 90.0), 192, symmetry)
+    np.testing.assert_allclose(slender.points.max(axis=0), (80.0, 120.0, 0.0))
+    for axis, name in enumerate(("symmetry_x", "symmetry_y") if symmetry == "quarter" else ()):
+        assert (slender.points[slender.node_sets[name], axis] == 0).all()
 
 
 def test_the_rim_is_the_ellipse_and_the_area_its_own_to_second_order():
@@ -201,28 +216,5 @@ def test_the_rim_is_the_ellipse_and_the_area_its_own_to_second_order():
     assert (mesh.points[mesh.node_sets["apex"]] == 0).all()
     share = TURNED.share(mesh.points[:, :2])
     np.testing.assert_array_equal(mesh.node_sets["rim"], np.flatnonzero(share > 1 - 1e-9))
-    # What the solvers take the rim for, from its nodes alone.
     form = rim_form(mesh.points[mesh.node_sets["rim"], :2])
     np.testing.assert_allclose(rim_share(form, mesh.points[:, :2]), share, atol=1e-12)
-
-
-def test_a_quarter_has_its_lines_of_symmetry():
-    quarter = elliptic_disk_mesh(Outline(120.0, 80.0, 90.0), 192, "quarter")
-    assert (quarter.points[quarter.node_sets["symmetry_x"], 0] == 0).all()
-    assert (quarter.points[quarter.node_sets["symmetry_y"], 1] == 0).all()
-    np.testing.assert_allclose(quarter.points.max(axis=0), (80.0, 120.0, 0.0))
-
-
-@pytest.mark.parametrize(
-    ("outline", "symmetry", "field"),
-    [
-        (Outline(120.0, 80.0, 30.0), "quarter", "symmetry"),
-        (Outline(80.0, 120.0), "full", "minor"),
-        (Outline(120.0, -80.0), "full", "minor"),
-        (Outline(120.0, 29.0), "full", "minor"),
-    ],
-)
-def test_what_cannot_be_meshed_is_named(outline, symmetry, field):
-    with pytest.raises(InputError) as error:
-        elliptic_disk_mesh(outline, 192, symmetry)
-    assert error.value.field == field

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.inference.unknowns import ProposedStarts, SobolStarts
-from bubblefit.materials.forms.trilinear import TriLinear
+from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, project_text, read_project, settings_of
 from bubblefit.reports.fit_page import record_tables

@@ -11,7 +11,7 @@ from bubblefit.experiments.biaxial.prepared import PreparedBiaxial, candidates
 from bubblefit.experiments.kinds import UNMATCHED, Expected, Planning, Precision, Weighting
 from bubblefit.materials.card import read_card
 from bubblefit.materials.designers import shares
-from bubblefit.materials.forms.ratio import LoadRatio
+from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations

@@ -27,7 +27,7 @@ from bubblefit.inference.comparison import Blocks
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
-from bubblefit.meshes.reading import Facet, FacetReading, SmoothReading
+from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.best import limit_of_meshes

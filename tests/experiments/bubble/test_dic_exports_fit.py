@@ -14,7 +14,7 @@ from bubblefit.experiments.bubble.report import ASKED, correlation_table, regist
 from bubblefit.experiments.bubble.section import CorrelationSection
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import moduli_error
-from bubblefit.meshes.reading import Facet
+from bubblefit.meshes.mesh import Facet
 from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation

@@ -13,7 +13,7 @@ from bubblefit.inference.problem import FitProblem
 from bubblefit.inference.unknowns import LawBounds, Unknowns
 from bubblefit.materials.forms import polynomial
 from bubblefit.materials.forms.base import COMPONENTS
-from bubblefit.materials.forms.trilinear import TriLinear
+from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh

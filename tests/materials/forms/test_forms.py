@@ -1,6 +1,6 @@
 """Forms of the moduli: pieces, increments, registry."""
 
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -20,8 +20,14 @@ from bubblefit.materials.forms.base import (
     ratio_map,
     ratios_of,
 )
-from bubblefit.materials.forms.polynomial import CUBIC, DEGREES, LINEAR
-from bubblefit.materials.forms.ratio import LoadRatio
+from bubblefit.materials.forms.polynomial import (
+    CONSTANT,
+    CUBIC,
+    DEGREES,
+    LINEAR,
+    QUADRATIC,
+    LoadRatio,
+)
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus
@@ -31,9 +37,58 @@ from scipy.interpolate import CubicSpline
 
 from ...complaints import complaint
 from ...plug_ins import install
-from ..paths import follow
-from .pieces_of_laws import BETA, KNOTS, RANGE, integral, turning_points
-from .pieces_of_laws import LAWS as OF_STRAIN
+from ...published_laws import TABLE_4_2
+
+BETA = 1e3 * np.array(TABLE_4_2)
+RANGE = [0.11, 0.12, 0.13]
+KNOTS = [[0.0, 0.01, 0.04, 0.06, 0.11], [0.0, 0.06, 0.12], [0.0, 0.02, 0.05, 0.13, 0.2]]
+
+
+def _degree(degree):
+    beta = BETA.reshape(3, 4).copy()
+    beta[:, : 3 - degree] = 0.0
+    return beta.ravel()
+
+
+OF_STRAIN = {
+    "constant": HypoelasticLaw(_degree(0), 0.24, RANGE, form=CONSTANT),
+    "linear": HypoelasticLaw(np.abs(_degree(1)), 0.24, RANGE, form=LINEAR),
+    "quadratic": HypoelasticLaw(np.abs(_degree(2)), 0.24, RANGE, form=QUADRATIC),
+    "cubic": HypoelasticLaw(BETA, 0.24, RANGE, form=CUBIC),
+    "trilinear": HypoelasticLaw.trilinear(
+        (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
+        [[0.01, 0.03], [0.02, 0.2], [0.01, 0.04]], 0.24, RANGE,
+    ),
+    "spline": HypoelasticLaw(
+        np.array([20.0, 9.0, 8.0, 16.0, 30.0, 140.0, 120.0, 260.0, 800, 640, 350, 330, 500.0]),
+        0.24, RANGE, form=Spline.at(KNOTS),
+    ),
+}  # fmt: skip
+
+
+def turning_points(law: HypoelasticLaw, name: str) -> np.ndarray:
+    ends = law.pieces[COMPONENTS[name], :, 0]
+    return np.unique(np.concatenate([-ends, [0.0], ends]))
+
+
+def integral(law: HypoelasticLaw, name: str, start: float, end: float) -> float:
+    """Of the modulus, as a reader of the card takes it: Gauss between the turning points."""
+    if end < start:
+        return -integral(law, name, end, start)
+    at, weight = np.polynomial.legendre.leggauss(4)
+    inside = [x for x in turning_points(law, name) if start < x < end]
+    points = np.array([start, *inside, end])
+    width, middle = np.diff(points), 0.5 * (points[1:] + points[:-1])
+    x = middle[:, None] + 0.5 * width[:, None] * at
+    return float((0.5 * width[:, None] * weight * law.modulus(name, x)).sum())
+
+
+def follow(law, path):
+    stress = np.zeros((1, 3))
+    for old, new in pairwise(path):
+        stress, _ = law.increment(old, new, stress)
+    return stress[0]
+
 
 LAWS = {
     **OF_STRAIN,
@@ -54,7 +109,6 @@ def test_what_every_form_says_fits_together(name):
     rows, uppers = form.piece_map(), form.uppers()
     assert rows.shape == (*uppers.shape, 4, form.size) and (uppers[:, -1] == UNLIMITED).all()
     assert (np.diff(uppers) >= 0).all()
-    # An entry belongs to one modulus, that of its name.
     for entry, modulus in zip(form.free, form.modulus_of, strict=True):
         component = COMPONENTS[modulus]
         by_ratio = np.vstack([ratio_map(form), np.zeros(form.size)])[:, entry]
@@ -113,7 +167,6 @@ def test_the_grid_sees_every_piece(name):
         strain = form.grid(COMPONENTS[modulus], RANGE[COMPONENTS[modulus]])
         moduli = [LAWS[name].modulus(modulus, strain, r) for r in ratios_of(form, modulus)]
         assert part @ LAWS[name].beta == pytest.approx(np.concatenate(moduli))
-    # Linear in the ratio: the ends are enough.
     asked = [1, 3, 3] if name == "load-ratio" else [1, 1, 1]
     assert [len(ratios_of(form, modulus)) for modulus in ORDER] == asked
 
@@ -127,16 +180,13 @@ def test_control_values_of_a_polynomial_are_moduli(name):
     assert law.form.from_values(RANGE) @ np.ravel(values) == pytest.approx(law.beta[free])
 
 
-# Splines
 def test_a_spline_is_the_not_a_knot_spline_through_its_values():
-    law = LAWS["spline"]
-    start = 0
+    law, start = LAWS["spline"], 0
     for modulus in ORDER:
-        knots = KNOTS[COMPONENTS[modulus]]
+        knots, end = KNOTS[COMPONENTS[modulus]], RANGE[COMPONENTS[modulus]]
         values = law.beta[start : start + len(knots)]
         start += len(knots)
-        end = min(RANGE[COMPONENTS[modulus]], knots[-1])
-        strain = np.linspace(0, end, 300)
+        strain = np.linspace(0, min(end, knots[-1]), 300)
         expected = CubicSpline(knots, values)(strain)
         assert law.modulus(modulus, strain) == pytest.approx(expected, rel=1e-11)
         inside = [knot for knot in knots if knot <= end]
@@ -167,16 +217,13 @@ def test_two_knots_are_a_line_and_beyond_the_last_the_modulus_is_held():
 
 
 def test_a_spline_that_is_positive_on_its_grid_hardly_dips_between():
-    random = np.random.default_rng(5)
     form = form_named("spline", {"knots": 6}, RANGE)
     coarse = moduli_on_grid(form, RANGE)["E1"][:, -6:]
     fine = modulus_rows(form, "E1", np.linspace(0, RANGE[0], 2000), RANGE)[:, -6:]
-    dips = []
-    for values in random.uniform(-1, 3, (4000, 6)):
-        on_grid = coarse @ values
-        if on_grid.min() > 0:
-            dips.append(-(fine @ values).min() / np.abs(fine @ values).max())
-    assert len(dips) > 200 and max(dips) < 1.5 * (2 / PARTS) ** 2
+    values = np.random.default_rng(5).uniform(-1, 3, (4000, 6))
+    whole = values[((coarse @ values.T) > 0).all(axis=0)] @ fine.T
+    assert len(whole) > 200
+    assert (-whole.min(axis=1) / np.abs(whole).max(axis=1)).max() < 1.5 * (2 / PARTS) ** 2
 
 
 BAD = [
@@ -199,7 +246,7 @@ BAD = [
 def test_bad_forms_are_named(name, given_settings, field):
     with pytest.raises(InputError) as caught:
         form_named(name, given_settings, RANGE)
-    assert caught.value.field == field and "\n" not in str(caught.value)
+    assert caught.value.field == field
 
 
 def test_a_number_of_knots_needs_a_range():
@@ -208,23 +255,12 @@ def test_a_number_of_knots_needs_a_range():
     assert form_named("spline", mixed, RANGE).size == 9
     same = form_named("spline", {"knots": [0.0, 0.05, 0.1]}, NO_RANGE)
     assert same.knots == ((0.0, 0.05, 0.1),) * 3
-
-
-def test_names_and_what_they_take():
-    assert {*DEGREES, "trilinear", "spline"} <= set(form_names())
-    assert "did you mean 'quadratic'" in complaint(form_named, "quadratics", {}, RANGE)
-    assert form_named("cubic", {}, RANGE) == CUBIC != LINEAR
-
-
-def test_an_entry_that_a_form_does_not_have_is_named():
-    with pytest.raises(InputError, match=r"linear law has no beta_0, beta_1: expected 0") as caught:
-        HypoelasticLaw(np.array([1.0, 2.0, *BETA[2:4]] + [0.0, 0.0, 1.0, 1.0] * 2), form=LINEAR)
-    assert caught.value.field == "beta"
-    assert "expected 13 finite" in complaint(HypoelasticLaw, BETA, form=LAWS["spline"].form)
+    surplus = np.array([1.0, 2.0, *BETA[2:4]] + [0.0, 0.0, 1.0, 1.0] * 2)
+    assert "beta_0, beta_1" in complaint(HypoelasticLaw, surplus, form=LINEAR)
+    assert "expected 13" in complaint(HypoelasticLaw, BETA, form=LAWS["spline"].form)
 
 
 EVERY_FORM = pytest.mark.parametrize("form", OF_STRAIN)
-STEPS = pytest.mark.parametrize("steps", [1, 2, 7, 50])
 names = st.sampled_from(sorted(COMPONENTS))
 forms = st.sampled_from(sorted(OF_STRAIN))
 strains = st.floats(-0.2, 0.2)
@@ -258,13 +294,6 @@ def test_the_mean_is_the_integral_over_the_increment(form, name, x, x_old):
     assert mean - (x - x_old) * behind == pytest.approx(start, rel=1e-9)
 
 
-@settings(deadline=None)
-@given(forms, names, strains, strains, strains)
-def test_two_increments_make_the_stress_of_one(form, name, a, b, c):
-    rise = [mean_of(form, name, y, x)[0] * (y - x) for x, y in ((a, b), (b, c), (a, c))]
-    assert rise[0] + rise[1] == pytest.approx(rise[2], rel=1e-12, abs=1e-12)
-
-
 @settings(max_examples=400, deadline=None)
 @given(forms, names, strains, strains)
 def test_derivatives_against_finite_differences(form, name, x, x_old):
@@ -272,27 +301,23 @@ def test_derivatives_against_finite_differences(form, name, x, x_old):
     near = turning_points(law, name)
     assume(np.abs(np.subtract.outer([x, x_old], near)).min() > 2 * step)
     assume(abs(x - x_old) > 1e-3)
-    _, ahead, behind = mean_of(form, name, x, x_old)
+    _, *slopes = mean_of(form, name, x, x_old)
     size = 1e-5 * float(law.pieces[COMPONENTS[name], 0, 4]) / abs(x - x_old)
-    by_new = [mean_of(form, name, x + s, x_old)[0] for s in (step, -step)]
-    assert ahead == pytest.approx((by_new[0] - by_new[1]) / (2 * step), rel=1e-4, abs=size)
-    by_old = [mean_of(form, name, x, x_old + s)[0] for s in (step, -step)]
-    assert behind == pytest.approx((by_old[0] - by_old[1]) / (2 * step), rel=1e-4, abs=size)
+    for slope, (by_new, by_old) in zip(slopes, ((step, 0.0), (0.0, step)), strict=True):
+        ends = [mean_of(form, name, x + s * by_new, x_old + s * by_old)[0] for s in (1, -1)]
+        assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-4, abs=size)
 
 
 @settings(deadline=None)
 @given(forms, names, strains, st.sampled_from([0.0, 1e-18, -1e-15, 1e-13, 1e-10, -1e-8, 1e-7]))
 def test_small_increments_lose_no_digits(form, name, x, change):
-    """Inside a piece, mean and half slopes are those of the point, however small the change."""
-    law, component = OF_STRAIN[form], COMPONENTS[name]
-    near = turning_points(law, name)
-    assume(np.abs(x - near).min() > 1e-6)
-    mean, ahead, behind = mean_of(form, name, x + change, x)
+    law, component, step = OF_STRAIN[form], COMPONENTS[name], 1e-7
+    assume(np.abs(x - turning_points(law, name)).min() > 1e-6)
+    mean, *slopes = mean_of(form, name, x + change, x)
     assert mean == pytest.approx(point_modulus(law.pieces, component, x + change / 2), rel=1e-12)
-    step = 1e-7
     half = (law.modulus(name, x + step) - law.modulus(name, x - step)) / (4 * step)
-    scale = 1e-6 * float(law.pieces[component, :, 4].max()) / step * 1e-3
-    assert [ahead, behind] == pytest.approx([half, half], rel=1e-4, abs=scale)
+    scale = 1e-9 * float(law.pieces[component, :, 4].max()) / step
+    assert slopes == pytest.approx([half, half], rel=1e-4, abs=scale)
 
 
 @settings(max_examples=400, deadline=None)
@@ -322,41 +347,24 @@ def test_stress_is_continuous_where_a_piece_ends(form, name):
             ends = (at - 1e-12, at, at + 1e-12)
             rises = [mean_of(form, name, x, old)[0] * (x - old) for x in ends]
             assert np.ptp(rises) < 3e-12 * law.modulus(name, np.linspace(0, 0.2, 99)).max()
-
-
-@pytest.mark.parametrize("bad", [(np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan), (np.nan, 0.5)])
-@EVERY_FORM
-def test_what_is_no_number_gives_none(form, bad):
-    for name in COMPONENTS:
+    for bad in ((np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan), (np.nan, 0.5)):
         assert np.isnan(mean_of(form, name, *bad)[0])
 
 
 @EVERY_FORM
-@STEPS
+@pytest.mark.parametrize("steps", [1, 2, 7, 50])
 @pytest.mark.parametrize("end", [0.005, 0.06, 0.11, 0.16])
 def test_bars_are_exact_in_any_number_of_increments(form, steps, end):
-    """Along the warp and along the fill; E of the yarn across is held, because it gets shorter."""
-    law = OF_STRAIN[form]
-    along = np.linspace(0.0, end, steps + 1)
-    path = np.column_stack([along, -law.nu12 * along, 0 * along])
-    warp = integral(law, "E1", 0.0, end)
-    assert follow(law, path) == pytest.approx([warp, 0, 0], rel=1e-10, abs=1e-10)
+    """Along warp, fill and in shear; E of the yarn across is held, because it gets shorter."""
+    law, along = OF_STRAIN[form], np.linspace(0.0, end, steps + 1)
+    warp, fill, shear = (integral(law, name, 0.0, end) for name in COMPONENTS)
     across = [-law.nu12 * integral(law, "E2", 0.0, x) / law.E1(0.0) for x in along]
-    path = np.column_stack([across, along, 0 * along])
-    fill = integral(law, "E2", 0.0, end)
-    assert follow(law, path) == pytest.approx([0, fill, 0], rel=1e-10, abs=1e-10)
-
-
-@EVERY_FORM
-@settings(max_examples=50, deadline=None)
-@given(names, st.lists(strains, min_size=1, max_size=6))
-def test_any_path_of_one_strain_ends_on_the_curve(form, name, path):
-    law, component = replace(OF_STRAIN[form], nu12=0.0), COMPONENTS[name]
-    whole = np.zeros((len(path) + 1, 3))
-    whole[1:, component] = path
-    expected = np.zeros(3)
-    expected[component] = integral(law, name, 0.0, path[-1])
-    assert follow(law, whole) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    for path, stress in (
+        ([along, -law.nu12 * along, 0 * along], [warp, 0, 0]),
+        ([across, along, 0 * along], [0, fill, 0]),
+        ([0 * along, 0 * along, -along], [0, 0, -shear]),
+    ):
+        assert follow(law, np.transpose(path)) == pytest.approx(stress, rel=1e-13, abs=1e-10)
 
 
 @EVERY_FORM
@@ -364,12 +372,11 @@ def test_the_tangent_of_the_law_is_that_of_its_stress(form):
     law, step = OF_STRAIN[form], 1e-7
     random = np.random.default_rng(3)
     old, new = random.uniform(-0.15, 0.15, (2, 300, 3))
-    stress = random.standard_normal((300, 3))
     near = [np.abs(np.subtract.outer(new[:, c], turning_points(law, n))).min(axis=1)
             for n, c in COMPONENTS.items()]  # fmt: skip
     keep = (np.array(near) > 1e-5).all(axis=0)
     assert keep.sum() > 200
-    old, new, stress = old[keep], new[keep], stress[keep]
+    old, new, stress = old[keep], new[keep], random.standard_normal((300, 3))[keep]
     _, tangent = law.increment(old, new, stress)
     for j in range(3):
         shift = step * np.eye(3)[j]
@@ -396,9 +403,8 @@ def test_ours_are_there_and_say_their_settings():
     assert form_names()[: len(ours)] == ours
     assert form_settings("cubic") == () and form_settings("spline") == ("knots",)
     assert form_settings("nothere") == ()
-    assert isinstance(form_named("cubic", {}, ENDS), Form)
-    message = complaint(form_named, "cubik", {}, ENDS)
-    assert message.startswith("form: no form is called 'cubik'; did you mean 'cubic'? known: con")
+    assert form_named("cubic", {}, ENDS) == CUBIC != LINEAR
+    assert "did you mean 'cubic'" in complaint(form_named, "cubik", {}, ENDS)
     assert "a cubic law has no knots" in complaint(form_named, "cubic", {"knots": 3}, ENDS)
 
 
@@ -407,7 +413,6 @@ def test_a_plug_ins_form_is_one_of_them(packages):
     assert "acme" in form_names() and form_settings("acme") == ("knee",)
     assert form_named("acme", {"knee": 0.1}, ENDS).size == 12
     assert "a acme law has no knots" in complaint(form_named, "acme", {"knots": 1}, ENDS)
-    # One of ours is not replaced.
     install(packages, "cubic", "raise RuntimeError", distribution="acme-others")
     assert form_named("cubic", {}, ENDS).name == "cubic" and form_names().count("cubic") == 1
 
@@ -415,11 +420,11 @@ def test_a_plug_ins_form_is_one_of_them(packages):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("raise RuntimeError('no licence')", "cannot be imported (RuntimeError: no licence)"),
-        ("THING = 3", "is no form: acme_acme:THING has no name, make, settings"),
-        (WORKING.format(body="pass").replace('"acme"', '"else"'), "calls its form 'else'; both"),
-        (WORKING.format(body="return settings['k']"), "fails when it is made (KeyError: 'k')"),
-        (WORKING.format(body="return 3"), "gives no form: int has no describe, free, from_values"),
+        ("raise RuntimeError('no licence')", "no licence"),
+        ("THING = 3", "acme_acme:THING has no name, make, settings"),
+        (WORKING.format(body="pass").replace('"acme"', '"else"'), "'else'"),
+        (WORKING.format(body="return settings['k']"), "KeyError: 'k'"),
+        (WORKING.format(body="return 3"), "int has no describe, free, from_values"),
     ],
 )
 def test_a_broken_form_is_one_line_and_breaks_no_other(packages, text, words):
@@ -427,6 +432,6 @@ def test_a_broken_form_is_one_line_and_breaks_no_other(packages, text, words):
     with pytest.raises(PlugInFailure) as failure:
         form_named("acme", {}, ENDS)
     message = str(failure.value)
-    assert message.startswith(f"the plug-in 'acme' of acme-things 2.5 {words}")
-    assert message.endswith("; repair or uninstall it") and "\n" not in message
+    assert message.startswith("the plug-in 'acme' of acme-things 2.5") and words in message
+    assert "\n" not in message
     assert form_named("cubic", {}, ENDS).name == "cubic"

@@ -1,17 +1,14 @@
 """Moduli that go with the load ratio: closed forms, derivatives, increments, pressed yarns."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
-from bubblefit.materials.card import MaterialCard, positive, read_card
+from bubblefit.materials.card import MaterialCard, positive
 from bubblefit.materials.exports.base import check_positive
 from bubblefit.materials.forms.base import EVEN
-from bubblefit.materials.forms.ratio import LABELS, LoadRatio
+from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.point_law import RIGHT, load_angle
 from bubblefit.materials.responses import biaxial_response, piece_constants
@@ -22,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ...complaints import complaint
+from .test_forms import follow
 
 NU = 0.24
 #: MPa: G12, E2 at 1:1 and its gain, E1 at 1:1 and its gain.
@@ -29,21 +27,17 @@ BETA = (30.0, 800.0, 400.0, 1000.0, -300.0)
 RATIOS = ((1, 0), (0, 1), (1, 1), (2, 1), (1, 2), (5, 1))
 
 
-def law_of(beta: Sequence[float] = BETA, nu: float = NU) -> HypoelasticLaw:
+def law_of(beta=BETA, nu=NU):
     return HypoelasticLaw(np.array(beta, dtype=float), nu, form=LoadRatio())
 
 
-def moduli(beta: Sequence[float], share: Sequence[float]) -> tuple[float, float]:
-    """E1 and E2 at loads in these shares, from the published formula."""
+def moduli(beta, share):
     _, fill, fill_gain, warp, warp_gain = beta
-    gamma = np.array(share) / np.hypot(*share)
-    return (
-        warp + warp_gain * (gamma[0] - 1 / np.sqrt(2)),
-        fill + fill_gain * (gamma[1] - 1 / np.sqrt(2)),
-    )
+    gamma = np.array(share) / np.hypot(*share) - 1 / np.sqrt(2)
+    return warp + warp_gain * gamma[0], fill + fill_gain * gamma[1]
 
 
-def compliance(beta: Sequence[float], share: Sequence[float]) -> np.ndarray:
+def compliance(beta, share):
     e1, e2 = moduli(beta, share)
     return np.array([[1 / e1, -NU / e1], [-NU / e1, 1 / e2]])
 
@@ -58,36 +52,11 @@ def test_a_proportional_path_has_the_moduli_of_its_ratio(fill_gain, warp_gain, a
     """Strain is the compliance of the ratio times the stress, in any number of increments."""
     beta = (30.0, 500.0, fill_gain, 700.0, warp_gain)
     share = np.array([np.cos(angle), np.sin(angle)])
-    strain = 20.0 * compliance(beta, share) @ share
-    law, old, stress = law_of(beta), np.zeros((1, 3)), np.zeros((1, 3))
-    for k in range(1, increments + 1):
-        new = np.array([[*(k / increments * strain), 0.0]])
-        stress, _ = law.increment(old, new, stress)
-        old = new
-    np.testing.assert_allclose(stress[0, :2], 20.0 * share, atol=1e-11)
+    strain = [*(20.0 * compliance(beta, share) @ share), 0.0]
+    stress = follow(law_of(beta), np.outer(np.linspace(0.0, 1.0, increments + 1), strain))
+    np.testing.assert_allclose(stress[:2], 20.0 * share, atol=1e-11)
 
 
-@pytest.mark.parametrize("share", RATIOS)
-def test_a_patch_at_small_loads_has_them_too(share):
-    """Forces are over the width before the test: at loads that hardly strain it, the same."""
-    load = 1e-5 * np.array([share], dtype=float)
-    wanted = compliance(BETA, share) @ load[0] / 0.8
-    found = biaxial_response(law_of(), load, 0.8)
-    np.testing.assert_allclose(found.strain[0], wanted, rtol=1e-6, atol=1e-6 * wanted.max())
-
-
-def test_without_gains_it_is_the_constant_law():
-    flat = law_of((30.0, 800.0, 0.0, 1000.0, 0.0))
-    known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU)
-    rng = np.random.default_rng(1)
-    old, new = rng.normal(0.0, 0.03, (2, 50, 3))
-    stress = rng.normal(0.0, 20.0, (50, 3))
-    ours, theirs = (law.increment(old, new, stress) for law in (flat, known))
-    for a, b in zip(ours, theirs, strict=True):
-        np.testing.assert_array_equal(a, b)
-
-
-# Which ratio it is
 def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed():
     for a, b in ((3.0, 1.0), (1.0, 2.0)):
         assert load_angle(a, b)[0] == pytest.approx(np.arctan2(b, a), rel=1e-15)
@@ -103,31 +72,29 @@ def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed():
 
 @pytest.mark.parametrize("stress", [(3.0, 1.0), (-1.0, -3.0), (2.0, -1.0)])
 def test_derivatives_of_the_ratio(stress):
-    step, a, b = 1e-6, *stress
-    by = [
-        (load_angle(a + step, b)[0] - load_angle(a - step, b)[0]) / (2 * step),
-        (load_angle(a, b + step)[0] - load_angle(a, b - step)[0]) / (2 * step),
-    ]
-    assert load_angle(a, b)[1:] == pytest.approx(by, abs=1e-9)
-    # Without stress it begins at equal loads.
-    none = np.zeros(3)
+    ends = [[load_angle(*(stress + s * by))[0] for s in (1, -1)] for by in 1e-6 * np.eye(2)]
+    by = [(ahead - behind) / 2e-6 for ahead, behind in ends]
+    assert load_angle(*stress)[1:] == pytest.approx(by, abs=1e-9)
+    # Without stress it begins at equal loads; without gains it is the constant law.
+    none, known = np.zeros(3), HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU)
     _, tangent = law_of().increment(none, none, none)
-    known = HypoelasticLaw.linear(1000.0, 800.0, 30.0, NU).increment(none, none, none)[1]
-    np.testing.assert_allclose(tangent, known, rtol=1e-14)
+    np.testing.assert_allclose(tangent, known.increment(none, none, none)[1], rtol=1e-14)
+    rng = np.random.default_rng(1)
+    path = (*rng.normal(0.0, 0.03, (2, 50, 3)), rng.normal(0.0, 20.0, (50, 3)))
+    flat = law_of((30.0, 800.0, 0.0, 1000.0, 0.0))
+    for a, b in zip(flat.increment(*path), known.increment(*path), strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 def test_a_yarn_that_is_pressed_beside_a_pulled_one_counts_as_one_without_load():
-    e1, e2 = moduli(BETA, (1, 0))
-    new = np.array([[0.02, -0.02, 0.0]])
-    stress, _ = law_of().increment(np.zeros((1, 3)), new, np.zeros((1, 3)))
-    known = HypoelasticLaw.linear(e1, e2, 30.0, NU)
-    wanted = known.increment(np.zeros((1, 3)), new, np.zeros((1, 3)))
+    known = HypoelasticLaw.linear(*moduli(BETA, (1, 0)), 30.0, NU)
+    new, none = np.array([[0.02, -0.02, 0.0]]), np.zeros((1, 3))
+    stress, _ = law_of().increment(none, new, none)
     assert stress[0, 1] < 0
-    np.testing.assert_allclose(stress, wanted[0], rtol=1e-12)
+    np.testing.assert_allclose(stress, known.increment(none, new, none)[0], rtol=1e-12)
 
 
-# Increments and derivatives
-def along(increments: int) -> np.ndarray:
+def along(increments):
     """Warp first, then the fill while the warp is let go: nowhere in proportion."""
     share = np.linspace(0.0, 1.0, increments + 1)[1:, None]
     return np.concatenate([share * [20.0, 5.0], [20.0, 5.0] + share * [-10.0, 20.0]])
@@ -149,11 +116,10 @@ def test_the_tangent(seed):
     new, stress = old + rng.normal(0.0, 0.02, 3), rng.normal(0.0, 10.0, 3)
     law = law_of((30.0, 800.0, rng.uniform(-400, 400), 1000.0, rng.uniform(-400, 400)))
     after, tangent = law.increment(old, new, stress)
-    mean = 0.5 * (stress + after[0])[:2]
-    if np.abs(mean).min() < 1e-3:  # the ratio has a kink there
+    if np.abs(0.5 * (stress + after[0])[:2]).min() < 1e-3:  # the ratio has a kink there
         return
 
-    def slope(step: float) -> np.ndarray:
+    def slope(step):
         ends = [[law.increment(old, new + s, stress)[0][0] for s in (by, -by)]
                 for by in step * np.eye(3)]  # fmt: skip
         return np.transpose([(up - down) / (2 * step) for up, down in ends])
@@ -166,18 +132,12 @@ def test_the_tangent(seed):
 @pytest.mark.parametrize("name", [*(f"beta_{i}" for i in range(5)), "nu12", "thickness"])
 def test_derivatives_of_a_patch_through_its_history(name):
     loads = np.concatenate([along(3), [[10.0, 1.0], [2.0, 8.0]]])
-    steps = {"nu12": 1e-6, "thickness": 1e-6}
-    step = steps.get(name, 1e-2)
+    step = 1e-2 if name.startswith("beta") else 1e-6
 
-    def strain(by: float) -> np.ndarray:
-        beta, nu, thickness = np.array(BETA), NU, 0.8
-        if name == "nu12":
-            nu += by
-        elif name == "thickness":
-            thickness += by
-        else:
-            beta[int(name[-1])] += by
-        return biaxial_response(law_of(beta, nu), loads, thickness).strain
+    def strain(by):
+        beta = BETA + by * np.array([name == f"beta_{i}" for i in range(5)])
+        law = law_of(beta, NU + by * (name == "nu12"))
+        return biaxial_response(law, loads, 0.8 + by * (name == "thickness")).strain
 
     found = biaxial_response(law_of(), loads, 0.8, [name])
     assert found.reached == len(loads)
@@ -187,7 +147,6 @@ def test_derivatives_of_a_patch_through_its_history(name):
     assert (np.abs(slope).max() > 0) == (name != "beta_0")
 
 
-# Where it holds
 def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio():
     falling = law_of((30.0, 800.0, 0.0, 1000.0, 1500.0))  # E1 < 0 where the warp carries little
     assert falling.modulus("E1", 0.0) == 1000.0
@@ -201,7 +160,6 @@ def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio():
 
 
 def test_where_it_is_definite_in_a_pull_along_either_yarn():
-    """E1 > nu12^2 E2 with both at the ratio of the pull, not at equal loads."""
     nu = 0.9
     beta = np.array([30.0, 800.0, 0.0, 1000.0, 800.0])
     rows = definite_rows(LoadRatio(), nu, [0.1, 0.1, 0.1])
@@ -212,32 +170,17 @@ def test_where_it_is_definite_in_a_pull_along_either_yarn():
     assert (rows @ [30.0, 800.0, 0.0, 1000.0, 0.0]).min() > 0
 
 
-def test_a_card_of_it(tmp_path):  # type: ignore[no-untyped-def]
-    known = replace(law_of(), strain_range=[0.02, 0.1, 0.1])
-    MaterialCard(known, 0.8, "ratio").write(tmp_path / "m.toml")
-    text = (tmp_path / "m.toml").read_text()
-    assert 'form = "load-ratio"' in text and "n2 / sqrt(n1^2 + n2^2)" in text
-    law = read_card(tmp_path / "m.toml").law
-    assert law.form == LoadRatio() and law.of_load_ratio
-    np.testing.assert_allclose(law.beta, BETA, rtol=1e-15)
-    np.testing.assert_allclose(law.coupling, [NU, -300.0, 400.0], rtol=1e-15)
-    assert LABELS == ("G12", "E2 at 1:1", "dE2", "E1 at 1:1", "dE1")
-
-
 def test_what_knows_strain_alone_refuses_it_in_one_line():
     card = MaterialCard(law_of(), 0.8, "ratio")
-    takes = {f.name for f in FORMATS.values() if f.load_ratios}
-    assert takes == {"constants", "gsa", "rfem"}
+    assert {f.name for f in FORMATS.values() if f.load_ratios} == {"constants", "gsa", "rfem"}
     for one in FORMATS.values():
         if one.load_ratios:
             assert one.export(card, lowest=0.5, highest=10.0).files
         else:
-            with pytest.raises(InputError, match=r"form: the format .* depend on the ratio"):
-                one.export(card)
-    assert "is for the solver membrane" in complaint(piece_constants, card.law)
+            assert complaint(one.export, card).startswith("form: ")
+    assert "solver membrane" in complaint(piece_constants, card.law)
     check_carries(solver_named("membrane"), card.law)
-    with pytest.raises(InputError, match="calculix takes moduli of strain"):
-        check_carries(solver_named("calculix"), card.law)
+    assert "calculix" in complaint(check_carries, solver_named("calculix"), card.law)
     # One that is run once and kept carries what the solver behind the cache carries.
     for carries in (True, False):
         behind = SimpleNamespace(name="lab", external=True, load_ratios=carries)

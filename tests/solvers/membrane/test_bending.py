@@ -27,7 +27,6 @@ from bubblefit.solvers.membrane.closed import (
     flexure_of,
     gaps,
 )
-from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 from hypothesis import given, settings
@@ -36,7 +35,6 @@ from hypothesis import strategies as st
 from ...complaints import complaint
 from .test_inflated import LAW
 
-# --- bending ---
 RADIUS, LENGTH, SPAN = 75.0, 600.0, 800.0
 POST = RigidCylinder("support", (1.0, 0.0, 0.0), (0.0, 0.0, 0.5 * SPAN), 50.0)
 RING = RigidCylinder("collar", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 120.0, True, 145.0, 10.0)
@@ -70,23 +68,25 @@ def bent():
 
 @pytest.mark.parametrize("body", [POST, RING])
 def test_distance_has_its_gradient_and_hessian(body):
-    """Points beside the post, in the ring's straight part and in its rounded mouth."""
     rng = np.random.default_rng(2)
     angle, z = rng.uniform(0.2, 2.9, 60), rng.uniform(-72.0, 72.0, 60)
     r = rng.uniform(105.0, 122.0, 60)
-    points = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
-    if not body.ring:
-        points[:, 2] += 0.5 * SPAN
+    points = np.stack([r * np.cos(angle), r * np.sin(angle), z + body.centre[2]], axis=1)
     gap, out, hessian = gaps(body, points)
     assert np.linalg.norm(out, axis=1) == pytest.approx(1.0, abs=1e-12)
-    step = 1e-4
+    step, smooth = 1e-4, np.abs(np.abs(z) - 62.5) > 1e-3  # curvature jumps where the mouth begins
     for k in range(3):
         up, down = (gaps(body, points + s * step * np.eye(3)[k]) for s in (1, -1))
-        smooth = np.abs(np.abs(z) - 62.5) > 1e-3  # curvature jumps where the mouth begins
         assert out[:, k] == pytest.approx((up[0] - down[0]) / (2 * step), abs=1e-6)
         slope = (up[1] - down[1]) / (2 * step)
         assert hessian[smooth, :, k] == pytest.approx(slope[smooth], abs=1e-5)
     assert ((gap < 0).any() and (gap > 0).any()) or not body.ring
+    x = np.asarray(body.centre) + rng.uniform(-160, 160, (4000, 3))
+    gap, out, _ = gaps(body, x)
+    force, _, touched = contact_forces(body, x, np.full(len(x), 2.0))
+    np.testing.assert_array_equal(touched, np.flatnonzero(gap < 0))
+    assert 100 < len(touched) < len(x)
+    assert force == pytest.approx(np.where(gap[:, None] < 0, -2.0 * gap[:, None] * out, 0.0))
 
 
 def test_ring_and_post_by_hand():
@@ -99,17 +99,6 @@ def test_ring_and_post_by_hand():
     assert touched.tolist() == [0]
     assert force[0] == pytest.approx([0.0, -3.0, 0.0])
     assert stiffness[0, 1, 1] == pytest.approx(3.0)
-
-
-@pytest.mark.parametrize("body", [POST, RING])
-def test_forces_are_on_all_nodes_that_are_inside(body):
-    rng = np.random.default_rng(3)
-    x = np.asarray(body.centre) + rng.uniform(-160, 160, (4000, 3))
-    gap, out, _ = gaps(body, x)
-    force, _, touched = contact_forces(body, x, np.full(len(x), 2.0))
-    np.testing.assert_array_equal(touched, np.flatnonzero(gap < 0))
-    assert 100 < len(touched) < len(x)
-    assert force == pytest.approx(np.where(gap[:, None] < 0, -2.0 * gap[:, None] * out, 0.0))
 
 
 def test_bodies_are_brought_to_touch():
@@ -130,7 +119,6 @@ def test_balance_mass_penetration_and_frames_of_a_bending(bent):
     total = history.reactions["collar"] + history.reactions["support"]
     assert total[1:] == pytest.approx(0.0, abs=1e-4 * history.load[1])
     assert history.load == pytest.approx(-history.reactions["collar"][:, 1])
-    _, history = bent
     amount = (history.cavity_pressure + 0.101) * history.cavity_volume
     assert amount == pytest.approx(np.full(len(amount), amount[0]), rel=1e-12)
     assert history.cavity_pressure[-1] > history.cavity_pressure[0]
@@ -140,22 +128,11 @@ def test_balance_mass_penetration_and_frames_of_a_bending(bent):
         return float(text.split()[3])
 
     stiff = bend(beam(penalty=50.0))[0]
-    assert depth(stiff) < 0.2 * depth(bent[1])
-    assert stiff.load[-1] == pytest.approx(bent[1].load[-1], rel=0.01)
+    assert depth(stiff) < 0.2 * depth(history)
+    assert stiff.load[-1] == pytest.approx(history.load[-1], rel=0.01)
     # A linear law's strain path is short here: more frames on the way change little.
     finer = bend(beam((1.0, 2.0, 4.0, 6.0, 8.0, 10.0)))[0]
-    assert finer.load[-1] == pytest.approx(bent[1].load[-1], rel=1e-3)
-
-
-def test_the_line_search_finds_what_plain_newton_finds(monkeypatch):
-    model = beam((1.0, 3.0))
-    with_search = bend(model)[0]
-    with monkeypatch.context() as patch:
-        patch.setattr(ClosedMembrane, "equilibrium", Membrane.equilibrium)
-        plain = bend(model)[0]
-    assert with_search.load == pytest.approx(plain.load, rel=1e-6)
-    in_one = bend(beam((3.0,)))[0]
-    assert in_one.load[-1] == pytest.approx(plain.load[-1], rel=1e-3)
+    assert finer.load[-1] == pytest.approx(history.load[-1], rel=1e-3)
 
 
 def test_work_of_the_collar_is_what_gas_and_fabric_store():
@@ -163,41 +140,31 @@ def test_work_of_the_collar_is_what_gas_and_fabric_store():
     moves = tuple(np.arange(0.5, 10.1, 0.5))
     model = beam(moves)
     history, m = bend(model)
-    load, way = history.load, np.array([0.0, *moves])
-    work = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(way)))
+    work = float(np.trapezoid(history.load, [0.0, *moves]))
     # Without gas, pressure and bodies the residual is the internal force.
-    stored = 0.0
     m.strain_old[:], m.stress_old[:] = 0.0, 0.0
-    m.gas, m.bodies = None, ()
-    before = None
+    m.gas, m.bodies, forces = None, (), []
     for u in history.displacement:
         m.unbalance(u, 0.0, with_tangent=False)
-        forces = m.residual.copy()
-        if before is not None:
-            stored += 0.5 * float((forces + before[0]) @ (u - before[1]).reshape(-1))
-        before = (forces, u)
+        forces.append(m.residual.copy())
+    mean = 0.5 * (np.array(forces[1:]) + forces[:-1])
+    stored = float(np.sum(mean * np.diff(history.displacement, axis=0).reshape(mean.shape)))
     volume, absolute = history.cavity_volume, history.cavity_pressure + 0.101
-    gas = absolute[0] * volume[0] * np.log(volume[0] / volume[-1]) + 0.101 * (
-        volume[-1] - volume[0]
-    )
+    gas = absolute[0] * volume[0] * np.log(volume[0] / volume[-1])
+    gas += 0.101 * (volume[-1] - volume[0])
     assert work == pytest.approx(model.copies * stored + gas, rel=0.01)
 
 
 def test_a_wall_bends_with_all_of_its_stiffness_unless_told_otherwise():
-    """D = E t^3/12 along every line, not none of it."""
-    membranes = [
-        closed_model.prepare(beam(), LINEAR, 1e-9, solver.wall)
-        for solver in (MembraneSolver(), MembraneSolver(bending_stiffness=1.0))
-    ]
     model = beam()
     planes = np.zeros(model.mesh.points.shape, dtype=bool)
     for name, axis in (("symmetry_x", 0), ("symmetry_z", 2)):
         planes[model.mesh.node_sets[name], axis] = True
     whole = flexure_of(model.mesh.points, model.mesh.quads, model.warp, model.thickness, planes)
-    for membrane in membranes:
-        assert membrane.flexure is not None
+    for solver in (MembraneSolver(), MembraneSolver(bending_stiffness=1.0)):
+        membrane = closed_model.prepare(model, LINEAR, 1e-9, solver.wall)
         assert membrane.flexure.shares == pytest.approx(whole.shares)
-    none = closed_model.prepare(beam(), LINEAR, 1e-9, Wall(bending_stiffness=0.0))
+    none = closed_model.prepare(model, LINEAR, 1e-9, Wall(bending_stiffness=0.0))
     assert none.flexure is None
 
 
@@ -226,13 +193,11 @@ def test_mistakes_in_the_plan_and_jumps_between_frames(monkeypatch):
     assert remark == "snaps, or nearly, before 6, 8 mm of deflection"
 
 
-# --- relaxation ---
 strains = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.2, 0.2)).map(np.array)
 TAUT, WRINKLED, SLACK = 0, 1, 2
 
 
 def update(h, h_old=(0, 0, 0), s_old=(0, 0, 0), share=0.01, law=LAW):
-    """State, strain and stress of the fabric, carried stress, its slope, that of the strain."""
     he, s, carried = (np.empty(3) for _ in range(3))
     tangent, slope, unused = np.empty((3, 3)), np.empty((3, 3)), np.empty(SLOPES)
     state = relaxed_update(
@@ -270,8 +235,7 @@ def test_derivatives_of_stress_and_strain(seed):
     then = first + rng.normal(0.0, [0.015, 0.015, 0.03])
     _, old, s_old, *_ = update(first)
     state, _, _, _, tangent, slope = update(then, old, s_old)
-    step = 1e-7
-    stress, strain = np.empty((3, 3)), np.empty((3, 3))
+    step, stress, strain = 1e-7, np.empty((3, 3)), np.empty((3, 3))
     for j in range(3):
         up, down = (update(then + k * step * np.eye(3)[j], old, s_old) for k in (1, -1))
         if {up[0], down[0]} != {state}:
@@ -293,15 +257,7 @@ def test_a_strip_that_is_pulled_wrinkles_where_it_is_narrowed(along, narrower):
     assert he == pytest.approx([free, along, 0.0], rel=1e-12, abs=1e-14)
 
 
-def test_what_is_left_to_wrinkles_vanishes_with_its_share():
-    _, _, s, *_ = update([-0.03, 0.05, 0.02])
-    excess = [np.abs(update([-0.03, 0.05, 0.02], share=k)[3] - s).max() for k in (1e-2, 1e-4, 0.0)]
-    assert excess[0] == pytest.approx(100 * excess[1], rel=1e-9)
-    assert excess[2] == 0.0
-
-
 def test_bent_tube_wrinkles_as_published():
-    """At multiples of the curvature of the first wrinkle; 1e-4 is left to wrinkles."""
     tube, taut = PlaneEnds(32, 1e-4), PlaneEnds(32, None)
     for times in (1.5, 2.5, 4.0):
         wrinkled, moment, radius = tube.moment(times * FIRST)
@@ -312,22 +268,20 @@ def test_bent_tube_wrinkles_as_published():
     assert taut.moment(1.5 * FIRST)[1] == pytest.approx(0.75, rel=1e-2)
 
 
-# --- flexure ---
 R, L, THICKNESS = 75.0, 40.0, 0.8
 SHEET = HypoelasticLaw.linear(800.0, 140.0, 20.0, 0.24)
 PLANE = 1.0 / (1.0 - 0.24**2 * 140.0 / 800.0)
 
 
 def quarter(across, warp=None, thickness=THICKNESS, caps=False):
-    """Half of half a tube; planes x = 0 and both ends."""
     mesh = half_tube(across, 4, R, L, caps)
     p = mesh.points
     planes = np.zeros(p.shape, dtype=bool)
     planes[mesh.node_sets["symmetry_x"], 0] = True
     planes[mesh.node_sets["symmetry_z"], 2] = True
     planes[mesh.node_sets["end"], 2] = not caps
-    directions = tube_warp(mesh, L) if warp is None else np.tile(warp, (len(mesh.quads), 1))
-    return p, flexure_of(p, mesh.quads, directions, thickness, planes)
+    warp = tube_warp(mesh, L) if warp is None else warp
+    return p, flexure_of(p, mesh.quads, warp, thickness, planes)
 
 
 def energy(points, flexure):
@@ -335,39 +289,21 @@ def energy(points, flexure):
     return 0.5 * float(x @ (flexure.matrix(SHEET, len(points)) @ x))
 
 
-def rolled(modulus):
-    """D/2 curvature^2 times the surface of half a tube."""
-    stiffness = modulus * PLANE * THICKNESS**3 / 12.0
-    return 0.5 * stiffness / R**2 * np.pi * R * L
-
-
 def test_bending_energy_of_a_rolled_sheet():
+    def rolled(modulus):
+        """D/2 curvature^2 times the surface of half a tube."""
+        return 0.5 * modulus * PLANE * THICKNESS**3 / 12.0 / R**2 * np.pi * R * L
+
     errors = [energy(*quarter(n)) / rolled(140.0) - 1.0 for n in (16, 32, 64)]
     assert abs(errors[2]) < 2e-3
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.1)
     # The same tube with its warp around: tangents of the facets turn, so given as one by one.
     mesh = half_tube(64, 4, R, L, caps=False)
     centre = mesh.points[mesh.quads].mean(axis=1)
-    around = np.stack([-centre[:, 1], centre[:, 0], np.zeros(len(centre))], axis=1)
-    planes = np.zeros(mesh.points.shape, dtype=bool)
-    planes[mesh.node_sets["symmetry_x"], 0] = True
-    planes[mesh.node_sets["symmetry_z"], 2] = planes[mesh.node_sets["end"], 2] = True
-    flexure = flexure_of(mesh.points, mesh.quads, around, THICKNESS, planes)
-    assert energy(mesh.points, flexure) == pytest.approx(rolled(800.0), rel=3e-3)
+    around = np.stack([-centre[:, 1], centre[:, 0], 0 * centre[:, 0]], axis=1)
+    assert energy(*quarter(64, around)) == pytest.approx(rolled(800.0), rel=3e-3)
     thin, thick = (energy(*quarter(16, thickness=t)) for t in (0.4, 0.8))
     assert thick == pytest.approx(8.0 * thin, rel=1e-12)
-
-
-def test_rigid_motions_leave_forces_and_energy():
-    points, flexure = quarter(16)
-    within = flexure.nodes[:, 0] != flexure.nodes[:, 2]
-    flexure = Flexure(flexure.nodes[within], flexure.differences[within], flexure.shares[within])
-    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
-    matrix = flexure.matrix(SHEET, len(points))
-    force = (matrix @ points.reshape(-1)).reshape(-1, 3)
-    moved = (matrix @ (points @ turn.T + [3.0, -2.0, 5.0]).reshape(-1)).reshape(-1, 3)
-    assert moved == pytest.approx(force @ turn.T, abs=1e-9 * np.abs(force).max())
-    assert force.sum(axis=0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_mirrored_lines_and_the_rim_of_a_cap():
@@ -376,9 +312,17 @@ def test_mirrored_lines_and_the_rim_of_a_cap():
     ends = flexure.nodes[:, 0] == flexure.nodes[:, 2]
     assert ends.sum() == 2 * 5 + 2 * 17  # top and bottom line; the rings at both ends
     curvature = np.einsum("hai,hai->hi", flexure.differences[ends], points[flexure.nodes[ends]])
-    size = np.linalg.norm(curvature, axis=1)
-    assert np.sort(size)[-10:] == pytest.approx(np.full(10, 1 / R), rel=5e-3)
-    assert np.sort(size)[:-10] == pytest.approx(0.0, abs=1e-12)
+    size = np.sort(np.linalg.norm(curvature, axis=1))
+    assert size[-10:] == pytest.approx(np.full(10, 1 / R), rel=5e-3)
+    assert size[:-10] == pytest.approx(0.0, abs=1e-12)
+    # A rigid motion turns the forces between nodes and adds none.
+    inner = Flexure(*(part[~ends] for part in (flexure.nodes, flexure.differences, flexure.shares)))
+    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
+    matrix = inner.matrix(SHEET, len(points))
+    force = (matrix @ points.reshape(-1)).reshape(-1, 3)
+    moved = (matrix @ (points @ turn.T + [3.0, -2.0, 5.0]).reshape(-1)).reshape(-1, 3)
+    assert moved == pytest.approx(force @ turn.T, abs=1e-9 * np.abs(force).max())
+    assert force.sum(axis=0) == pytest.approx(0.0, abs=1e-12)
     points, flexure = quarter(16, caps=True)
     before, node, after = points[flexure.nodes].transpose(1, 0, 2)
     rim = (node[:, 2] > L - 1e-6) & (np.hypot(node[:, 0], node[:, 1]) > R - 1e-6)
@@ -386,7 +330,6 @@ def test_mirrored_lines_and_the_rim_of_a_cap():
     assert (before[rim, 2] > L - 1e-6).all() and (after[rim, 2] > L - 1e-6).all()
 
 
-# --- wall ---
 WALL_LAW = HypoelasticLaw.linear(700.0, 150.0, 20.0)
 
 
@@ -395,28 +338,22 @@ def model():
     return inflated_cylinder(150.0, 0.14, 0.81, 75.0, deflections=[2.0])
 
 
-def membrane_of(solver, model):
-    """What the solver would run."""
-    return cylinder.prepare(model, WALL_LAW, 1e-8, solver.wall)
+def wall_of(solver, model):
+    return cylinder.prepare(model, WALL_LAW, 1e-8, solver.wall).wall
 
 
 def test_the_band_goes_from_a_tension_field_to_a_stiff_wall(model):
-    membrane = membrane_of(MembraneSolver(), model)
-    assert membrane.wall == TENSION_FIELD == Wall(LEFT, 1.0)
-    assert membrane.wrinkle_stiffness == LEFT and membrane.flexure is not None
     solver = MembraneSolver()
+    assert wall_of(solver, model) == TENSION_FIELD == Wall(LEFT, 1.0)
     assert isinstance(solver, BandedSolver)
     ends = solver.band(model)
     assert [(end.name, end.predicted) for end in ends] == [
         ("tension field", True), ("stiff wall", False)
     ]  # fmt: skip
     own = [solver_named("membrane", wrinkle_stiffness=None, **end.options) for end in ends]
-    walls = [membrane_of(one, model).wall for one in own]  # type: ignore[arg-type]
+    walls = [wall_of(one, model) for one in own]
     assert walls == [TENSION_FIELD, STIFF] == [Wall(LEFT, 1.0), Wall(None, 1.0)]
-    assert [one.band(model) for one in own] == [(), ()]  # type: ignore[attr-defined]
-    assert "carries no compression" in ends[0].meaning
-    assert "like a solid sheet of its thickness" in ends[1].meaning
-    # Only of cylinders that are bent: nothing else is pressed together.
+    assert [one.band(model) for one in own] == [(), ()]
     assert not solver.band(closed_membrane_of(model))
 
 
@@ -435,18 +372,18 @@ def test_the_band_goes_from_a_tension_field_to_a_stiff_wall(model):
 )
 def test_a_wall_that_is_asked_for_has_no_band(model, options, wall):
     solver = MembraneSolver(**options)
-    assert membrane_of(solver, model).wall == wall
+    assert wall_of(solver, model) == wall
     assert not solver.band(model)
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "field"),
     [
-        ({"wall": "soft"}, "wall: expected 'band', 'tension field' or 'stiff', got 'soft'"),
+        ({"wall": "soft"}, "wall"),
         ({"wall": "stiff", "wrinkle_stiffness": 0.1}, "wrinkle_stiffness: a stiff wall has no"),
-        ({"wrinkle_stiffness": 0.0}, "wrinkle_stiffness: expected 0 < share <= 1"),
-        ({"wall": "stiff", "bending_stiffness": -1.0}, "bending_stiffness: expected 0 or more"),
+        ({"wrinkle_stiffness": 0.0}, "wrinkle_stiffness"),
+        ({"wall": "stiff", "bending_stiffness": -1.0}, "bending_stiffness"),
     ],
 )
-def test_a_wall_that_cannot_be(options, words):
-    assert complaint(MembraneSolver, **options).startswith(words)
+def test_a_wall_that_cannot_be(options, field):
+    assert complaint(MembraneSolver, **options).startswith(field)

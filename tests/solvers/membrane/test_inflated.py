@@ -23,9 +23,8 @@ from bubblefit.runs.verification.closed_forms import THICKNESS_THIN_WALLS as THI
 from bubblefit.runs.verification.closed_forms import sphere_model as sphere
 from bubblefit.runs.verification.closed_forms import tube_model as tube
 from bubblefit.solvers.membrane.bending import settled
-from bubblefit.solvers.membrane.bubble import Wall
-from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity, closed_membrane
-from bubblefit.solvers.membrane.factorisation import BandedTangent, swept, tangent_for
+from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity
+from bubblefit.solvers.membrane.factorisation import tangent_for
 from bubblefit.solvers.membrane.kernel import GAUSS_POINTS, reference_elements
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -35,24 +34,16 @@ from scipy.optimize import brentq
 from ...complaints import complaint
 from ...published_laws import TABLE_4_2
 
-# --- inflated ---
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 
 
 def run(model, law=ISOTROPIC, tolerance=1e-09):
-    """History and the membrane with the strain and stress of the last increment."""
     solver = MembraneSolver(tolerance)
     history = solver.run(model, law)
     return history, solver._prepared[1]
 
 
-def order(errors, factor=2.0):
-    return float(np.log(abs(errors[-2] / errors[-1])) / np.log(factor))
-
-
-# Reference surface
 def twisted():
-    """Facets that are not plane, and their warp directions, none of them in its facet."""
     x, y = np.meshgrid(np.linspace(0, 30, 5), np.linspace(0, 20, 4), indexing="ij")
     points = np.stack([x, y, 0.02 * x * y + 0.01 * x**2], axis=-1).reshape(-1, 3)
     corner = (np.arange(4)[:, None] * 4 + np.arange(3)).ravel()
@@ -61,21 +52,7 @@ def twisted():
     return points, quads, warp
 
 
-def test_frames_of_twisted_facets_hold_the_projected_warp():
-    points, quads, warp = twisted()
-    e = reference_elements(points, quads, warp)
-    frame = np.einsum("mpan,mnk->mpak", e.slopes, points[quads])
-    # Images of unit warp and fill in the reference state: unit vectors, at right angles, and
-    # the warp direction has no part along fill.
-    assert np.einsum("mpak,mpbk->mpab", frame, frame) == pytest.approx(
-        np.broadcast_to(np.eye(2), (*frame.shape[:2], 2, 2)), abs=1e-12
-    )
-    assert np.einsum("mk,mpk->mp", warp, frame[:, :, 1]) == pytest.approx(0.0, abs=1e-12)
-    assert (np.einsum("mk,mpk->mp", warp, frame[:, :, 0]) > 0).all()
-
-
 def test_patch_of_a_curved_surface_in_an_even_deformation():
-    """Every point of twisted facets finds the strain of the gradient that all were moved by."""
     points, quads, warp = twisted()
     elements = reference_elements(points, quads, warp)
     free = np.arange(points.size)
@@ -88,7 +65,6 @@ def test_patch_of_a_curved_surface_in_an_even_deformation():
     corner = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
     for e, facet in enumerate(quads):
         for g, (a, b) in enumerate(GAUSS_POINTS):
-            # Tangents of the bilinear facet, by hand.
             slopes = [[0.25 * i * (1 + j * b), 0.25 * j * (1 + i * a)] for i, j in corner]
             normal = np.cross(*(np.array(slopes).T @ points[facet]))
             normal /= np.linalg.norm(normal)
@@ -99,82 +75,41 @@ def test_patch_of_a_curved_surface_in_an_even_deformation():
             assert m.strain_new[e, g] == pytest.approx(exact, abs=1e-12)
 
 
-def test_rotation_of_a_stressed_tube_leaves_stress_and_balance():
-    model = tube(8, 4, 100.0, [0.02, 0.05])
-    history, m = run(model, LAW)
-    turn = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
-    turn *= np.sign(np.linalg.det(turn))
-    assert m.unbalance(history.displacement[-1], 0.05, with_tangent=False) < 1e-9
-    before, stress, volume = m.residual.reshape(-1, 3).copy(), m.stress_new.copy(), m.volume
-    position = (m.reference + history.displacement[-1]) @ turn.T
-    m.unbalance(position - m.reference, 0.05, with_tangent=False)
-    assert m.stress_new == pytest.approx(stress, abs=1e-9)
-    assert m.residual.reshape(-1, 3) == pytest.approx(before @ turn.T, abs=1e-8)
-    assert volume > 0
-
-
 def test_thickness_by_element():
     """Two thicknesses side by side in one tube wall carry the hoop force in equal strain."""
-    model = replace(tube(16, 1, 20.0, [0.01], caps=False))
+    model = tube(16, 1, 20.0, [0.01], caps=False)
     thick = np.where(model.mesh.points[model.mesh.quads][..., 1].mean(axis=1) > 0, 1.6, 0.8)
-    _, m = run(replace(model, thickness=thick), ISOTROPIC)
+    m, even = (run(one)[1] for one in (replace(model, thickness=thick), model))
     hoop = m.stress_old[..., 1].mean(axis=1) * thick
-    _, even = run(model, ISOTROPIC)
     # Without friction the hoop force is the same all around, p times the apothem.
     assert hoop == pytest.approx(np.full(len(hoop), hoop.mean()), rel=1e-3)
     assert hoop.mean() == pytest.approx(even.stress_old[..., 1].mean() * 0.8, rel=1e-2)
     assert np.ptp(even.stress_old[..., 1]) < 1e-6
 
 
-# Cavity and gas
 def test_volume_of_a_box_and_of_a_slice():
-    model = tube(8, 3, 60.0, [0.01])
-    mesh, fixed = model.mesh, model.fixed()
-    cavity = closed_cavity(mesh.points, mesh.quads, fixed)
-    volume, push = cavity.measure(mesh.points)
-    assert volume == pytest.approx(0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 60.0, rel=1e-12)
-    rng, free = np.random.default_rng(1), np.setdiff1d(np.arange(mesh.points.size), fixed)
-    bent = mesh.points.copy()
-    bent.reshape(-1)[free] += rng.uniform(-3, 3, len(free))
-    _, push = cavity.measure(bent)
-    for dof in rng.choice(free, 12, replace=False):
-        step = np.zeros(bent.size)
-        step[dof] = 1e-3
-        up, down = (cavity.measure(bent + s * step.reshape(-1, 3))[0] for s in (1, -1))
-        assert push[dof] == pytest.approx((up - down) / 2e-3, rel=1e-7, abs=1e-6)
-    model = tube(8, 2, 40.0, [0.01], caps=False)
-    cavity = closed_cavity(model.mesh.points, model.mesh.quads, model.fixed())
-    volume = 0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * 40.0
-    assert cavity.measure(model.mesh.points)[0] == pytest.approx(volume, rel=1e-12)
+    for caps, length in ((True, 60.0), (False, 40.0)):
+        model = tube(8, 3, length, [0.01], caps=caps)
+        mesh, fixed = model.mesh, model.fixed()
+        cavity = closed_cavity(mesh.points, mesh.quads, fixed)
+        volume = 0.5 * 8 * RADIUS**2 * np.sin(np.pi / 8) * length
+        assert cavity.measure(mesh.points)[0] == pytest.approx(volume, rel=1e-12)
+        rng, free = np.random.default_rng(1), np.setdiff1d(np.arange(mesh.points.size), fixed)
+        bent = mesh.points.copy()
+        bent.reshape(-1)[free] += rng.uniform(-3, 3, len(free))
+        _, push = cavity.measure(bent)
+        for dof in rng.choice(free, 12, replace=False):
+            step = 1e-3 * (np.arange(bent.size) == dof).reshape(-1, 3)
+            up, down = (cavity.measure(bent + s * step)[0] for s in (1, -1))
+            assert push[dof] == pytest.approx((up - down) / 2e-3, rel=1e-7, abs=1e-6)
     assert cavity.symmetric.tolist() == [True, False, True]
-    model = tube(8, 2, 40.0, [0.01], caps=False)
     supports = {k: v for k, v in model.supports.items() if k != "end"}
     assert "the cavity is open between nodes" in complaint(run, replace(model, supports=supports))
 
 
-def test_gas_keeps_pressure_times_volume_when_the_tube_is_dented():
-    model = tube(8, 4, 100.0, [0.02, 0.05])
-    history, inflated = run(model)
-    dent = np.flatnonzero(
-        (model.mesh.points[:, 1] > RADIUS - 1e-6) & (model.mesh.points[:, 2] < 1e-6)
-    )
-    fixed = np.union1d(model.fixed(), 3 * dent + 1)
-    m = closed_membrane(model, ISOTROPIC, 1e-10, fixed, Wall())
-    m.strain_old[:], m.stress_old[:] = inflated.strain_old, inflated.stress_old
-    u = history.displacement[-1].copy()
-    m.gas = ClosedGas((0.05 + 0.101) * history.cavity_volume[-1] / model.copies, 0.101)
-    u[dent, 1] -= 5.0
-    found = m.equilibrium(u, 0.0)
-    assert found is not None
-    assert (m.pressure + 0.101) * m.volume == pytest.approx(m.gas.amount, rel=1e-14)
-    assert m.volume < history.cavity_volume[-1] / model.copies
-    assert m.pressure > 0.05
-
-
 def test_tangent_with_gas_against_finite_differences():
     """Stress, follower pressure and the rank-one term of the gas: J (K^-1 b) = b."""
-    model = tube(8, 3, 60.0, [0.02, 0.05])
-    history, m = run(model, LAW)
+    history, m = run(tube(8, 3, 60.0, [0.02, 0.05]), LAW)
     m.gas = ClosedGas(0.15 * m.volume, 0.101)
     rng = np.random.default_rng(5)
     u = history.displacement[-1].copy()
@@ -182,74 +117,57 @@ def test_tangent_with_gas_against_finite_differences():
     m.unbalance(u, 0.0, with_tangent=True)
     m.tangent.factor()
     for _ in range(3):
-        rhs = rng.normal(size=len(m.free))
-        x = np.zeros(u.size)
+        rhs, x, sides = rng.normal(size=len(m.free)), np.zeros(u.size), []
         x[m.free] = m.tangent.solve(rhs)
         step = 1e-4 / np.abs(x).max()
-        sides = []
         for sign in (1, -1):
             m.unbalance(u + sign * step * x.reshape(-1, 3), 0.0, with_tangent=False)
             sides.append(m.residual[m.free].copy())
         assert (sides[0] - sides[1]) / (2 * step) == pytest.approx(rhs, abs=2e-6)
 
 
-# Closed forms
+def order(errors, factor):
+    return np.log(np.abs(np.divide(*errors[-2:]))) / np.log(factor)
+
+
 def test_sphere_against_the_closed_form():
     """Cauchy stress p r/(2 t) = E/(1 - nu) log(r/R), constant thickness; second order."""
-    pressures = [0.01, 0.1, 0.4, 0.8]
-    errors = []
+    pressures, errors = [0.01, 0.1, 0.4, 0.8], []
+
+    def balance(strain, p):
+        return E / (1 - NU) * strain - p * RADIUS * np.exp(strain) / (2 * THICKNESS)
+
+    strain = np.array([brentq(balance, 0.0, 0.9, args=(p,)) for p in pressures])
+    radius = RADIUS * np.exp(strain)
     for n in (4, 8, 12):
         history, m = run(sphere(n, pressures))
-        exact = []
-        for p in pressures:
-            strain = brentq(
-                lambda e: E / (1 - NU) * e - p * RADIUS * np.exp(e) / (2 * THICKNESS),  # noqa: B023
-                0.0, 0.9,
-            )  # fmt: skip
-            exact.append((RADIUS * np.exp(strain), E / (1 - NU) * strain))
-        radius, stress = np.array(exact).T
         found = np.linalg.norm(m.reference + history.displacement, axis=2).mean(axis=1)
-        growth = found / radius - 1
         volume = history.cavity_volume / (4 / 3 * np.pi * radius**3) - 1
-        mean = m.stress_old[..., :2].mean() / stress[-1] - 1
-        errors.append((np.abs(growth).max(), np.abs(volume).max(), abs(mean)))
+        mean = m.stress_old[..., :2].mean() / (E / (1 - NU) * strain[-1]) - 1
+        errors.append((np.abs(found / radius - 1).max(), np.abs(volume).max(), abs(mean)))
     assert max(errors[-1]) < 5e-3
-    assert [order(e, 12 / 8) for e in np.array(errors).T] == pytest.approx([2.0] * 3, abs=0.15)
+    assert order(errors, 12 / 8) == pytest.approx([2.0] * 3, abs=0.15)
 
 
 @pytest.mark.parametrize(("law", "pressure"), [(ISOTROPIC, 0.02), (ISOTROPIC, 0.2), (LAW, 0.14)])
 def test_long_capped_tube_against_the_closed_form(law, pressure):
     """Middle of a tube with flat caps, from the slack state: hoop p r/t, axial half of it."""
     pressures = pressure * np.array([0.05, *np.arange(1, 11) / 10])
-    strain = capped_strain(law, pressure, RADIUS, THICKNESS)
+    strain, errors = capped_strain(law, pressure, RADIUS, THICKNESS), []
     radius = RADIUS * np.exp(strain[1])
     hoop = pressure * radius / THICKNESS
-    errors = []
     for across in (8, 16, 24):
         model = tube(across, 12, 600.0, pressures)
         history, m = run(model, law)
-        found = in_the_middle(model, history, m.stress_old)
-        near = np.argmin(np.abs(model.mesh.points[:, 2] - 600.0 / 4))
-        stretch = np.log1p(history.displacement[-1, near, 2] / model.mesh.points[near, 2])
-        errors.append(
-            [*(np.array(found) / [radius, hoop / 2, hoop] - 1), np.expm1(stretch - strain[0])]
-        )
-    stresses = np.array(errors)[:, 1:3].T
-    assert [order(e, 24 / 16) for e in stresses] == pytest.approx([2.0, 2.0], abs=0.1)
+        found = in_the_middle(model, history, m.stress_old) / np.array([radius, hoop / 2, hoop])
+        z = model.mesh.points[:, 2]
+        near = np.argmin(np.abs(z - 600.0 / 4))
+        stretch = 1 + history.displacement[-1, near, 2] / z[near]
+        errors.append([*(found - 1), stretch / np.exp(strain[0]) - 1])
+    assert order(errors, 24 / 16)[1:3] == pytest.approx([2.0, 2.0], abs=0.1)
     assert np.abs(errors[-1]).max() < 5e-3
 
 
-def test_tube_between_planes_is_the_polygon_in_every_digit():
-    """Plane strain: N straight facets carry p times their apothem, as statics has it."""
-    model = tube(16, 1, 20.0, [0.01, 0.1], caps=False)
-    _, m = run(model, tolerance=1e-11)
-    strain = m.strain_old[..., 1].mean()
-    apothem = RADIUS * np.cos(np.pi / 32) * np.exp(strain)
-    assert np.ptp(m.strain_old[..., 1]) < 1e-8
-    assert m.stress_old[..., 1] == pytest.approx(0.1 * apothem / THICKNESS, rel=1e-7)
-
-
-# Failures
 def test_refusals():
     model = sphere(2, [0.01])
     assert "expected positive, increasing" in complaint(replace, model, pressures=[0.2, 0.1])
@@ -267,8 +185,7 @@ def test_a_limit_pressure_is_passed_by_volume():
     """Fill modulus that falls under the stress and rises again: p R/t has a maximum on the way."""
     beta = 1e3 * np.array([0, 0, 0, 0.1, 81.7789, 15.6849, -4.03842, 0.181033, 0, 0, 0, 0.3])
     law = HypoelasticLaw(beta, 0.24, [0.2, 0.2, 0.2])
-    model = tube(8, 1, 20.0, np.linspace(0.003, 0.09, 30), caps=False)
-    history, m = run(model, law)
+    history, m = run(tube(8, 1, 20.0, np.linspace(0.003, 0.09, 30), caps=False), law)
     assert any("snaps" in remark for remark in history.remarks)
     strain = m.strain_old[..., 1].mean()
     assert np.ptp(m.strain_old[..., 1]) < 1e-6
@@ -278,22 +195,19 @@ def test_a_limit_pressure_is_passed_by_volume():
     # The axial strain is zero, so that the stress is the integral of the modulus.
     exact = quad(rigidity, 0, strain)[0]
     assert m.stress_old[..., 1].mean() == pytest.approx(exact, rel=2e-3)
-    softest = min(rigidity(np.linspace(0, strain, 400)))
-    assert softest < exact  # there is a limit pressure
-
-
-# --- cylinder membrane ---
-PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]
+    assert min(rigidity(np.linspace(0, strain, 400))) < exact  # there is a limit pressure
 
 
 def thesis_case(symmetry="quarter"):
-    """150 mm at 140 kPa, coarse; increments of which two are reported."""
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, symmetry=symmetry)
     return replace(model, deflections=[4.0, 12.0], increments=INCREMENTS)
 
 
 def bend(model, law=LAW):
     return MembraneSolver(1e-9, wall="tension field").run(model, law)
+
+
+PRESSURE, INCREMENTS = 0.14, [2.0, 4.0, 8.0, 12.0]
 
 
 @pytest.fixture(scope="module")
@@ -309,8 +223,6 @@ def test_frames_bodies_and_supports_as_said_by_hand(quarter):
     np.testing.assert_array_equal(history.displacement, history.path[[0, 2, 4]])
     assert history.load[0] == 0.0 and (np.diff(history.load) > 0).all()
     assert history.cavity_pressure[0] == PRESSURE
-    assert set(history.reactions) == {"supports", "collar"}  # as on CalculiX
-    model, history = quarter
     by_hand = InflatedModel(
         model.mesh, model.thickness, model.mesh.warp, model.inflation,
         {"symmetry_x": (0,), "symmetry_z": (2,), "support_bottom": (1,)}, 4,
@@ -326,10 +238,15 @@ def test_frames_bodies_and_supports_as_said_by_hand(quarter):
 
 
 def test_the_whole_cylinder_bends_like_its_quarter(quarter):
-    _, part = quarter
-    model = thesis_case("full")
-    whole = bend(model)
-    assert model.copies == 1
+    model, part = quarter
+    whole = bend(thesis_case("full"))
+    for history in (part, whole):
+        assert set(history.reactions) == {"supports", "collar"}  # as on CalculiX
+        total = history.reactions["collar"] + history.reactions["supports"]
+        assert total[1:] == pytest.approx(0.0, abs=1e-5 * history.load[-1])
+        amount = (history.cavity_pressure + model.gas.ambient) * history.cavity_volume
+        assert amount == pytest.approx(np.full(3, amount[0]), rel=1e-12)
+        assert history.cavity_pressure[-1] > PRESSURE
     assert whole.load == pytest.approx(part.load, rel=1e-6)
     assert whole.cavity_volume == pytest.approx(part.cavity_volume, rel=1e-10)
     assert whole.cavity_pressure == pytest.approx(part.cavity_pressure, rel=1e-9)
@@ -337,31 +254,18 @@ def test_the_whole_cylinder_bends_like_its_quarter(quarter):
         assert whole.reactions[name] == pytest.approx(part.reactions[name], abs=1e-4)
 
 
-@pytest.mark.parametrize("symmetry", ["quarter", "full"])
-def test_forces_balance_and_the_gas_keeps_its_mass(symmetry, quarter):
-    model = thesis_case(symmetry)
-    history = quarter[1] if symmetry == "quarter" else bend(model)
-    total = history.reactions["collar"] + history.reactions["supports"]
-    assert total[1:] == pytest.approx(0.0, abs=1e-5 * history.load[-1])
-    absolute = history.cavity_pressure + model.gas.ambient
-    energy = absolute * history.cavity_volume
-    assert energy == pytest.approx(np.full(3, energy[0]), rel=1e-12)
-    assert history.cavity_pressure[-1] > PRESSURE
-
-
 def test_gas_bodies_and_span_of_the_model_are_taken(quarter):
     model, before = quarter
     thin = bend(replace(model, gas=Gas(ambient=0.01)))
-    energy = (thin.cavity_pressure + 0.01) * thin.cavity_volume
-    assert energy == pytest.approx(np.full(3, energy[0]), rel=1e-12)
-    # Less absolute pressure rises less over the same loss of volume.
+    amount = (thin.cavity_pressure + 0.01) * thin.cavity_volume
+    assert amount == pytest.approx(np.full(3, amount[0]), rel=1e-12)
     rise = [h.cavity_pressure[-1] - PRESSURE for h in (before, thin)]
     assert 0 < rise[1] < 0.75 * rise[0]
     long = bend(replace(model, collar=Collar(240.0, 400.0)))
     assert long.load[-1] > 1.05 * before.load[-1]
     narrow = RigidSupports(span=1600.0)
     model = inflated_cylinder(150.0, PRESSURE, 0.81, 60.0, supports=narrow, deflections=[4, 12.0])
-    assert bend(model).load[-1] > 1.3 * quarter[1].load[-1]
+    assert bend(model).load[-1] > 1.3 * before.load[-1]
 
 
 def test_the_first_millimetres_hardly_hang_on_the_mesh():
@@ -374,90 +278,51 @@ def test_the_first_millimetres_hardly_hang_on_the_mesh():
     assert history.load[1:] == pytest.approx([140.5, 220.1], rel=0.012)
 
 
-def test_a_bending_that_finds_nothing_is_a_failure(quarter, monkeypatch):
-    find = ClosedMembrane.equilibrium
-
-    def inflates_only(self, u, pressure):
-        return None if self.bodies else find(self, u, pressure)
-
-    monkeypatch.setattr(ClosedMembrane, "equilibrium", inflates_only)
-    with pytest.raises(SolverFailure, match=r"no frame of the bending.*between 0 and 2 mm"):
-        bend(quarter[0])
-    with pytest.raises(InputError, match="takes no parameters"):
-        MembraneSolver().run_with_sensitivity(quarter[0], LAW)
-
-
-def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch):
-    find = ClosedMembrane.equilibrium
+@pytest.mark.parametrize("limit", [0.0, 8.5])
+def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch, limit):
+    model, whole = quarter
+    find, heights = ClosedMembrane.equilibrium, []
 
     def tired(self, u, pressure):
         if not self.bodies:
             return find(self, u, pressure)
         heights.append(self.bodies[-1].centre[1])
         gone = heights[0] + INCREMENTS[0] - heights[-1]
-        return find(self, u, pressure) if gone < 8.5 else None
+        return find(self, u, pressure) if gone < limit else None
 
-    heights: list[float] = []
     monkeypatch.setattr(ClosedMembrane, "equilibrium", tired)
-    history = bend(quarter[0])
-    assert history.load == pytest.approx(quarter[1].load[:2], rel=1e-6)
+    if not limit:
+        with pytest.raises(SolverFailure, match=r"no frame of the bending.*between 0 and 2 mm"):
+            bend(model)
+        with pytest.raises(InputError, match="takes no parameters"):
+            MembraneSolver().run_with_sensitivity(model, LAW)
+        return
+    history = bend(model)
+    assert history.load == pytest.approx(whole.load[:2], rel=1e-6)
     assert len(history.displacement) == len(history.cavity_volume) == 2
-    assert any("the run stopped early: no equilibrium between 8 and 12" in r
-               for r in history.remarks)  # fmt: skip
+    assert any("stopped early: no equilibrium between 8 and 12" in r for r in history.remarks)
 
 
-def test_unknowns_are_ordered_ring_by_ring():
-    """The band is a ring and a node wide; Cuthill and McKee from one node need two rings."""
-    mesh = thesis_case().mesh
-    ring = len(mesh.node_sets["mid_span"])
-    widths = []
-    for order in swept(mesh.quads, mesh.points):
-        np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.points)))
-        rank = np.argsort(order)[mesh.quads]
-        widths.append(int(np.ptp(rank, axis=1).max()))
-    assert min(widths) <= ring + 1
-    tangent = tangent_for(mesh.quads, mesh.points.size, np.arange(mesh.points.size), mesh.points)
-    assert isinstance(tangent, BandedTangent)
-    assert tangent.width == 3 * min(widths) + 2
-    # A surface in two pieces is ordered, too.
-    both = np.concatenate([mesh.points, 0.5 * mesh.points])
-    quads = np.concatenate([mesh.quads, mesh.quads + len(mesh.points)])
-    for order in swept(quads, both):
-        np.testing.assert_array_equal(np.sort(order), np.arange(len(both)))
-
-
-@pytest.mark.parametrize("law", [HypoelasticLaw.linear(400.0, 300.0, 20.0), LAW])
-def test_the_inflated_frame_is_the_closed_form_away_from_caps(law):
-    """No seam; radius and strains in the middle of a short cylinder, finer and finer."""
-    strain = capped_strain(law, PRESSURE, 75.0, 0.81)
-    errors = []
+def test_the_inflated_frame_is_the_closed_form_away_from_caps():
+    strain, errors = capped_strain(LAW, PRESSURE, 75.0, 0.81), []
     for size in (50.0, 25.0):
         model = inflated_cylinder(
             150.0, PRESSURE, 0.81, size, length=900.0, seam_width=0.0,
             supports=RigidSupports(500.0), collar=Collar(240.0, 60.0), deflections=[0.5],
         )  # fmt: skip
-        model = replace(model, inflation=np.linspace(0.0, PRESSURE, 25)[1:])
-        u = bend(model, law).displacement[0]
-        at = model.mesh.points + u
-        radius = 0.5 * model.diameter_at(at)
-        near = np.abs(model.mesh.points[:, 2] - 100.0) < size
-        along = float(np.log1p(u[near, 2] / model.mesh.points[near, 2]).mean())
-        errors.append(np.array([radius / 75.0, np.exp(along)]) / np.exp(strain[::-1]) - 1)
-    found = np.abs(errors)
-    assert found[-1].max() < 1e-3  # 0.5 % is asked for
-    assert (np.diff(found, axis=0) < 0).all()
+        u = bend(replace(model, inflation=np.linspace(0.0, PRESSURE, 25)[1:])).displacement[0]
+        points = model.mesh.points
+        near = np.abs(points[:, 2] - 100.0) < size
+        along = float(np.log1p(u[near, 2] / points[near, 2]).mean())
+        found = [0.5 * model.diameter_at(points + u) / 75.0, np.exp(along)]
+        errors.append(np.abs(found / np.exp(strain[::-1]) - 1))
+    assert errors[-1].max() < 1e-3  # 0.5 % is asked for
+    assert (np.diff(errors, axis=0) < 0).all()
 
 
-# --- settling ---
-@pytest.fixture
-def inflated():
-    """A tube at 50 kPa, and the membrane with the strain and stress of that increment."""
+def test_it_rests_where_newton_would(monkeypatch):
     history, membrane = run(tube(8, 4, 100.0, [0.02, 0.05]), LAW)
-    return history.displacement[-1], membrane
-
-
-def test_it_rests_where_newton_would(inflated, monkeypatch):
-    found, membrane = inflated
+    found = history.displacement[-1]
     pushed = found.copy()
     pushed.reshape(-1)[membrane.free] += np.random.default_rng(5).uniform(-2, 2, len(membrane.free))
     membrane.pressure = 0.05
@@ -466,7 +331,6 @@ def test_it_rests_where_newton_would(inflated, monkeypatch):
     assert rest == pytest.approx(found, abs=1e-6)
     assert membrane.viscosity == 0.0
     assert membrane.unbalance(rest, 0.05, with_tangent=False) < membrane.tolerance
-    # Nothing is said to rest that does not.
     monkeypatch.setattr(ClosedMembrane, "equilibrium", lambda *_: None)
     assert settled(membrane, found) is None
     assert membrane.viscosity == 0.0
@@ -474,7 +338,6 @@ def test_it_rests_where_newton_would(inflated, monkeypatch):
 
 @pytest.mark.parametrize("wall", ["stiff", "tension field"])
 def test_a_beam_goes_beyond_its_limit_load(wall):
-    """The thesis' cylinder of 150 mm at 90 kPa, coarse: all frames there, the forces in balance."""
     model = inflated_cylinder(150.0, 0.09, 0.81, 40.0, deflections=np.arange(8.0, 201.0, 8.0))
     history = MembraneSolver(1e-8, wall=wall).run(model, LAW)
     assert len(history.load) == 1 + len(model.deflections)

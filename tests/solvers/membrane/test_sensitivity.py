@@ -1,12 +1,9 @@
 """Derivatives of bubbles, and the stability of the law."""
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.errors import SolverFailure
-from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, draw
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import SLACK, BubbleModel, default_increments
@@ -18,12 +15,9 @@ from bubblefit.solvers.membrane.newton import named
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
-from ...inference.cases import CUBIC, RANGE
-from ...inference.cases import LAW as CASE_LAW
 from ...inference.cases import MODEL as CASE_MODEL
 from ...published_laws import TABLE_4_2
 
-# --- sensitivity ---
 BETA = 1e3 * np.array(TABLE_4_2)
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
 MODEL = BubbleModel(
@@ -35,47 +29,64 @@ OFFSET = "pressure_offset"
 TIGHT = 1e-10
 
 
-def changed(law, model, name, step):
-    """Model and law with one parameter moved."""
-    if name == "nu12":
-        return model, replace(law, nu12=law.nu12 + step)
-    if name in model.parameters:
-        return model.with_parameters({name: step}), law
-    beta = law.beta.copy()
-    beta[int(name.removeprefix("beta_"))] += step
-    return model, law.with_beta(beta)
-
-
 def differences(law, name, slope, move=0.01, model=MODEL):
     """Central differences, extrapolated, with the step that moves the bubble by `move` mm."""
 
+    def moved(step):
+        if name == "nu12":
+            return model, replace(law, nu12=law.nu12 + step)
+        if name in model.parameters:
+            return model.with_parameters({name: step}), law
+        entry = np.arange(len(law.beta)) == int(name.removeprefix("beta_"))
+        return model, law.with_beta(law.beta + step * entry)
+
     def central(step):
-        ahead, behind = (
-            MembraneSolver(TIGHT).run(*changed(law, model, name, by)).displacement
-            for by in (step, -step)
-        )
+        ahead, behind = (MembraneSolver(TIGHT).run(*moved(by)).displacement for by in (step, -step))
         return (ahead - behind) / (2 * step)
 
     step = move / np.abs(slope).max()
     return (4 * central(step / 2) - central(step)) / 3
 
 
+#: Nine increments: points pass breaks and knots inside of them.
+TRILINEAR = HypoelasticLaw.trilinear(
+    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
+    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
+)  # fmt: skip
+KNOTS = [[0.0, 0.01, 0.03, 0.06, 0.13], [0.0, 0.04, 0.08, 0.13], [0.0, 0.05, 0.13]]
+SPLINE = HypoelasticLaw(
+    np.array([20.0, 10.0, 12.0, 140.0, 110.0, 130.0, 190.0, 800, 650, 450, 420, 600]), 0.24,
+    [0.13, 0.13, 0.13], form=Spline.at(KNOTS),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("law", "names", "move"),
+    [
+        (LAW, PARAMETERS, 0.01),
+        (replace(LAW, thickness_change="incompressible"), PARAMETERS, 0.01),
+        # Strains beyond a short range: held moduli still depend on the coefficients.
+        (replace(LAW, strain_range=[0.02, 0.03, 0.02]), ["beta_4", "beta_9", "beta_1"], 1e-4),
+        (TRILINEAR, [n for i, n in enumerate(PARAMETERS) if i % 4 or i > 11], 1e-4),
+        (replace(SPLINE, thickness_change="incompressible"), parameters_of(SPLINE), 1e-3),
+    ],
+    ids=["cubic", "incompressible", "held", "trilinear", "spline"],
+)
+def test_each_parameter(law, names, move):
+    history, slopes = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, names)
+    assert slopes.shape == (*history.displacement.shape, len(names))
+    for name, slope in zip(names, np.moveaxis(slopes, -1, 0), strict=True):
+        expected = differences(law, name, slope, move)
+        assert np.abs(slope - expected).max() < 1e-5 * np.abs(expected).max(), name
+        if move == 0.01:  # the first frame, too, is right to 1e-5 of its own largest
+            first = np.abs(slope[0] - expected[0]).max()
+            assert first < 2e-5 * np.abs(expected[0]).max(), name
+
+
 @pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-@pytest.mark.parametrize("name", PARAMETERS)
-def test_each_parameter(name, thickness_change):
-    law = replace(LAW, thickness_change=thickness_change)
-    history, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
-    assert slope.shape == (*history.displacement.shape, 1)
-    expected = differences(law, name, slope)
-    assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
-    # Not only the largest: the first frame, too, is right to 1e-5 of its own largest.
-    first = np.abs(slope[0, ..., 0] - expected[0]).max()
-    assert first < 2e-5 * np.abs(expected[0]).max()
-
-
-def sheet(thickness_change):
-    """A whole disk that is neither flat nor taut, with a rim that moves."""
-    mesh = disk_mesh(100.0, 64)
+def test_the_parameters_of_the_sheet_together(thickness_change):
+    """A whole disk that is neither flat nor taut, with a rim that moves: heights and slack."""
+    law, mesh = replace(LAW, thickness_change=thickness_change), disk_mesh(100.0, 64)
     modes = disk_modes(mesh.points, 100.0, 10)
     x, y = mesh.points[:, 0], mesh.points[:, 1]
     points = mesh.points + np.outer(3.0 * modes["z0_1"] - 4.0 * modes["z0_xy"], [0, 0, 1])
@@ -83,19 +94,11 @@ def sheet(thickness_change):
     pressures = 1e-3 * np.array([22.0, 97.0, 186.0])
     steps = default_increments(pressures)
     rim = mesh.points[mesh.node_sets["rim"]]
-    motion = np.array([p / 0.186 * (0.01 * rim + (0.3, 0.0, 1.0)) for p in steps])
     model = BubbleModel(
-        replace(mesh, points=points), 0.81, pressures, steps,
-        modes=modes, slack=(0.002, -0.001), rim_motion=motion,
+        replace(mesh, points=points), 0.81, pressures, steps, modes=modes, slack=(0.002, -0.001),
+        rim_motion=np.array([p / 0.186 * (0.01 * rim + (0.3, 0.0, 1.0)) for p in steps]),
     )  # fmt: skip
-    return model, replace(LAW, thickness_change=thickness_change)
-
-
-@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-def test_the_parameters_of_the_sheet_together(thickness_change):
-    """Heights and slack, along the path: the law's own history depends on them, too."""
-    model, law = sheet(thickness_change)
-    names = [*SLACK, *model.modes, OFFSET, "beta_11"]
+    names = [*SLACK, *modes, OFFSET, "beta_11"]
     slopes = MembraneSolver(TIGHT).run_with_sensitivity(model, law, names)[1]
     for j, name in enumerate(names):
         if name in ("z0_x", "z0_xx", "z0_xxy", "z0_yyy"):
@@ -106,123 +109,46 @@ def test_the_parameters_of_the_sheet_together(thickness_change):
             assert off < 2e-5 * np.abs(expected[frame]).max(), (name, frame)
 
 
-def test_where_the_moduli_are_held():
-    """Strains beyond a short range: held moduli still depend on the coefficients."""
-    law = HypoelasticLaw(BETA, 0.24, [0.02, 0.03, 0.02])
-    for name in ("beta_4", "beta_9", "beta_1"):
-        _, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
-        expected = differences(law, name, slope, 1e-4)
-        assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
-
-
-TRILINEAR = HypoelasticLaw.trilinear(
-    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
-    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
-)  # fmt: skip
-USED = [name for i, name in enumerate(PARAMETERS) if i % 4 or i > 11]
-
-
-@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-@pytest.mark.parametrize("name", USED)
-def test_each_parameter_of_a_trilinear_law(name, thickness_change):
-    """Nine increments: points pass breaks inside of them. A small move, as for held moduli."""
-    law = replace(TRILINEAR, thickness_change=thickness_change)
-    _, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, [name])
-    expected = differences(law, name, slope, 1e-4)
-    assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
-
-
-def test_a_trilinear_bubble():
-    _, slope = MembraneSolver().run_with_sensitivity(MODEL, TRILINEAR, ["beta_0", "beta_3"])
-    assert not slope[..., 0].any() and slope[..., 1].any()
-    few = MembraneSolver(TIGHT).run(MODEL, TRILINEAR)
-    assert len(MODEL.increments) == 9
-    levels = np.interp(np.linspace(0, 9, 73)[1:], range(10), [0, *MODEL.increments])
-    many = MembraneSolver(TIGHT).run(replace(MODEL, increments=levels), TRILINEAR)
-    reached = many.strain_max
-    assert (reached > TRILINEAR.form.breaks[:, 1]).all()
-    apex = MODEL.mesh.node_sets["apex"][0]
-    assert few.displacement[:, apex, 2] == pytest.approx(many.displacement[:, apex, 2], rel=1e-4)
-
-
-def test_derivatives_do_not_depend_on_how_they_are_computed():
+def test_derivatives_do_not_depend_on_how_they_are_computed(monkeypatch):
     solver = MembraneSolver(TIGHT)
     assert isinstance(solver, DifferentiatingSolver)
-    together = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS)[1]
-    for j, name in enumerate(PARAMETERS):
+    history, together = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS)
+    for name in ("beta_5", "nu12", OFFSET):
         alone = solver.run_with_sensitivity(MODEL, LAW, [name])[1]
-        near = pytest.approx(together[..., j], rel=1e-9, abs=1e-9 * np.abs(alone).max())
-        assert alone[..., 0] == near
-    solver = MembraneSolver(TIGHT)
-    history, cold = solver.run_with_sensitivity(MODEL, LAW)
-    _, warm = solver.run_with_sensitivity(MODEL, LAW, guess=history.path)
-    assert warm == pytest.approx(cold, rel=1e-6, abs=1e-8 * np.abs(cold).max())
-    history, slope = MembraneSolver().run_with_sensitivity(MODEL, LAW)
-    plain = MembraneSolver().run(MODEL, LAW)
+        near = together[..., PARAMETERS.index(name)]
+        assert alone[..., 0] == pytest.approx(near, rel=1e-9, abs=1e-9 * np.abs(alone).max())
+    room = 1e-8 * np.abs(together).max()
+    _, warm = solver.run_with_sensitivity(MODEL, LAW, PARAMETERS, guess=history.path)
+    assert warm == pytest.approx(together, rel=1e-6, abs=room)
+    plain = MembraneSolver(TIGHT).run(MODEL, LAW)
     assert history.displacement == pytest.approx(plain.displacement, abs=1e-9)
     for name in plain.reactions:
         assert history.reactions[name] == pytest.approx(plain.reactions[name], rel=1e-6, abs=1e-4)
-    assert history.path_slope is not None
-    assert (history.path_slope[MODEL.reported] == slope).all()
-    assert (slope[:, MODEL.mesh.node_sets["rim"]] == 0).all()
-    solver = MembraneSolver(TIGHT)
-    band = solver.run_with_sensitivity(MODEL, LAW)[1]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(factorisation, "LARGEST_BAND", 0)
-        sparse = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, LAW)[1]
-    assert sparse == pytest.approx(band, rel=1e-5, abs=1e-8 * np.abs(band).max())
-
-
-KNOTS = [[0.0, 0.01, 0.03, 0.06, 0.13], [0.0, 0.04, 0.08, 0.13], [0.0, 0.05, 0.13]]
-SPLINE = HypoelasticLaw(
-    np.array([20.0, 10.0, 12.0, 140.0, 110.0, 130.0, 190.0, 800, 650, 450, 420, 600]), 0.24,
-    [0.13, 0.13, 0.13], form=Spline.at(KNOTS),
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("name", parameters_of(SPLINE))
-def test_each_parameter_of_a_spline(name):
-    """Points pass several knots inside of an increment, where slopes are continuous."""
-    history, slope = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, SPLINE, [name])
-    assert (history.strain_max[:2] > 0.05).all()
-    expected = differences(SPLINE, name, slope, 1e-3)
-    assert np.abs(slope[..., 0] - expected).max() < 1e-5 * np.abs(expected).max()
+    assert (history.path_slope[MODEL.reported] == together).all()
+    assert (together[:, MODEL.mesh.node_sets["rim"]] == 0).all()
+    monkeypatch.setattr(factorisation, "LARGEST_BAND", 0)
+    sparse = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, LAW, PARAMETERS)[1]
+    assert sparse == pytest.approx(together, rel=1e-5, abs=room)
 
 
 def test_a_spline_through_a_cubic_is_that_cubic():
-    _, slope = MembraneSolver().run_with_sensitivity(MODEL, SPLINE)
-    assert slope.shape[-1] == 12
     assert "beta_12" in complaint(MembraneSolver().run_with_sensitivity, MODEL, SPLINE, ["beta_12"])
-    # Solution and derivatives: those by the values are those by the coefficients.
     values = [LAW.modulus(n, KNOTS[1]) for n in ("G12", "E2", "E1")]
     form = Spline.at([KNOTS[1]] * 3)
     spline = HypoelasticLaw(np.ravel(values), 0.24, LAW.strain_range, form=form)
     a, by_values = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, spline)
     b, by_coefficients = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, LAW)
     assert a.displacement == pytest.approx(b.displacement, abs=1e-8)
-    powers = np.kron(np.eye(3), np.vander(KNOTS[1], 4))  # d values / d coefficients
-    expected = by_values @ powers
+    expected = by_values @ np.kron(np.eye(3), np.vander(KNOTS[1], 4))  # d values / d coefficients
     assert expected == pytest.approx(by_coefficients, abs=1e-7 * np.abs(by_coefficients).max())
 
 
-# --- stability ---
-ENDS = LawBounds.of_moduli({"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (1.0, 200.0)})
-FREE = Unknowns.of(CUBIC.form, 0.24, RANGE, ENDS)
-#: Sewn 4 % too long both ways: pressed together at low pressures, taut from 97 kPa on. Which of
-#: its equilibria Newton finds does not hang on rounding, unlike that of a law that folds.
+#: Sewn 4 % too long both ways: pressed together at low pressures, taut from 97 kPa on.
 LOOSE = replace(CASE_MODEL, slack=(0.04, 0.04))
 EVEN = HypoelasticLaw.linear(500.0, 500.0, 150.0)
 
 
-def drawn(number):
-    """Random laws of the bubble's bounds, feasible; some are unstable somewhere."""
-    draws = draw(FREE, np.random.default_rng([1, 0]), 2000)
-    some = draws[allowed(FREE, draws)][:number]
-    return [CASE_LAW.with_beta(FREE.beta(FREE.at(coefficients))) for coefficients in some]
-
-
 def judged(monkeypatch, model, law):
-    """At every increment: whether the least eigenvalue is positive, and what the solver says."""
     every = replace(model, pressures=model.increments)
     solver, pairs = MembraneSolver(), []
     membrane = solver._membrane(every, law)
@@ -252,26 +178,19 @@ def test_a_bubble_that_is_stable_at_the_last_pressure_and_not_before():
     assert history.unstable == differentiated.unstable == ("22 kPa", "59 kPa")
     assert history.stable is False
     assert instability(history.unstable) == "unstable equilibrium at 22 kPa, 59 kPa"
-    # At a pressure that nobody asks for it is no matter.
     last = replace(LOOSE, pressures=(0.251, 0.3))
     assert MembraneSolver().run(last, EVEN).unstable == ()
+    places = named(np.arange(1.0, 6.0), "mm")
+    assert instability(places[:3]).endswith("at 1 mm, 2 mm, 3 mm")
+    assert "at 5 of the reported loads, from 1 mm to 5 mm" in instability(places)
+    assert instability(()) == instability(None) == ""
 
 
 @pytest.mark.parametrize("largest", [factorisation.LARGEST_BAND, 0], ids=["band", "sparse"])
 def test_the_judgement_is_that_of_the_least_eigenvalue(monkeypatch, largest):
-    """Of the symmetric part of the tangent as it is assembled, at every increment."""
     monkeypatch.setattr(factorisation, "LARGEST_BAND", largest)
     pairs = judged(monkeypatch, LOOSE, EVEN)
     assert pairs == 4 * [(False, False)] + 5 * [(True, True)]
-
-
-def test_laws_drawn_at_random_are_judged_by_the_least_eigenvalue(monkeypatch):
-    agreements = []
-    for law in drawn(12):
-        with suppress(SolverFailure):
-            agreements += judged(monkeypatch, CASE_MODEL, law)
-    assert len(agreements) >= 9 * 6
-    assert all(expected == found for expected, found in agreements)
 
 
 @pytest.mark.parametrize("shear", [4.0, 8.0])
@@ -279,21 +198,10 @@ def test_yarns_slide_where_half_the_stress_along_them_is_more_than_the_shear_mod
     """Sliding by gamma along the load takes G gamma^2/2 and gives back s gamma^2/4."""
     law = HypoelasticLaw.linear(500.0, 200.0, shear)
     model = straight_strip("warp", 20.0, 21.6, 0.81, increments=40, across=20)
-    solver = MembraneSolver()
-    plain = solver.run(model, law)
-    differentiated, _ = solver.run_with_sensitivity(model, law)
-    assert plain.unstable == differentiated.unstable and plain.unstable
+    plain = MembraneSolver().run(model, law)
+    differentiated, _ = MembraneSolver().run_with_sensitivity(model, law)
+    assert plain.unstable == differentiated.unstable
     assert plain.unstable[0].endswith(" mm of elongation")
-    stress = plain.load / (model.load_factor * 12.5 * np.exp(-0.24 * np.log1p(
-        np.array(model.elongations) / 20.0)) * 0.81)  # fmt: skip
-    onset = stress[len(stress) - len(plain.unstable)]
-    assert 2 * shear < onset < 2.5 * shear
-
-
-def test_many_loads_are_told_by_the_first_and_the_last():
-    places = named(np.arange(1.0, 6.0), "mm of elongation")
-    assert instability(places[:3]).endswith("at 1 mm of elongation, 2 mm of elongation, "
-                                            "3 mm of elongation")  # fmt: skip
-    said = instability(places)
-    assert "at 5 of the reported loads, from 1 mm of elongation to 5 mm of" in said
-    assert instability(()) == instability(None) == ""
+    narrow = np.exp(-0.24 * np.log1p(np.array(model.elongations) / 20.0))
+    stress = plain.load / (model.load_factor * 12.5 * narrow * 0.81)
+    assert 2 * shear < stress[len(stress) - len(plain.unstable)] < 2.5 * shear
