@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import json
+import math
 import os
 import re
 import stat
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -198,6 +200,19 @@ def write_text(path: Path | str, text: str) -> None:
         stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
+
+
+def json_text(content: Any) -> str:
+    """Return plain values as a JSON file; a number that is not known (not finite) is null."""
+    return json.dumps(_known(content), indent=1, allow_nan=False) + "\n"
+
+
+def _known(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _known(own) for key, own in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_known(own) for own in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def remove_unfinished(folder: Path | str) -> None:

@@ -110,7 +110,7 @@ def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
 
 def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     """Fit the chosen tests (of a kind) of a project, write the folder and print the summary."""
-    from ..project.cards import usual_folder
+    from ..project.schema import usual_folder
     from ..runs.fit import fit
     from ..runs.starts import timed
 

@@ -145,7 +145,7 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 def folder_beside(project: Path, suffix: str) -> Path:
     """Return the usual output folder of a command that does not fit: out/NAME-`suffix`."""
-    from ..project.cards import usual_folder
+    from ..project.schema import usual_folder
 
     own = usual_folder(project)
     return own.with_name(f"{own.name}-{suffix}")

@@ -14,9 +14,8 @@ from ..errors import InputError, SolverFailure
 from ..experiments.kinds import Fabric, Place, Scales
 from ..experiments.registry import kind_named
 from ..materials.card import MaterialCard
-from ..project.cards import usual_folder
 from ..project.project import Project, chosen_cards, read_project
-from ..project.schema import FitSection, LawSection
+from ..project.schema import FitSection, LawSection, usual_folder
 from ..readers.sections import first_error
 from ..runs.folder import KeptAnalyses
 from ..runs.predictions import Predictions, measured_tests, predict

@@ -21,7 +21,7 @@ from typing import IO, Any
 import click
 
 from ..errors import BubblefitError, OutputError
-from ..files import __version__, output_errors
+from ..files import __version__, json_text, output_errors
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 FILE = click.Path(path_type=Path)
@@ -116,7 +116,7 @@ def written_to(folder: Path) -> str:
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
     """Print the lines, or with --json the content of result.json."""
-    click.echo(json.dumps(result, indent=1) if as_json else "\n".join(lines))
+    click.echo(json_text(result) if as_json else "\n".join(lines) + "\n", nl=False)
 
 
 # Usage errors

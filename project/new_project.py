@@ -15,11 +15,9 @@ from .project import read_project
 
 #: What a test is like unless something else is said; mm and kPa.
 USUAL: Mapping[str, Any] = {
-    "radius": 100.0,
-    "pressures": (20, 60, 100, 150, 200, 250, 300),
-    "diameter": 150.0,
+    "radius": 100.0, "pressures": (20, 60, 100, 150, 200, 250, 300), "diameter": 150.0,
     "pressure": 100.0,
-}
+}  # fmt: skip
 
 
 def writable_kinds() -> list[str]:
@@ -36,11 +34,10 @@ def write_project(
     form: str = "cubic",
     **said: Any,
 ) -> None:
-    """Write a project file and see that it can be read.
+    """Write a project file that can be read.
 
-    tests : how many there are of each kind. name, thickness : of the fabric, mm. form : of the
-    moduli. said : `USUAL` values that are otherwise; mm and kPa. InputError: what is said makes no
-    project. OutputError: the file cannot be written.
+    tests : how many of each kind. name, thickness : of the fabric, mm. said : `USUAL` values that
+    are otherwise; mm and kPa. InputError: what is said makes no project. OutputError.
     """
     write_text(path, project_text(tests, name, thickness, form, **said))
     try:
@@ -63,25 +60,18 @@ def project_text(
     if form not in form_names():
         raise InputError(None, "--form", f"{form!r} is not one of: {', '.join(form_names())}")
     fitted = [kind for kind in asked if kind_named(kind).fitted]
+    parts = [
+        render(f"project/{kind}.toml.j2", number=n, count=tests[kind], name=f"{kind}{n}", **values)
+        for kind in asked
+        for n in range(1, tests[kind] + 1)
+    ]
     return render(
-        "project/project.toml.j2",
-        name=_quoted(name),
-        version=__version__,
-        thickness=thickness,
-        form=_quoted(form),
-        fitted=bool(fitted),
+        "project/project.toml.j2", name=_quoted(name), version=__version__, thickness=thickness,
+        form=_quoted(form), fitted=bool(fitted), predicted=len(fitted) < len(asked), tests=parts,
         methods=", ".join(f'"{name}"' for name in method_names()),
-        predicted=len(fitted) < len(asked),
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,
-        tests=[
-            render(
-                f"project/{kind}.toml.j2", number=n, count=tests[kind], name=f"{kind}{n}", **values
-            )
-            for kind in asked
-            for n in range(1, tests[kind] + 1)
-        ],
-    )
+    )  # fmt: skip
 
 
 def _quoted(text: str) -> str:

@@ -17,17 +17,21 @@ from ..files import content_of, is_file
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import form_settings
-from ..readers.sections import (
-    LENGTH_UNITS,
-    MODULUS_UNITS,
-    PRESSURE_UNITS,
-    beside,
-)
+from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
-from .cards import FITTED, Cards, NamedCard, read_cards, usual_folder
-from .schema import FitSection, LawSection, ProjectFile, parse
+from .schema import (
+    FITTED,
+    Cards,
+    FitSection,
+    LawSection,
+    NamedCard,
+    ProjectFile,
+    parse,
+    read_cards,
+    usual_folder,
+)
 
 Settings = dict[str, Any]
 #: Data folders: of all tests, or by the name of a test.
@@ -40,10 +44,9 @@ HEAD = "# As it was run: what the project says, with the options of the command.
 class Written:
     """The words of a project file, in its own units.
 
-    text : the file's own. common : [fabric] and [units]. tests : the section of each test by its
-    name, with the folder that its data were taken from; without what it leaves to defaults, which
-    need not go with each other when they are said. whole : each with its defaults. kinds : of the
-    tests, by name. cards : each [[card]], in the order of the file.
+    common : [fabric] and [units]. tests : the section of each test by its name, with the folder of
+    its data, without defaults (which need not go with each other when they are said). whole : each
+    with its defaults. kinds : of the tests, by name. cards : each [[card]].
     """
 
     text: str
@@ -59,8 +62,8 @@ def section_as_run(
 ) -> Settings:
     """Return a test's section with its name, and with the folder of its files in full.
 
-    folder_key : dotted key of the folder; None where the kind has none. base : the project's
-    folder. folder : what the command says instead of the section.
+    folder_key : dotted, None where the kind has none. base : the project's folder. folder : what
+    the command says instead of the section.
     """
     whole = {**plain(said), "name": name}
     if folder_key is None:
@@ -88,10 +91,7 @@ def section_as_run(
 
 
 def settings_of(project: Project, tests: Sequence[str]) -> Settings:
-    """Return what a run of these tests is given, as a project file would say it, without cards.
-
-    Options of the command that change the project are in it; the tests are in the project's order.
-    """
+    """Return what a run of these tests is given, options included, as a project file."""
     written = project.written
     assert written is not None
     settings: Settings = {
@@ -112,10 +112,7 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
 def settings_of_predictions(
     project: Project, tests: Sequence[str], cards: Sequence[str | Path]
 ) -> Settings:
-    """Return what a run of predictions is given, as a project file would say it.
-
-    cards : names of the project's cards, and files.
-    """
+    """Return `settings_of` predictions; cards : names of the project's cards, and files."""
     written = project.written
     assert written is not None
     settings = settings_of(project, tests)
@@ -137,13 +134,9 @@ def project_text(settings: Mapping[str, Any]) -> str:
 
 def _solver_options(project: Project) -> Settings:
     """Return the options that the table of the solver that runs may hold, paths in full."""
-    name = project.fit.solver
-    section = solver_sections().get(name)
-    return {
-        key: _in_full(value)
-        for key, value in plain(project.solver_options.get(name, {})).items()
-        if section is None or key in section.model_fields
-    }
+    section = solver_sections().get(project.fit.solver)
+    options = _in_full(plain(project.solver_options.get(project.fit.solver, {})))
+    return {k: v for k, v in options.items() if section is None or k in section.model_fields}
 
 
 def _in_full(value: Any) -> Any:
@@ -167,11 +160,9 @@ def plain(value: Any) -> Any:
 class Project:
     """A whole project file, in mm, N and MPa where it is not a section.
 
-    path : of the file. fabric : of all tests. tests, cards : by name, in the file's order.
-    law, fit : the sections as they are written, in the units of `scales`. solver_options : by name
-    of a solver, what it is made with. written : what the file says; None without one.
-    scheduler : address of the Dask scheduler whose workers do the runs; None: this machine does.
-    InputError: settings that contradict each other (also after `with_fit`).
+    tests, cards : in the file's order. law, fit : the sections, in the units of `scales`.
+    solver_options : by name of a solver. written : None without a file. scheduler : address of the
+    Dask scheduler whose workers do the runs. InputError: settings that contradict each other.
     """
 
     path: Path
@@ -201,10 +192,7 @@ class Project:
 
     @property
     def run_cache(self) -> RunCache | None:
-        """Return where runs of another program are kept, for all projects; None: nowhere.
-
-        A folder that the project names is beside its file.
-        """
+        """Return where runs of another program are kept, for all projects; None: nowhere."""
         said = self.fit.cache
         return run_cache(beside(self.path.parent, said) if isinstance(said, str) else said)
 
@@ -223,11 +211,7 @@ class Project:
         return replace(self, fit=self.fit.model_copy(update=given))
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
-        """Return the project with another form of the moduli.
-
-        settings : of the form; those that the project has for it stay unless they are given.
-        InputError: no such form, or a setting that it does not know.
-        """
+        """Return the project with another form of the moduli; its settings stay unless given."""
         known, own = form_settings(form), self.law.model_extra or {}
         said = self.law.model_dump(exclude=set(own), exclude_unset=True)
         kept = {key: value for key, value in own.items() if key in known}
@@ -239,8 +223,7 @@ class Project:
     ) -> Project:
         """Return the project with another solver, or with more options for the one that it has.
 
-        options : by name; None leaves an option as it is. settings : each "KEY=VALUE", as in
-        [solver.NAME]. InputError: an option that means nothing to the solver that runs.
+        options : None leaves one as it is. settings : each "KEY=VALUE". InputError: unknown to it.
         """
         solver = name or self.fit.solver
         changed = overridden(solver, self.solver_options.get(solver, {}), options, settings)
@@ -252,8 +235,7 @@ class Project:
     ) -> tuple[Test, ...]:
         """Return tests by name or by kind, in the project's order; all of them where none is named.
 
-        fitted : only those that a fit can match, or only those that are predicted. InputError: a
-        name that is none, or nothing to choose from.
+        fitted : only those that a fit can match, or only those that are predicted. InputError.
         """
         known = kinds()
         names = None if which is None else [which] if isinstance(which, str) else list(which)
@@ -275,10 +257,8 @@ class Project:
 def read_project(path: Path | str, data: Folders | None = None, need_data: bool = True) -> Project:
     """Read a project file (TOML).
 
-    data : where measured files lie, instead of what the sections say: one folder for all tests, or
-    one by the name of a test. need_data : whether measured files must be there (a forward analysis
-    does without). InputError: TOML syntax, missing or unknown keys, wrong units, values out of
-    order, missing data; one line naming the file and the dotted key.
+    data : folder of the measured files, or of each test by name, instead of the file's. need_data :
+    they must be there. InputError: in one line, the file and the dotted key.
     """
     path = Path(path)
     file = parse(path)
@@ -289,16 +269,10 @@ def read_project(path: Path | str, data: Folders | None = None, need_data: bool 
     place = Place(path, "", fabric, scales, None, need_data)
     tests = _tests(file, place, data)
     return Project(
-        path=path,
-        fabric=fabric,
-        scales=scales,
-        tests=tests,
-        law=file.law,
-        fit=file.fit,
-        cards=read_cards(place, file.card),
-        solver_options=solver_settings(path, file.solver),
+        path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
+        cards=read_cards(place, file.card), solver_options=solver_settings(path, file.solver),
         written=_written(file, path, tests, data),
-    )
+    )  # fmt: skip
 
 
 def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, Test]:
@@ -355,20 +329,15 @@ def _names(kind: str, sections: Sequence[Any]) -> list[str]:
 
 
 def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Return cards by name: those given, else the project's, else the one that its fit left.
-
-    InputError: a name that the project does not have, a file that is no card; none at all.
-    """
+    """Return cards by name: those given, else the project's, else that of its fit; InputError."""
     if isinstance(cards, Mapping):
         return dict(cards)
     own = {name: named.card for name, named in project.cards.items()}
     if not cards and not own:
         fitted = usual_folder(project.path) / FITTED
         if not is_file(fitted):
-            problem = (
-                f"the project has no card and there is none in {fitted}: fit first (bubblefit "
-                "fit), name a card's file with --card, or add [[card]]"
-            )
+            problem = f"the project has no card and there is none in {fitted}: fit first "
+            problem += "(bubblefit fit), name a card's file with --card, or add [[card]]"
             raise InputError(project.path, "card", problem)
         card = read_card(fitted)
         return {card.name or fitted.stem: card}
@@ -388,10 +357,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
-    """Return the project's names, and the files, of the cards that `chosen_cards` gives.
-
-    None where they were handed over as they are, by Python: they have neither.
-    """
+    """Return names in the project and files of `chosen_cards`; None where Python gave them."""
     if isinstance(cards, Mapping):
         return None
     if not cards:

@@ -1,18 +1,24 @@
-"""Describe the project file as it is written: what all tests share, in the file's own units."""
+"""The project file as it is written, in its own units: sections, schema, and its [[card]]s."""
 
 from __future__ import annotations
 
 import functools
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from ..errors import InputError
+from ..experiments.kinds import Place
 from ..experiments.registry import kind_named, kinds
 from ..files import plug_in_named, plug_ins, toml_of
+from ..materials.card import MaterialCard, read_card
+from ..materials.forms.base import UNLIMITED, form_named
+from ..materials.law import HypoelasticLaw
 from ..readers.sections import (
     LengthUnit,
     ModulusUnit,
@@ -26,7 +32,6 @@ from ..readers.sections import (
     first_error,
 )
 from ..solvers.registry import solver_sections
-from .cards import CardSection
 
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
@@ -65,10 +70,7 @@ class MarginSection(Section):
 
 
 class LawSection(Section):
-    """[law]: the form of the moduli, and between what they are looked for.
-
-    Keys beyond these belong to a form (knots, breaks); it checks them.
-    """
+    """[law]: the form of the moduli, and their bounds; keys beyond these are the form's."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Any] = Field(init=False)
@@ -124,6 +126,32 @@ class CommonSections(Section):
     fit: FitSection = FitSection()
 
 
+#: Keys that a card's own file says.
+OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_range")
+NU12, FORM = 0.24, "cubic"
+#: Cards by name; or names in the project and files; none for the project's own.
+Cards = Mapping[str, MaterialCard] | Sequence[str | Path] | None
+#: The card that a fit leaves in its folder.
+FITTED = "material.toml"
+
+
+class CardSection(Section):
+    """A card's file, or coefficients; keys beyond these (knots, breaks) belong to the form."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+    __pydantic_extra__: dict[str, Any] = Field(init=False)
+
+    name: Name | None = None
+    file: str | None = None
+    beta: list[Number] | None = None
+    form: str | None = None
+    nu12: Annotated[float, Field(ge=0, lt=1)] | None = None
+    thickness: Positive | None = None
+    thickness_change: Literal["constant", "incompressible"] | None = None
+    strain_range: StrainTriple | None = None
+    test: str | None = None
+
+
 #: Most tables of one sort: more is a mistake in whatever wrote the file.
 MANY = 1000
 OLD = (
@@ -162,9 +190,7 @@ def _list_of(section: type[BaseModel]) -> Any:
 def parse(path: Path) -> ProjectFile:
     """Parse a project file; tests have the keys of [defaults.KIND] that they do not say.
 
-    InputError: TOML syntax, a file of version 0.1, missing or unknown keys, values that cannot be
-    meant; one line naming the file and the dotted key. PlugInFailure: a kind of test that a plug-in
-    offers, and that does not work.
+    InputError: in one line, the file and the dotted key. PlugInFailure: of a kind of test.
     """
     content = _content(path)
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
@@ -217,10 +243,9 @@ DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
-    """Return the schema of a whole file, as plain data, kinds of plug-ins included or not.
+    """Return the schema of a whole file, as plain data.
 
-    A test may have its keys from [defaults.KIND], so that none is required here; bubblefit itself
-    says which are missing.
+    A test may have its keys from [defaults.KIND], so that none is required here.
     """
     schema = project_file().model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
@@ -278,18 +303,75 @@ def _plain(part: Any) -> Any:
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
     """Return the names of the definitions that a part of the schema leads to."""
-    used: set[str] = set()
-    waiting = [part]
+    used, waiting = set[str](), [part]
     while waiting:
         one = waiting.pop()
         if isinstance(one, dict):
             target = one.get("$ref")
-            if isinstance(target, str):
-                name = target.removeprefix(REFERENCE)
-                if name not in used:
-                    used.add(name)
-                    waiting.append(definitions[name])
+            if isinstance(target, str) and (name := target.removeprefix(REFERENCE)) not in used:
+                used.add(name)
+                waiting.append(definitions[name])
             waiting += one.values()
-        elif isinstance(one, Sequence) and not isinstance(one, str):
+        elif isinstance(one, list):
             waiting += one
     return used
+
+
+def usual_folder(project: Path) -> Path:
+    """Return out/NAME below the current folder, after the project's folder and file."""
+    name = project.resolve().parent.name
+    return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
+
+
+@dataclass(frozen=True, eq=False)
+class NamedCard:
+    """A material card and, where it is known, the sort of test that it was fitted to."""
+
+    card: MaterialCard
+    test: str | None = None
+
+
+def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:
+    """Return the cards by name, in the order of the file; InputError."""
+    cards: dict[str, NamedCard] = {}
+    for i, section in enumerate(sections):
+        at = f"card[{i}]"
+        if (section.file is None) == (section.beta is None):
+            raise InputError(place.path, at, "expected exactly one of 'file' and 'beta'")
+        card = _of_file(place, at, section) if section.file else _of_table(place, at, section)
+        if card.name in cards:
+            problem = f"{card.name!r} is there twice; name one of them"
+            raise InputError(place.path, f"{at}.name", problem)
+        cards[card.name] = NamedCard(card, section.test)
+    return cards
+
+
+def _of_file(place: Place, at: str, section: CardSection) -> MaterialCard:
+    extra = list(section.model_extra or {})
+    for key in (*OF_THE_FILE, *extra):
+        if key in extra or getattr(section, key) is not None:
+            problem = "is said by the card's file; leave this out"
+            raise InputError(place.path, f"{at}.{key}", problem)
+    source = place.path.parent / str(section.file)
+    card = read_card(source)
+    return replace(card, name=section.name or card.name or source.stem)
+
+
+def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:
+    if section.name is None:
+        raise InputError(place.path, f"{at}.name", "this key is missing; add it")
+    own, thickness = section.thickness, place.fabric.thickness
+    thickness = thickness if own is None else own * place.scales.length
+    ends = section.strain_range or [UNLIMITED] * 3
+    try:
+        form = form_named(section.form or FORM, section.model_extra or {}, ends)
+        law = HypoelasticLaw(
+            place.scales.modulus * np.array(section.beta),
+            NU12 if section.nu12 is None else section.nu12,
+            np.array(ends),
+            section.thickness_change or place.fabric.thickness_change,
+            form,
+        )
+    except InputError as error:
+        raise InputError(place.path, f"{at}.{error.field}", error.problem) from None
+    return MaterialCard(law, thickness, section.name)

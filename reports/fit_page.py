@@ -21,8 +21,7 @@ from ..inference.posterior import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
-from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Store
-from ..runs.record import Record
+from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
 from ..runs.result import STRAINS, Fit, answer_at, coefficients_of
 from .charts import Charts
 from .content import Download, Facts, Listing, Part, Report, Section, Table, Words

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
-from ..files import __version__, replacing, write_notes, write_text
+from ..files import __version__, json_text, replacing, write_notes, write_text
 from ..runs.fit import Check
 from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Store
 from ..runs.predictions import Predictions
@@ -123,7 +123,7 @@ def _notes(predictions: Predictions) -> list[Table]:
 def write_check(check: Check, folder: Path) -> Path:
     """Write check.json, the tests' own figures and report.html; return the page's path."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "check.json", json.dumps(check.result, indent=1) + "\n")
+    write_text(folder / "check.json", json_text(check.result))
     several = len(check.setup.tests) > 1
     exhibits: list[tuple[str, Exhibit]] = []
     for one in check.setup.tests:

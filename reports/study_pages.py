@@ -5,7 +5,6 @@ A function a study, found by the type of its result (`runs.folder`); all end in 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from pandas.api.types import is_numeric_dtype
 from ..errors import NOTES, NOTES_ARE, SolverFailure, percent
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
-from ..files import replacing, write_notes, write_text
+from ..files import json_text, replacing, write_notes, write_text
 from ..inference.likelihood import THRESHOLD
 from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS
@@ -79,7 +78,7 @@ def write_folder(
     write_notes(folder, study.notes)
     warnings, files = [note.line for note in study.notes], [*page.files, *FILES]
     written = write_report(folder, replace(page, warnings=warnings, files=files))
-    write_text(folder / RESULT, json.dumps(study.result, indent=1) + "\n")
+    write_text(folder / RESULT, json_text(study.result))
     return written
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -36,8 +35,8 @@ from ..materials.card import CardCertainty, MaterialCard, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from .series import card_of, card_words, fitted_card
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
+from .simulation import GivenCard, card_of, card_words, fitted_card
 from .starts import StartRecord
 
 #: Kinds of notes that are made here.
@@ -58,10 +57,9 @@ LEAST_STRAIN = 1e-6
 class BestFit:
     """The best fit, run again.
 
-    point : analysis by the project's solver. differentiated : same point by the solver that
-    differentiates, if it could. ranked : starts with a fit, best first. records : all starts, by
-    number. reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. certainty : of
-    `with_certainty`; None without derivatives.
+    point : by the project's solver. differentiated : the same by the solver that differentiates, if
+    it could. ranked : starts with a fit, best first. records : all, by number. reached : (3,)
+    largest (eps1, eps2, gamma12) in all tests. certainty : None without derivatives.
     """
 
     point: Evaluation
@@ -86,11 +84,8 @@ class BestFit:
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
     """Run the best of the starts again; another program gets a second try.
 
-    tolerance : objectives below it are the same.
-
-    Raises
-    ------
-    SolverFailure : the best fit does not run again, or gives another objective.
+    tolerance : objectives below it are the same. SolverFailure : it does not run again, or gives
+    another objective.
     """
     ranked = ranking(records)
     problem.reset()
@@ -160,10 +155,9 @@ LEAST = 0.01
 
 
 def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
-    """Return the limit of the best fit on ever finer meshes, and its residual.
+    """Return the limit of the best fit on ever finer meshes; InputError, SolverFailure.
 
-    None without derivatives, if another program runs the tests (it is not run unasked), or if a
-    kind of test has no finer model. Raises InputError, SolverFailure of the finer model.
+    None without derivatives, for another program (not run unasked), or without a finer model.
     """
     if best.differentiated is None or problem.solver.external:
         return None
@@ -213,7 +207,7 @@ NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """Return the best fit with its certainty, if its derivatives are known.
 
-    Noise is the residual of finer models. If the project asks for it, the law is that of ever finer
+    Noise is the residual of finer models. With `mesh_error` taken out the law is that of ever finer
     meshes; the analysis stays that of the fit.
     """
     slopes = best.differentiated
@@ -277,8 +271,7 @@ def card_certainty(
 ) -> CardCertainty | None:
     """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
 
-    With an error of the mesh that is not taken out, draws lie about the law of ever finer meshes:
-    its distance from the card's counts as a standard deviation.
+    With an error of the mesh not taken out, draws lie about the law of ever finer meshes.
     """
     sure = best.certainty
     known = None if sure is None else sure.fine or sure.posterior
@@ -292,13 +285,9 @@ def card_certainty(
 
 
 #: A card, its file or its name; None for that of the project's fit.
-Card = MaterialCard | Path | str | None
-
-
+Card = GivenCard | None
 #: Limit of analyses from the card to the optimum, and damping of the first.
 MOST, DAMPING = 40, 1e-6
-
-
 #: Relative change of a modulus beyond which the card was not the optimum.
 MOVED = 0.02
 
@@ -307,7 +296,7 @@ MOVED = 0.02
 class Optimum:
     """A fit's optimum, found again from its card, with derivatives and certainty.
 
-    card : name of the card. moved : largest relative change of each modulus from the card.
+    moved : largest relative change of each modulus from the card.
     """
 
     setup: FitSetup
@@ -346,12 +335,8 @@ class Optimum:
 def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> Optimum:
     """Find the optimum of the project's fit from a card, by a solver that differentiates.
 
-    card : of a fit of these tests; unless given that of the project's fit in its usual folder.
-
-    Raises
-    ------
-    InputError : in the project or its data; no card, or one of another form. SolverFailure : the
-        tests cannot be run with it.
+    card : by default that of the project's fit. InputError : in the project or its data; no card,
+    or one of another form. SolverFailure : the tests cannot be run with it.
     """
     notes = []
     named = project.fit.solver
@@ -387,10 +372,8 @@ def _unknowns(setup: FitSetup, problem: FitProblem, card: MaterialCard) -> Array
     """Return the unknowns (count,) of a card; raises InputError for another form."""
     own, unknowns = card.law.form, problem.unknowns
     if own != setup.law.form:
-        expected = (
-            f"expected a card of this project's fit: its moduli are {setup.law.form.describe()}, "
-            f"those of the card {own.describe()}"
-        )
+        expected = "expected a card of this project's fit: its moduli are "
+        expected += f"{setup.law.form.describe()}, those of the card {own.describe()}"
         raise InputError(setup.project.path, "--card", expected)
     y = unknowns.at(card.law.beta[list(unknowns.free)])
     known = {"nu12": card.law.nu12, "thickness": card.thickness}

@@ -26,8 +26,8 @@ from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Presented, Store
-from .series import StudyRecord
 from .setup import fingerprints
+from .simulation import StudyRecord
 from .validation import TESTS, name_of, parts_of
 
 if TYPE_CHECKING:

@@ -25,8 +25,8 @@ from .executor import executor_of
 from .fit import FitEvent, stored_fit
 from .folder import Presented
 from .result import Fit
-from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
+from .simulation import StudyRecord, begin_study
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,13 +18,20 @@ from ..experiments.registry import kinds
 from ..files import __version__
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
-from ..project.project import Project, settings_of
+from ..project.project import Project, plain, settings_of
+from ..solvers.base import Solver
 from .best import BestFit, best_fit, with_certainty
 from .executor import Task, executor_of
-from .folder import Store, failure_page, write_report
-from .record import Record, data_rows, facts_of, solver_facts, this_run
+from .folder import (
+    NAMES,
+    Record,
+    Store,
+    failure_page,
+    solver_facts,
+    write_report,
+)
 from .result import Fit
-from .setup import FitSetup, coarse_problem, fingerprints, prepare_fit
+from .setup import UNCOUNTED, FitSetup, coarse_problem, fingerprints, prepare_fit
 from .starts import (
     HISTORY,
     STARTS,
@@ -59,12 +66,12 @@ def distinct(
     """
     groups: list[list[StartRecord]] = []
     for record in sorted(records, key=lambda r: r.number):
-        same = (g for g in groups if _are_one(problem, g[0], record, tolerance))
-        group = next(same, None)
-        if group is None:
-            groups.append([record])
+        for group in groups:
+            if _are_one(problem, group[0], record, tolerance):
+                group.append(record)
+                break
         else:
-            group.append(record)
+            groups.append([record])
     return groups
 
 
@@ -102,11 +109,7 @@ def every_start(
 
     Coarse to fine, all starts run on quads of twice the edge, as most analyses only come near an
     optimum; one start of each distinct optimum is continued on the full mesh, the others take its
-    fit.
-
-    Parameters
-    ----------
-    done : starts that ended before. ran : receives every record as it ends, None now and then.
+    fit. done : starts that ended before. ran : receives every record as it ends, None now and then.
     told : receives a stage as it begins, and its earlier records.
     """
     fit, executor = setup.project.fit, executor_of(setup.project)
@@ -125,7 +128,7 @@ def every_start(
     for record in coarse.values():
         told(record)
     missing = [n for n in range(fit.starts) if n not in coarse]
-    build = functools.partial(_coarse_problem, setup)
+    build: Any = functools.partial(coarse_problem, setup)
     coarse |= _ended(executor.run_starts(build, setup.options, fit.seed, missing, "coarse"), ran)
 
     groups = distinct(setup.problem(), list(coarse.values()), fit.tolerance)
@@ -155,12 +158,6 @@ def _ended(
         if isinstance(record, StartRecord):
             ended[record.number] = record
     return ended
-
-
-def _coarse_problem(setup: FitSetup) -> FitProblem:
-    problem = coarse_problem(setup)
-    assert problem is not None  # it was there before
-    return problem
 
 
 def _continuation(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
@@ -230,32 +227,23 @@ def fit(
 ) -> Fit:
     """Fit the law of a project to its tests, from random feasible starts.
 
-    Parameters
-    ----------
-    tests : names of tests, or a kind of test; unless given all that can be fitted.
+    tests : names of tests, or a kind of test; by default all that can be fitted.
     starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
     scheduler : address of a Dask scheduler, whose workers run the starts.
     starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", from the evaluations in
         the folder `earlier`.
     trust : names of doubts about the data to ignore, beside those of the project.
-    out : folder in which analyses and starts are written as they end, for `resume`, also after
-        Ctrl-C; without it nothing is written. overwrite : replace its content.
-    progress : receives every record, None now and then. command_line : for the record.
-
-    Raises
-    ------
-    InputError : in the project or its data, or nothing to resume. OutputError : the folder is used
-        or cannot be written. NoFeasibleStart : of all starts. SolverFailure : the solver is not
-        there, failed in every start, or the best fit does not run again or gives another objective:
-        then the page in `out` says so, and there is no result.
+    out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
+        content. progress : receives every record, None now and then. command_line : for the record.
+    InputError : in the project or its data, or nothing to resume. OutputError. NoFeasibleStart : of
+        all starts. SolverFailure : the solver is not there, failed in every start, or the best fit
+        does not run again or gives another objective: then the page in `out` says so.
     """
     begun = time.perf_counter()
-    trusted = [*project.fit.trust, *trust]
-    project = project.with_fit(starts=starts, seed=seed, method=method, jobs=jobs, trust=trusted)
     project = project.with_fit(
-        starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute())
-    )
-    project = project.with_scheduler(scheduler)
+        starts=starts, seed=seed, method=method, jobs=jobs, trust=[*project.fit.trust, *trust],
+        starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute()),
+    ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     with timed("tests and their data made ready"):
@@ -264,7 +252,9 @@ def fit(
     judgements = judge(setup)
     for judgement in judgements:
         judgement.demand(project.path)
-    record = _record(setup, problem, command_line)
+    named = [(test.test.name, test) for test in setup.tests]
+    settings = settings_of(project, [n for n, _ in named]) if project.written is not None else None
+    record = Record.of(project, settings, named, problem.solver, command_line)
     files = None
     done: list[StartRecord] = []
     if out is not None:
@@ -281,22 +271,10 @@ def fit(
         done = files.begin(resume)
     with failure_page(None if out is None else Path(out), project.title):
         with timed("all starts"):
-            records = _records(setup, files, done, progress or _nobody)
+            records = _records(setup, files, done, progress or (lambda record: None))
         with timed("the best fit once more, and how sure it is"):
             best = with_certainty(setup, problem, _best(problem, records, project))
     return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
-
-
-def _record(setup: FitSetup, problem: FitProblem, command_line: Sequence[str] | None) -> Record:
-    project, tests = setup.project, [(test.test.name, test) for test in setup.tests]
-    return Record(
-        project.path,
-        None if project.written is None else project.written.text,
-        None if project.written is None else settings_of(project, [name for name, _ in tests]),
-        data_rows(tests),
-        solver_facts(project.fit.solver, problem.solver.identity),
-        [this_run(command_line)],
-    )
 
 
 def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:
@@ -311,10 +289,7 @@ def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project)
 
 
 def _records(
-    setup: FitSetup,
-    files: RunningFiles | None,
-    done: Sequence[StartRecord],
-    progress: Progress,
+    setup: FitSetup, files: RunningFiles | None, done: Sequence[StartRecord], progress: Progress
 ) -> list[StartRecord]:
     """Return finished starts and run the others side by side."""
 
@@ -332,10 +307,6 @@ def _records(
     if files is not None:
         files.finish()
     return records
-
-
-def _nobody(record: Any) -> None:
-    """Ignore a record."""
 
 
 def stored_fit(
@@ -419,16 +390,12 @@ class Check:
         """Return everything in plain values, as check.json holds it."""
         tests = {
             j.test: [
-                {
-                    "name": d.name,
-                    "severity": "error" if d.sure else "warning",
-                    "trusted": d.name in j.trusted,
-                    "text": d.text,
-                }
+                {"name": d.name, "severity": "error" if d.sure else "warning",
+                 "trusted": d.name in j.trusted, "text": d.text}
                 for d in j.doubts
             ]
             for j in self.judgements
-        }
+        }  # fmt: skip
         return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
 
     def rows(self) -> list[tuple[str, str, str, str]]:
@@ -461,12 +428,47 @@ def check(
 ) -> Check:
     """Look at the data of tests, by default of all that can be fitted.
 
-    trust : names of doubts to ignore, beside those of the project.
-
-    Raises
-    ------
-    InputError : unreadable data, an unknown doubt. SolverFailure : a known solution does not run.
+    trust : names of doubts to ignore, beside those of the project. InputError : unreadable data, an
+    unknown doubt. SolverFailure : a known solution does not run.
     """
     project = project.with_fit(trust=[*project.fit.trust, *trust])
     setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
     return Check(setup, judge(setup))
+
+
+def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return all that a fit's starts depend on, as `folder.Facts`; data : of `data_rows`."""
+    names = [test.test.name for test in setup.tests]
+    files = {
+        name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
+        for name in names
+    }
+    return {
+        "version": __version__,
+        "solver": solver_facts(setup.project.fit.solver, solver.identity),
+        **_of_project(setup.project, names),
+        "files": files,
+    }
+
+
+def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
+    written = project.written
+    if written is None:  # of no file
+        return {"settings": {}, "tests": {name: {} for name in names}}
+    whole = settings_of(project, names)
+    law = {f"law.{key}": value for key, value in whole["law"].items()}
+    fit = {f"fit.{k}": v for k, v in whole["fit"].items() if k not in UNCOUNTED}
+    fabric = {f"fabric.{k}": v for k, v in whole["fabric"].items() if k not in NAMES}
+    units = {f"units.{key}": value for key, value in whole["units"].items()}
+    return {
+        "settings": {**fabric, **units, **law, **fit},
+        "tests": {name: _without(written.whole[name]) for name in names},
+    }
+
+
+def _without(section: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without(value) if isinstance(value, Mapping) else plain(value)
+        for key, value in section.items()
+        if key not in NAMES
+    }

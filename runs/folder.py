@@ -1,14 +1,23 @@
-"""The output folder of a run: its store, kept runs and analyses, resuming, and its presenter."""
+"""The output folder of a run: its store, kept runs and analyses, resuming, the record, presenters.
+
+The record, provenance.json: project, data files, command, date, machine, versions.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import importlib.metadata
 import importlib.util
 import json
+import os
+import platform
 import re
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +25,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, NoFeasibleStart, Note, NoteKind, OutputError, SolverFailure
-from ..experiments.kinds import RunRecord
-from ..files import output_errors, remove_unfinished, replacing, write_text
-from ..solvers.base import History
+from ..experiments.kinds import RunRecord, files_of
+from ..files import (
+    __version__,
+    checksum,
+    json_text,
+    output_errors,
+    remove_unfinished,
+    replacing,
+    write_text,
+)
+from ..project.project import Project, project_text
+from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 
 if TYPE_CHECKING:
@@ -29,7 +47,6 @@ DIGITS = 12
 #: Differences of lists that are listed one by one; length of texts.
 FEW, LONG = 3, 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
-NOT_SAID = "not given"
 
 #: All that results depend on, in plain values: `version` of bubblefit; `solver`, name and
 #: identity; `settings` of the project file; `tests`, settings by name; `files`, name and sha256 of
@@ -40,7 +57,11 @@ Facts = Mapping[str, Any]
 def differences(before: Facts, now: Facts) -> list[str]:
     """Return the differences of two runs, one each: key, old value, new value."""
     words = list(_values("version of bubblefit", before.get("version"), now.get("version")))
-    words += _solvers(before.get("solver", {}), now.get("solver", {}))
+    one, other = before.get("solver", {}), now.get("solver", {})
+    if one.get("name") != other.get("name"):  # what one says of itself, the other cannot
+        words += _values("the solver", one.get("name"), other.get("name"))
+    else:
+        words += _tables(f"the solver {other.get('name')}: ", one, other)
     words += _tables("", before.get("settings", {}), now.get("settings", {}))
     tests, others = before.get("tests", {}), now.get("tests", {})
     if list(tests) != list(others):
@@ -51,13 +72,6 @@ def differences(before: Facts, now: Facts) -> list[str]:
             files = before.get("files", {}).get(name, []), now.get("files", {}).get(name, [])
             words += _files(name, *files)
     return words
-
-
-def _solvers(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    if before.get("name") != now.get("name"):
-        yield from _values("the solver", before.get("name"), now.get("name"))
-        return  # what one says of itself, the other cannot
-    yield from _tables(f"the solver {now.get('name')}: ", before, now)
 
 
 def _tables(head: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
@@ -79,7 +93,7 @@ def _values(key: str, before: Any, now: Any) -> Iterable[str]:
 
 def _said(value: Any) -> str:
     if value is None:
-        return NOT_SAID
+        return "not given"
     if isinstance(value, str) and CHECKSUM.fullmatch(value):
         return f"sha256 {value[:DIGITS]}"
     text = json.dumps(value, ensure_ascii=False)
@@ -112,12 +126,11 @@ OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
 PARTS, FACTS = "parts", "facts"
 
 
-class Store:
-    """A folder of one fit, or of one series of predictions.
+NOTHING_THERE = "holds nothing to go on with; leave --resume out, or name another with --out"
 
-    run.json holds its origin; result.json is written last and removed first, so that with it
-    everything is complete.
-    """
+
+class Store:
+    """A folder of one fit or series of predictions: run.json, its origin; last result.json."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -137,26 +150,16 @@ class Store:
     ) -> bool:
         """Make the folder ready; return `resume`.
 
-        Parameters
-        ----------
-        parts : digests of what must be the same to resume, by name (project, data, solver,
-            version); empty if every record carries a digest.
-        records : files below the folder to remove unless resumed.
-        facts : behind the digests, to describe a difference.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written, or is used without `resume` or `overwrite`.
-        InputError : nothing to resume, something else (named), or not readable.
+        parts : digests of what must be the same to resume, by name; empty if every record carries
+        one. records : files below the folder to remove unless resumed. facts : behind the digests,
+        to describe a difference. OutputError : the folder cannot be written, or is used without
+        `resume` or `overwrite`. InputError : nothing to resume, something else, or not readable.
         """
         if self.used and not (resume or overwrite):
-            raise OutputError(
-                f"{self.path}: already holds results; go on with --resume, replace them with "
-                "--overwrite, or name another folder with --out"
-            )
+            problem = "already holds results; go on with --resume, replace them with --overwrite"
+            raise OutputError(f"{self.path}: {problem}, or name another folder with --out")
         if resume and not self.used:
-            problem = "holds nothing to go on with; leave --resume out, or name another with --out"
-            raise InputError(self.path, "", problem)
+            raise InputError(self.path, "", NOTHING_THERE)
         if resume:
             self._check(parts, facts or {})
         remove_unfinished(self.path)
@@ -181,7 +184,7 @@ class Store:
 
     def finish(self, result: Mapping[str, Any]) -> None:
         """Write result.json, after everything else; raises OutputError."""
-        self.write(RESULT, json.dumps(result, indent=1, allow_nan=False) + "\n")
+        self.write(RESULT, json_text(result))
 
     def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
         path = self.path / RUN
@@ -206,8 +209,6 @@ CSV, PARQUET = ".csv", ".parquet"
 def write_table(table: pd.DataFrame, path: Path | str) -> Path:
     """Write a table as .csv (nine digits) or .parquet (exact), by the ending of the file's name.
 
-    Raises
-    ------
     InputError : another ending, or Parquet without pyarrow. OutputError.
     """
     path = Path(path)
@@ -248,15 +249,10 @@ class RunRecords:
         """Write a run unless it failed: that is tried again next time; raises OutputError."""
         if record.failure:
             return
-        words = {
-            "seconds": record.seconds,
-            "early": record.early,
-            "iterations": record.iterations,
-            "unstable": record.unstable,
-            "remarks": [(note.kind, note, note.of) for note in record.remarks],
-            "arrays": list(record.arrays),
-            "from_cache": record.from_cache,
-        }
+        plain = ("seconds", "early", "iterations", "unstable", "from_cache")
+        words = {name: getattr(record, name) for name in plain}
+        words["remarks"] = [(note.kind, note, note.of) for note in record.remarks]
+        words["arrays"] = list(record.arrays)
         arrays: dict[str, Any] = {f"of_{name}": array for name, array in record.arrays.items()}
         arrays["words"] = np.array(json.dumps(words))
         arrays["strain"] = np.empty(0) if record.strain is None else record.strain
@@ -300,8 +296,7 @@ class KeptAnalyses(RunCache):
     def __init__(self, folder: Path, resume: bool) -> None:
         super().__init__(folder / FOLDER)
         if resume and not self.folder.is_dir():
-            problem = "holds nothing to go on with; leave --resume out, or name another with --out"
-            raise InputError(folder, "", problem)
+            raise InputError(folder, "", NOTHING_THERE)
         self._resume, self._begun = resume, False
 
     def read(self, key: str) -> History | None:
@@ -372,3 +367,117 @@ def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
             with suppress(OutputError):  # the failure itself says more
                 present.write_failure(folder, title, said, more)
         raise
+
+
+PACKAGES = ("numpy", "scipy", "numba", "nlopt", "quadprog", "meshio")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of bubblefit, Python and `PACKAGES` by name."""
+    of = {name: importlib.metadata.version(name) for name in PACKAGES}
+    return {"bubblefit": __version__, "python": platform.python_version(), **of}
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """The origin of a folder's results.
+
+    project : path of its file. text : of that file. settings : of `settings_of`; None if it cannot
+    be run again. data : of `data_rows`. runs : of `this_run`, those that were resumed first.
+    """
+
+    project: Path
+    text: str | None
+    settings: Mapping[str, Any] | None
+    data: Sequence[Mapping[str, Any]]
+    solver: Mapping[str, str]
+    runs: Sequence[Mapping[str, Any]]
+
+    @classmethod
+    def of(
+        cls,
+        project: Project,
+        settings: Mapping[str, Any] | None,
+        tests: Iterable[tuple[str, object]],
+        solver: Solver,
+        command_line: Sequence[str] | None,
+    ) -> Record:
+        """Return the record of a run that begins now; command_line : None if called from Python."""
+        text = None if project.written is None else project.written.text
+        facts = solver_facts(project.fit.solver, solver.identity)
+        return cls(project.path, text, settings, data_rows(tests), facts, [this_run(command_line)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain values, as provenance.json holds them."""
+        text = self.text
+        return {
+            "project": {
+                "file": os.path.abspath(self.project),
+                "sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
+                "text": text,
+                "as_run": None if self.settings is None else project_text(self.settings),
+            },
+            "data": [dict(row) for row in self.data],
+            "solver": dict(self.solver),
+            "runs": [dict(run) for run in self.runs],
+        }
+
+    def after(self, folder: Path) -> Record:
+        """Return the record after the runs of the folder's own, unless that is damaged."""
+        try:
+            runs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["runs"]
+            before = [dict(run) for run in runs]
+        except (OSError, ValueError, KeyError, TypeError):
+            return self
+        return replace(self, runs=[*before, *self.runs])
+
+    def write(self, folder: Path) -> None:
+        """Write provenance.json, and the project as run; raises OutputError."""
+        content = self.to_json()
+        if self.settings is not None:
+            write_text(folder / AS_RUN, content["project"]["as_run"])
+        write_text(folder / PROVENANCE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+
+    @property
+    def files(self) -> list[tuple[str, str]]:
+        """Return its files and their descriptions."""
+        project = [] if self.settings is None else [(AS_RUN, "the project as run, to run again")]
+        return [(PROVENANCE, "what these results came from"), *project]
+
+
+def data_rows(tests: Iterable[tuple[str, object]]) -> list[dict[str, Any]]:
+    """Return checksum, format, columns, units and rows of each measured file; InputError."""
+    return [
+        {
+            "test": name, "file": os.path.abspath(file.path), "name": file.path.name,
+            "sha256": checksum(file.path), "format": file.source.format,
+            "columns": dict(file.source.columns), "units": dict(file.source.units),
+            "rows_used": file.used, "rows_dropped": dict(file.dropped),
+            "notes": list(file.source.notes),
+        }
+        for name, test in tests
+        for file in files_of(test)
+    ]  # fmt: skip
+
+
+def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
+    """Return date, machine and versions of now; command_line : None if called from Python."""
+    return {
+        "command_line": None if command_line is None else list(command_line),
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "folder": os.getcwd(),
+        "machine": {"name": platform.node(), "system": platform.platform(),
+                    "processor": platform.machine()},
+        "versions": versions(),
+    }  # fmt: skip
+
+
+#: Settings of a test that change no result.
+NAMES = ("name", "folder")
+
+
+def solver_facts(name: str, identity: str) -> dict[str, str]:
+    """Return a solver's identity in parts: version and element of "ccx 2.20; element=S8R"."""
+    itself, *settings = identity.split("; ")
+    pairs = [setting.partition("=")[::2] for setting in settings]
+    return {"name": name, "version": itself, **dict(pairs)}

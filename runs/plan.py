@@ -36,9 +36,8 @@ from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .folder import Presented
-from .series import card_of, card_words, fitted_card, thickness_notes
 from .setup import FitSetup, prepare_fit
-from .simulation import FAILED
+from .simulation import FAILED, card_of, card_words, fitted_card, thickness_notes
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,8 +17,17 @@ from ..project.project import Project
 from ..solvers.base import History
 from ..solvers.run_cache import RunCache
 from .folder import Presented
-from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
-from .simulation import FAILED, Progress
+from .simulation import (
+    FAILED,
+    Part,
+    Progress,
+    Series,
+    card_of,
+    card_words,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,7 +180,7 @@ def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
     law = series.card.law
 
     def run(nu12: float) -> History:
-        return series.run(part, replace(law, nu12=nu12))
+        return series.run_part(part, replace(law, nu12=nu12))
 
     base = run(law.nu12)
     notes, failed = [note.about(f"nu12 = {law.nu12:g}") for note in series.notes(base)], {}

@@ -28,14 +28,20 @@ from ..experiments.kinds import (
 from ..experiments.registry import kind_named
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..project.cards import Cards
 from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
+from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .executor import Task, executor_of
-from .folder import PROVENANCE, RunRecords, failure_page, write_report
-from .record import Record, data_rows, solver_facts, this_run, versions
+from .folder import (
+    PROVENANCE,
+    Record,
+    RunRecords,
+    failure_page,
+    versions,
+    write_report,
+)
 from .starts import log_run
 
 if TYPE_CHECKING:
@@ -94,7 +100,7 @@ class Predictions:
 
     @property
     def notes(self) -> list[Note]:
-        """Return the notes of "TEST with CARD" or "TEST with CARD, WALL"."""
+        """Return the notes, of "TEST with CARD" or "TEST with CARD, WALL"."""
         return [as_note(note).about(run.title) for run in self.each for note in run.notes]
 
     @property
@@ -104,10 +110,7 @@ class Predictions:
 
     @property
     def worst(self) -> float | None:
-        """Return the largest RMS error over the largest measured value; None if none is compared.
-
-        The other end of a band is no prediction.
-        """
+        """Return the largest `error` of a prediction; None if none is compared."""
         errors = [self.error(i) for i, run in enumerate(self.each) if run.predicted]
         return max((e for e in errors if e is not None), default=None)
 
@@ -132,12 +135,13 @@ class Predictions:
 
     def silent(self) -> list[int]:
         """Return the numbers of the runs of measured tests that gave nothing to compare."""
-        measured = [
+        return [
             i
             for i, run in enumerate(self.each)
-            if run.predicted and predicted_kind(run.test.kind).measured(run.test)
+            if run.predicted
+            and predicted_kind(run.test.kind).measured(run.test)
+            and self.error(i) is None
         ]
-        return [i for i in measured if self.error(i) is None]
 
     def runs(self) -> pd.DataFrame:
         """Return a row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
@@ -227,27 +231,20 @@ def predict(
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
 
-    Both ends of a solver's band are run (`PredictedRun.end`). Predictions are also run with laws
-    around a card's that has a certainty, for their spread (`PredictedRun.around`).
+    Both ends of a solver's band are run (`PredictedRun.end`), and laws around that of a card with a
+    certainty, for the spread (`PredictedRun.around`).
 
-    Parameters
-    ----------
-    tests : names of tests, or a kind of test; unless given all that are not fitted.
-    cards : by name; or names of the project's cards and files of others; unless given the
-        project's, else the one that its fit left in the usual folder.
-    samples : laws drawn from the certainty of each card; 0 for no spread; unless given, steps along
-        its few least certain directions are run, but not by another program.
+    tests : names of tests, or a kind of test; by default all that are not fitted.
+    cards : by name; or names of the project's cards and files of others; by default the project's,
+        else the one that its fit left in the usual folder.
+    samples : laws drawn from the certainty of each card; 0 for no spread; by default steps along
+        its few least certain directions, but not by another program.
     jobs : processes; by default the project's, else all cores. scheduler : address of a Dask
         scheduler, whose workers do the runs.
-    out : folder in which runs are written as they end, for `resume`, also after Ctrl-C; without it
-        nothing is written. overwrite : replace its content.
+    out : folder in which runs are written as they end, for `resume`. overwrite : its content.
     progress : receives every run that ended, None now and then. command_line : for the record.
-
-    Raises
-    ------
-    InputError : no such test or card, a test without a model of a card's thickness, or nothing to
-        resume. OutputError : the folder is used or cannot be written. SolverFailure : the solver is
-        not there, or no run ended well.
+    InputError : no such test or card, no model of a card's thickness, nothing to resume.
+        OutputError. SolverFailure : the solver is not there, or no run ended well.
     """
     begun = time.perf_counter()
     project = project.with_scheduler(scheduler)
@@ -257,7 +254,11 @@ def predict(
     options = project.options_of(name)
     solver = usable_solver(name, options, project.path, cache=project.run_cache)
     pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
-    record = _record(project, chosen, card_sources(project, cards), solver, command_line)
+    sources, settings = card_sources(project, cards), None
+    if project.written is not None and sources is not None:
+        settings = settings_of_predictions(project, [test.name for test in chosen], sources)
+    named = [(test.name, test) for test in chosen]
+    record = Record.of(project, settings, named, solver, command_line)
     records = None
     if out is not None:
         records = RunRecords(Path(out))
@@ -270,7 +271,7 @@ def predict(
         some = 0 if samples is None and solver.external else samples
         others = _around(project, pairs, some)
         every = [*pairs, *(run for _, run in others)]
-        ended = _run(project, every, records, jobs, progress or _nobody)
+        ended = _run(project, every, records, jobs, progress or (lambda event: None))
         runs = _with_others(ended, [number for number, _ in others])
         if all(run.record.failure for run in runs):
             said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
@@ -279,33 +280,8 @@ def predict(
     return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
 
 
-def _record(
-    project: Project,
-    tests: Sequence[Test],
-    cards: Sequence[str | Path] | None,
-    solver: Solver,
-    command_line: Sequence[str] | None,
-) -> Record:
-    written, settings = project.written, None
-    if written is not None and cards is not None:
-        settings = settings_of_predictions(project, [test.name for test in tests], cards)
-    return Record(
-        project.path,
-        None if written is None else written.text,
-        settings,
-        data_rows((test.name, test) for test in tests),
-        solver_facts(project.fit.solver, solver.identity),
-        [this_run(command_line)],
-    )
-
-
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
-    """Return the tests that `predict` runs: by name or by kind, all unless named.
-
-    Raises
-    ------
-    InputError : no such name; none is of a kind that is predicted.
-    """
+    """Return the tests that `predict` runs, as `Project.chosen`; InputError: there is none."""
     chosen = project.chosen(tests, fitted=False)
     able = [test for test in chosen if kind_named(test.kind).predicted is not None]
     if not able:
@@ -316,8 +292,8 @@ def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) 
 
 def measured_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests of `predicted_tests` that are measured."""
-    chosen = predicted_tests(project, tests)
-    return [test for test in chosen if predicted_kind(test.kind).measured(test)]
+    every = predicted_tests(project, tests)
+    return [test for test in every if predicted_kind(test.kind).measured(test)]
 
 
 def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) -> RunRecord:
@@ -341,7 +317,7 @@ def _pairs(
     project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
     """Return runs to be made: test by test, card by card, end by end of the solver's band."""
-    pairs = []
+    pairs: list[PredictedRun] = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
         for name, card in cards.items():
@@ -353,7 +329,8 @@ def _pairs(
                 raise InputError(project.path, where, error.problem) from None
             (model,) = models[card.thickness].values()
             waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
-            pairs += [replace(waiting, end=end) for end in _ends(solver, model)]
+            band = tuple(solver.band(model)) if isinstance(solver, BandedSolver) else ()
+            pairs += [replace(waiting, end=end) for end in band or (None,)]
     return pairs
 
 
@@ -388,12 +365,6 @@ def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[
     return runs
 
 
-def _ends(solver: Solver, model: Any) -> Sequence[BandEnd | None]:
-    """Return the ends of the solver's band for a model; one None without a band."""
-    band = solver.band(model) if isinstance(solver, BandedSolver) else ()
-    return tuple(band) or (None,)
-
-
 def _run(
     project: Project,
     pairs: Sequence[PredictedRun],
@@ -426,7 +397,10 @@ def _run(
     missing = [number for number in range(len(pairs)) if number not in ended]
     prepare = functools.partial(_runner, project, pairs)
     executor = executor_of(project.with_fit(jobs=jobs))
-    told: Iterable[Any] = executor.run_tasks(prepare, missing, "runs", _lost) if missing else ()
+    told: Iterable[Any] = ()
+    if missing:
+        lost = lambda number, why: (number, RunRecord(0.0, why))  # noqa: E731
+        told = executor.run_tasks(prepare, missing, "runs", lost)
     for item in told:
         if item is None:
             progress(None)
@@ -436,10 +410,6 @@ def _run(
             records.write(marks[number], record)
         end(number, record, False)
     return [ended[number] for number in range(len(pairs))]
-
-
-def _lost(number: int, why: str) -> tuple[int, RunRecord]:
-    return number, RunRecord(0.0, why)
 
 
 def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
@@ -467,7 +437,3 @@ def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
         return made[key]
 
     return solver_of
-
-
-def _nobody(event: RunEvent | None) -> None:
-    """Ignore an event."""

@@ -27,8 +27,17 @@ from ..meshes.mesh import Mesh
 from ..project.project import Project
 from ..solvers.run_cache import RunCache
 from .folder import Presented
-from .series import Part, Series, card_of, card_words, parts_of, studied_tests, thickness_notes
-from .simulation import FAILED, Progress
+from .simulation import (
+    FAILED,
+    Part,
+    Progress,
+    Series,
+    card_of,
+    card_words,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -410,7 +419,7 @@ def run_level(series: Series, level: Level) -> LevelRun:
     """Run one level; an analysis that does not end well is a level without values."""
     part, begun = level.part, time.perf_counter()
     try:
-        history = series.run(part, series.card.law)
+        history = series.run_part(part, series.card.law)
     except SolverFailure as failure:
         return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
     # Without the keeping, and of a run that was kept earlier what it took then.

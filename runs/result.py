@@ -34,8 +34,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE, write_report, write_table
-from .record import Record, versions
+from .folder import PROVENANCE, Record, versions, write_report, write_table
 from .setup import CoarseToFine, FitSetup
 from .starts import coarse_columns
 
@@ -53,6 +52,8 @@ Array = NDArray[np.float64]
 BEST = 5
 #: Tables of `Fit.write_table`.
 TABLES = ("residuals", "moduli", "coefficients", "starts")
+#: Numbers of a start that are also summed.
+COUNTED = ("analyses", "external_runs", "cached_runs")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
 #: Number of strains of each modulus in `Fit.moduli`.
@@ -61,11 +62,7 @@ PLACES = 61
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The result of a fit.
-
-    best : the best of the starts, run once more from the unloaded state. record : of project, data
-    and command. judgements : doubts about the data.
-    """
+    """The result of a fit; best : of the starts, run once more from the unloaded state."""
 
     setup: FitSetup
     problem: FitProblem
@@ -98,14 +95,10 @@ class Fit:
     @cached_property
     def card(self) -> MaterialCard:
         """Return the material card, valid for the strains that the tests reached."""
-        quality = ", ".join(
-            f"{name}: {f.quality}" if len(self.findings) > 1 else f.quality
-            for name, f in self.findings.items()
-        )
-        source = (
-            f"bubblefit {__version__} {self.command}, {self.project.path.name}, objective "
-            f"{self.objective:.4g}, {quality}"
-        )
+        several = "{0}: {1}" if len(self.findings) > 1 else "{1}"
+        quality = ", ".join(several.format(n, f.quality) for n, f in self.findings.items())
+        source = f"bubblefit {__version__} {self.command}, {self.project.path.name}, objective "
+        source += f"{self.objective:.4g}, {quality}"
         if self.best.certainty is not None and self.best.certainty.taken_out:
             source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
@@ -186,9 +179,8 @@ class Fit:
     def moduli(self) -> pd.DataFrame:
         """Return E1, E2 and G12 along their strains with band and standard deviation.
 
-        Columns modulus, strain, MPa, lower_MPa and upper_MPa (95 %, noise and mesh together),
-        sigma_relative and its parts noise_relative and mesh_relative (change of the modulus on ever
-        finer meshes). NaN where not known; sigma is of the noise alone if the mesh's is not known.
+        lower_MPa, upper_MPa: 95 %, noise and mesh together, as sigma_relative; mesh_relative: the
+        change on ever finer meshes. NaN where not known; then sigma is of the noise alone.
         """
         import pandas as pd
 
@@ -216,12 +208,7 @@ class Fit:
         return coefficients_of(self)
 
     def residuals(self) -> pd.DataFrame:
-        """Return a row a matched value of every test.
-
-        Columns test, part, place (of a bubble frame, pressure_kPa, x_mm, y_mm; of a strip
-        elongation_mm; of a biaxial test the loads), then `COMPARED`: difference is modelled less
-        measured.
-        """
+        """Return a row a matched value: test, part, place, then `COMPARED`, modelled - measured."""
         import pandas as pd
 
         frames = []
@@ -234,29 +221,20 @@ class Fit:
         return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
 
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
-        """Write one of `TABLES` as .csv or .parquet, by the ending of the file's name.
-
-        Raises
-        ------
-        InputError : another table or ending, or Parquet without pyarrow. OutputError.
-        """
+        """Write one of `TABLES`, as `folder.write_table`; InputError : another table."""
         if table not in TABLES:
             raise InputError(None, "table", f"{table!r} is not one of: {', '.join(TABLES)}")
         return write_table(getattr(self, table)(), path)
 
     def starts(self) -> pd.DataFrame:
-        """Return a row a start: objective, status, analyses, runs, seconds.
-
-        Of starts that ran coarse to fine also objective and analyses on the coarse mesh, and
-        same_as, the start with the same optimum there that alone was continued.
-        """
+        """Return a row a start: objective, status, analyses, runs, seconds, coarse to fine."""
         import pandas as pd
 
         rows = [
             {
                 "start": r.number, "objective": np.nan if r.objective is None else r.objective,
-                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
-                "cached_runs": r.cached_runs, "seconds": r.wall_s,
+                "status": r.status, **{name: getattr(r, name) for name in COUNTED},
+                "seconds": r.wall_s,
                 **({} if self.coarse_to_fine is None else coarse_columns(r)),
             }
             for r in self.best.records
@@ -285,16 +263,12 @@ class Fit:
         names = [c.name for c in self.problem.comparisons]
         mine = [k for k, name in enumerate(names) if name in own]
         unknowns, y = self.problem.unknowns, best.point.unknowns
+        histories = tuple(best.point.histories[k] for k in mine)
+        nuisance = {n: v for k in mine for n, v in unknowns.nuisance_values(names[k], y).items()}
         return FittedTest(
-            self.setup.own(prepared),
-            tuple(best.point.histories[k] for k in mine),
-            {n: v for k in mine for n, v in unknowns.nuisance_values(names[k], y).items()},
-            self.law,
-            self.laws,
-            best.reached,
-            best.valid,
-            best.certainty,
-        )
+            self.setup.own(prepared), histories, nuisance, self.law, self.laws, best.reached,
+            best.valid, best.certainty,
+        )  # fmt: skip
 
 
 #: Logarithmic strains of `answers`, beside the end of the valid ones.
@@ -305,10 +279,9 @@ NEAR = 0.95
 
 @dataclass(frozen=True)
 class Answer:
-    """One modulus at one logarithmic strain.
+    """One modulus at one logarithmic strain; end : it is fitted no further.
 
     value : MPa. per_width : kN/m. sigma : relative. band : MPa, 95 %; None if not known.
-    end : the modulus is fitted no further.
     """
 
     modulus: str
@@ -354,8 +327,7 @@ COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 def coefficients_of(fit: Fit) -> pd.DataFrame:
     """Return coefficients of the law in the project's unit, then the nuisance, a row each.
 
-    `COLUMNS` (sigma by noise, bounds left aside), then the correlation with each unknown under its
-    name. NaN where not known.
+    `COLUMNS` (sigma by noise, bounds left aside), then correlations by name. NaN where not known.
     """
     import pandas as pd
 
@@ -403,16 +375,13 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "starts": [
             {
                 "start": r.number, "seed": list(r.seed), "objective": r.objective,
-                "status": r.status, "analyses": r.analyses, "external_runs": r.external_runs,
-                "cached_runs": r.cached_runs,
+                "status": r.status, **{name: getattr(r, name) for name in COUNTED},
                 **({} if fit.coarse_to_fine is None else coarse_columns(r)),
             }
             for r in records
         ],
         "coarse_to_fine": None if fit.coarse_to_fine is None else fit.coarse_to_fine.to_json(),
-        "analyses": sum(r.analyses for r in records),
-        "external_runs": sum(r.external_runs for r in records),
-        "cached_runs": sum(r.cached_runs for r in records),
+        **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
         "warnings": [], "notes": [], "wall_s": fit.wall_s, "versions": versions(),
     }  # fmt: skip
     result["misfit"] = {
@@ -422,8 +391,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
-            "noise": sure.noise,
-            "values_that_err_as_one": sure.alike,
+            "noise": sure.noise, "values_that_err_as_one": sure.alike,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),
@@ -433,7 +401,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "smooth_beyond_noise": {
                 name: {**asdict(d), "told": d.significant} for name, d in sure.discrepancy.items()
             },
-        }
+        }  # fmt: skip
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
     if fit.record is not None:
@@ -502,12 +470,9 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     best, several = fit.best, len(fit.problem.comparisons) > 1
     notes = list(best.certainty.undetermined) if best.certainty is not None else []
     notes += notes_of_verdicts(fit.verdicts)
-    cut = [record for record in best.records if record.failure]
-    if cut:
-        said = (
-            f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
-            f"failed ({cut[0].failure}): --resume tries them again"
-        )
+    if cut := [record for record in best.records if record.failure]:
+        said = f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
+        said += f"failed ({cut[0].failure}): --resume tries them again"
         notes.append(Note(STARTS, said))
     notes += [note for judgement in fit.judgements for note in judgement.notes]
     ends = np.asarray(fit.law.strain_range)

@@ -1,28 +1,46 @@
-"""Forward analyses: cards in the tests of a project, or one card in one test."""
+"""Forward analyses: cards in tests, one after the other, and the records of a study of them."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ..errors import Note, NoteKind, SolverFailure, rows
+from ..errors import InputError, Note, NoteKind, SolverFailure, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import CardRun, Output, Simulation, Test, notes_of, other_thickness
-from ..experiments.registry import report_of
-from ..files import write_notes, write_text
+from ..experiments.kinds import (
+    CardRun,
+    Output,
+    Refined,
+    Simulation,
+    Studied,
+    Test,
+    notes_of,
+    other_thickness,
+)
+from ..experiments.registry import kinds, report_of
+from ..files import json_text, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..project.project import Project
+from ..project.project import Project, chosen_cards
+from ..project.schema import FITTED, usual_folder
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import Once, RunCache, run_cache
+from .folder import RESULT, Store
 from .starts import timed
 
 #: A remark on a run that has no result.
 FAILED = NoteKind("failed")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T")
+R = TypeVar("R", bound="DataclassInstance")
+GivenCard = MaterialCard | Path | str
 
 
 @dataclass(frozen=True)
@@ -52,35 +70,30 @@ class Analyses:
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
-        own = counted(name, options)
-        self._runs = self.solver if kept is None else Once(self.solver, kept, own)
+        self._runs = self.solver
+        if kept is not None:
+            self._runs = Once(self.solver, kept, counted(name, options))
         self.total = self.count = 0
         self._progress = progress
 
     def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
-        """Run the next analysis, or raise SolverFailure.
-
-        part, increments : for the progress; 0 where not known.
-        """
+        """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
         check_carries(self.solver, law)
         self.count += 1
-        with timed(f"analysis {self.count}, {part}, by {self.solver.name}"):
-            return self._run(part, model, law, increments)
-
-    def _run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
         tell, count = self._progress, self.count
-        if tell is None:
-            return self._runs.run(model, law)
+        with timed(f"analysis {count}, {part}, by {self.solver.name}"):
+            if tell is None:
+                return self._runs.run(model, law)
 
-        def say(done: float) -> None:
-            tell(Step(part, count, self.total, done, increments))
+            def say(done: float) -> None:
+                tell(Step(part, count, self.total, done, increments))
 
-        say(0.0)
-        self.solver.progress = lambda increment: say(increment.time)
-        try:
-            return self._runs.run(model, law)
-        finally:
-            self.solver.progress = None
+            say(0.0)
+            self.solver.progress = lambda increment: say(increment.time)
+            try:
+                return self._runs.run(model, law)
+            finally:
+                self.solver.progress = None
 
 
 def simulate(
@@ -88,8 +101,6 @@ def simulate(
 ) -> dict[str, History]:
     """Run one test with a card and its thickness; return histories by part of the test.
 
-    Raises
-    ------
     InputError : no such solver, or an option it does not know. SolverFailure.
     """
     runs = usable_solver(solver, options, cache=run_cache())
@@ -110,19 +121,10 @@ def simulate_cards(
 ) -> Simulation:
     """Run tests with cards; write files of their kinds, notes.csv and result.json.
 
-    Parameters
-    ----------
-    cards : by name; the thickness of each counts, not the fabric's.
-    within_range : show curves only within a card's valid range.
-    kept : where finished analyses are kept, to resume an interrupted series.
-
-    Returns
-    -------
-    The numbers of result.json (of a single test at the top level), and lines for a terminal.
-
-    Raises
-    ------
-    SolverFailure : nothing ended well. InputError, OutputError.
+    cards : by name; the thickness of each counts, not the fabric's. within_range : show curves only
+    within a card's valid range. kept : finished analyses, to resume an interrupted series. Numbers
+    of a single test stand at the top level. SolverFailure : nothing ended well. InputError,
+    OutputError.
     """
     analyses = Analyses(project, progress, kept)
     models = {
@@ -167,8 +169,10 @@ def simulate_cards(
         **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
     }
     write_notes(folder, notes)
-    write_text(folder / "result.json", json.dumps(result, indent=1) + "\n")
-    return Simulation(result, _lines(shown, notes))
+    write_text(folder / RESULT, json_text(result))
+    several = "{0}: {1}" if len(shown) > 1 else "{1}"
+    lines = [several.format(name, line) for name, one in shown.items() for line in one.lines]
+    return Simulation(result, [*lines, *note_lines(notes)])
 
 
 def _outcome(
@@ -192,8 +196,168 @@ def _notes(name: str, card: MaterialCard, parts: Mapping[str, CardRun]) -> list[
     return notes
 
 
-def _lines(shown: Mapping[str, Simulation], notes: Sequence[Note]) -> list[str]:
-    several = len(shown) > 1
-    lines = [f"{name}: {line}" if several else line for name, one in shown.items()
-             for line in one.lines]  # fmt: skip
-    return [*lines, *note_lines(notes)]
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One model of a test with the quantities of its kind; its name is unique in a study."""
+
+    name: str
+    model: Any
+    studied: Studied
+
+    @property
+    def increments(self) -> int:
+        """Number of load increments of the whole analysis."""
+        return len(self.studied.steps(self.model))
+
+
+class Series(Analyses):
+    """The analyses of a study, all with one card; raises as `Analyses`."""
+
+    def __init__(
+        self,
+        project: Project,
+        card: MaterialCard,
+        progress: Progress | None = None,
+        kept: RunCache | None = None,
+    ) -> None:
+        super().__init__(project, progress, kept)
+        self.card = card
+
+    def run_part(self, part: Part, law: HypoelasticLaw) -> History:
+        """Run the next analysis; raises SolverFailure."""
+        return self.run(part.name, part.model, law, part.increments)
+
+    def notes(self, history: History) -> list[Note]:
+        """Return the notes on the values of a run."""
+        return notes_of(history, self.card)
+
+
+def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
+    """Return the tests that a study can run, as `Project.chosen`; InputError: there is none."""
+    known = kinds()
+    able = [t for t in project.chosen(tests or None) if known[t.kind].studied is not None]
+    if not able:
+        raise InputError(project.path, "", "no study can run the tests of this project")
+    return able
+
+
+def parts_of(
+    project: Project,
+    tests: Sequence[Test],
+    thickness: float,
+    what: Refined = "elements",
+    factor: float = 1.0,
+) -> dict[str, Part]:
+    """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
+    parts: dict[str, Part] = {}
+    for test in tests:
+        studied = kinds()[test.kind].studied
+        assert studied is not None
+        try:
+            models = test.models(thickness, what, factor)
+        except InputError as error:
+            if error.path is not None:
+                raise
+            field = f"refinement by {factor:g} (--levels, --coarser, --factor), {error.field}"
+            raise InputError(project.path, field, error.problem) from None
+        for part, model in models.items():
+            name = part_name(test, part, len(models), len(tests))
+            parts[name] = Part(name, model, studied)
+    return parts
+
+
+def part_name(test: Test, part: str, parts: int, tests: int) -> str:
+    """Return a part's name: of its test where it is the only one, with it among several."""
+    if parts == 1:
+        return test.name
+    return part if tests == 1 else f"{test.name}: {part}"
+
+
+def card_of(project: Project, card: GivenCard) -> MaterialCard:
+    """Return a card that is given as itself, its file, or its name in the project; InputError."""
+    if isinstance(card, MaterialCard):
+        return card
+    (chosen,) = chosen_cards(project, [card]).values()
+    return chosen
+
+
+def fitted_card(project: Project) -> Path:
+    """Return the path of the card that the project's fit left; InputError: there is none."""
+    path = usual_folder(project.path) / FITTED
+    if not path.is_file():
+        problem = f"no fit left a card in {path}: fit first (bubblefit fit), or name a card"
+        raise InputError(project.path, "--card", problem)
+    return path
+
+
+def card_words(card: GivenCard) -> str:
+    """Return the name of a card in results."""
+    return card.name if isinstance(card, MaterialCard) else str(card)
+
+
+def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
+    """Return a note where the card's thickness, which counts, is not the fabric's."""
+    return other_thickness(card, project.fabric.thickness)
+
+
+def begin_study(
+    folder: Path,
+    parts: Mapping[str, str],
+    resume: bool,
+    overwrite: bool,
+    fits: Iterable[str],
+    records: Sequence[str] = (),
+) -> None:
+    """Prepare the folder of a study with a folder for each fit; raises as `Store.begin`.
+
+    `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
+    """
+    for name in fits if overwrite else ():
+        Store(folder / name).forget()
+    Store(folder).begin(parts, resume, overwrite, records)
+
+
+def mark_of(parts: Mapping[str, Any]) -> str:
+    """Return a digest of everything that a record depends on."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def read_marked(path: Path, mark: str, read: Callable[[dict[str, Any]], T]) -> T | None:
+    """Read a record with `read`; None where it has another mark, or there is none."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return read(content) if content["of"] == mark else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def write_marked(folder: Path, file: str, mark: str, content: Mapping[str, Any]) -> None:
+    """Write a record into an existing folder; raises OutputError."""
+    Store(folder).write(file, json.dumps({"of": mark, **content}, indent=1) + "\n")
+
+
+class StudyRecord(Generic[R]):
+    """Rows of a study under a mark of all that they depend on, each written as it ends.
+
+    folder : None where nothing is read or written. file : its name. name : of the rows in the file.
+    row : their class, a dataclass of plain values. key : field by which `rows` are sorted.
+    depends : on what they depend, in plain values. read : take over what the file holds.
+    """
+
+    def __init__(
+        self, folder: Path | None, file: str, name: str, row: type[R], key: str,
+        depends: Mapping[str, Any], read: bool = True,
+    ) -> None:  # fmt: skip
+        self._folder, self._file, self._name, self._key = folder, file, name, key
+        self._mark = mark_of(depends)
+        self.rows: dict[Any, R] = {}
+        if folder is not None and read:
+            rows = read_marked(folder / file, self._mark, lambda c: [row(**own) for own in c[name]])
+            self.rows = {getattr(one, key): one for one in rows or ()}
+
+    def write(self, row: R) -> None:
+        """Add a row and write the file; raises OutputError."""
+        self.rows[getattr(row, self._key)] = row
+        if self._folder is not None:
+            rows = [asdict(self.rows[key]) for key in sorted(self.rows)]
+            write_marked(self._folder, self._file, self._mark, {self._name: rows})

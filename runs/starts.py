@@ -58,10 +58,8 @@ class StartRecord:
 
     analyses : in all, of them external_runs by an external solver and cached_runs by one earlier.
     failure : of the solver, if that ended the start, which is run again on resuming. reached :
-    largest strain (eps1, eps2, gamma12) at the optimum. mesh : of the objective.
-
-    Coarse to fine: coarse_objective and coarse_analyses, on the coarse mesh; same_as, the start
-    with the same optimum there, which alone was fitted on the full mesh and has this fit.
+    (eps1, eps2, gamma12) at the optimum. mesh : of the objective. same_as : the start with the same
+    optimum on the coarse mesh, which alone was fitted on the full one.
     """
 
     number: int
@@ -89,22 +87,15 @@ class StartRecord:
     def from_json(cls, values: dict[str, Any]) -> StartRecord:
         """Return the record of `to_json`; raises KeyError or TypeError if it is none."""
         return cls(
-            number=int(values["number"]),
-            seed=(int(values["seed"][0]), int(values["seed"][1])),
-            objective=_number(values["objective"]),
-            status=str(values["status"]),
-            analyses=int(values["analyses"]),
-            unknowns=tuple(map(float, values["unknowns"])),
-            coefficients=tuple(map(float, values["coefficients"])),
-            wall_s=float(values["wall_s"]),
-            external_runs=int(values.get("external_runs", 0)),
-            failure=str(values.get("failure", "")),
-            reached=tuple(map(float, values.get("reached", ()))),
-            mesh="coarse" if values.get("mesh") == "coarse" else "full",
-            coarse_objective=_number(values.get("coarse_objective")),
-            coarse_analyses=int(values.get("coarse_analyses", 0)),
+            int(values["number"]), (int(values["seed"][0]), int(values["seed"][1])),
+            _number(values["objective"]), str(values["status"]), int(values["analyses"]),
+            tuple(map(float, values["unknowns"])), tuple(map(float, values["coefficients"])),
+            float(values["wall_s"]), int(values.get("external_runs", 0)),
+            str(values.get("failure", "")), tuple(map(float, values.get("reached", ()))),
+            "coarse" if values.get("mesh") == "coarse" else "full",
+            _number(values.get("coarse_objective")), int(values.get("coarse_analyses", 0)),
             cached_runs=int(values.get("cached_runs", 0)),
-        )
+        )  # fmt: skip
 
 
 def run_start(
@@ -118,15 +109,11 @@ def run_start(
 ) -> StartRecord:
     """Draw feasible start `number` of `seed` and fit from it; report every evaluation to `tell`.
 
-    coarse : the start's end on the coarse mesh: the fit begins at its optimum, if any, and its
-    analyses are included.
+    coarse : its end on the coarse mesh, at whose optimum the fit begins; its analyses are included.
     """
     begun = time.perf_counter()
     problem.reset()
-    size = problem.unknowns.size
-    near = coarse is not None and coarse.objective is not None
-
-    runs = 0
+    size, runs = problem.unknowns.size, 0
     before = analyses = 0 if coarse is None else coarse.analyses
 
     def watch(y: NDArray, value: float | None, status: str, solver: str) -> None:
@@ -135,20 +122,17 @@ def run_start(
         runs += problem.solver.external and solver == problem.solver.name
         coefficients = tuple((problem.unknowns.to_coefficients @ y[:size]).tolist())
         nuisance = tuple(np.asarray(y[size:]).tolist())
-        record = EvaluationRecord(
-            number, analyses, value, status, coefficients, nuisance, solver, mesh
-        )
-        tell(record)
+        own = number, analyses, value, status, coefficients, nuisance
+        tell(EvaluationRecord(*own, solver, mesh))
 
     watched = [p for p in (problem, problem.surrogate) if p is not None]
     for p in watched:
         p.watch = watch
     try:
-        if coarse is not None and near:
-            start = np.array(coarse.unknowns)
+        if coarse is not None and coarse.objective is not None:
+            optimum = fit_from(problem, np.array(coarse.unknowns), options, True)
         else:
-            start = feasible_start(problem, seed, number)
-        optimum = fit_from(problem, start, options, near)
+            optimum = fit_from(problem, feasible_start(problem, seed, number), options, False)
         failure = optimum.failure if optimum is not None else _why(watched)
         status = f"{problem.solver.name} failed: {failure}"
     except NoFeasibleStart as error:
@@ -165,14 +149,12 @@ def run_start(
     )  # fmt: skip
     if optimum is None:
         return none
+    reached = np.max([strains_of(h) for h in optimum.best.histories], axis=0)
     return replace(
-        none,
-        objective=optimum.value,
-        status=optimum.status,
+        none, objective=optimum.value, status=optimum.status, reached=tuple(reached.tolist()),
         unknowns=tuple(optimum.best.unknowns.tolist()),
         coefficients=tuple(optimum.coefficients.tolist()),
-        reached=tuple(np.max([strains_of(h) for h in optimum.best.histories], axis=0).tolist()),
-    )
+    )  # fmt: skip
 
 
 def coarse_columns(record: StartRecord) -> dict[str, Any]:
@@ -197,10 +179,7 @@ MESH = HEADER.index("mesh")
 
 
 class RunningFiles:
-    """The running files of a fit in its store.
-
-    columns : of the unknowns, after `HEADER`, with the unit in the name. scale : their divisors.
-    """
+    """The running files of a fit; columns : of the unknowns, after `HEADER`. scale : divisors."""
 
     def __init__(self, store: Store, columns: Sequence[str], scale: Sequence[float]) -> None:
         self.store, self.columns, self.scale = store, tuple(columns), tuple(scale)
@@ -208,12 +187,7 @@ class RunningFiles:
         self._starts: FileIO | None = None
 
     def begin(self, resume: bool) -> list[StartRecord]:
-        """Open the files; return the starts, on either mesh, that are finished if resumed.
-
-        Raises
-        ------
-        InputError : a line of starts.jsonl is damaged. OutputError : the folder cannot be written.
-        """
+        """Open the files; return the finished starts, on either mesh, if resumed; InputError."""
         done = self.finished() if resume else []
         ended = {(str(record.number), record.mesh) for record in done}
         rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []

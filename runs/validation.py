@@ -42,9 +42,8 @@ from .executor import executor_of
 from .fit import FitEvent, stored_fit
 from .folder import Presented
 from .result import Fit
-from .series import begin_study, mark_of, read_marked, write_marked
 from .setup import FitSetup, fingerprints, prepare_fit
-from .simulation import FAILED
+from .simulation import FAILED, begin_study, mark_of, read_marked, write_marked
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,9 +19,8 @@ from .compare import errors
 from .fit import FitEvent, stored_fit
 from .folder import Presented
 from .result import Fit
-from .series import StudyRecord, begin_study
 from .setup import FitSetup, fingerprints
-from .simulation import FAILED
+from .simulation import FAILED, StudyRecord, begin_study
 
 if TYPE_CHECKING:
     import pandas as pd

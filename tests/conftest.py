@@ -91,7 +91,7 @@ def packages(tmp_path, monkeypatch):
 def bars(monkeypatch: pytest.MonkeyPatch) -> BarSolver:
     """A solver and a kind of test, both named bars; the solver is the one that runs."""
     solver, known = BarSolver(), dict(experiments.kinds())
-    for module in ("runs.series", "project.project"):
+    for module in ("runs.simulation", "project.project"):
         monkeypatch.setattr(f"bubblefit.{module}.kinds", lambda: {**known, "bars": BarKind()})
     reports = experiments.report_of
     monkeypatch.setattr(

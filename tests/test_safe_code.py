@@ -65,7 +65,6 @@ def faults(source: str) -> list[str]:
 #: processes send each other, by a pipe or through Dask (docs/reference/security.md).
 ALLOWED = {
     "examples/solver-adapter/bubblefit_homogeneous.py": ["calls np.loadtxt"],
-    "runs/cluster.py": ["imports cloudpickle"],
     "runs/executor.py": ["imports cloudpickle"],
 }
 

@@ -41,7 +41,7 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
     """A project of one bar; what its solver `says` and `fails` at."""
     solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
     solver.says = says or solver.says
-    for module in ("runs.series", "project.project"):
+    for module in ("runs.simulation", "project.project"):
         patch.setattr(f"bubblefit.{module}.kinds", lambda: known)
     reports = experiments.report_of
     patch.setattr(

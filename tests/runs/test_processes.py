@@ -1,4 +1,4 @@
-"""Starts side by side: processes that die, errors that cross their border, and order."""
+"""Tasks side by side, here and on a Dask cluster: the same, whoever dies on the way."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ import multiprocessing.util
 import os
 import signal
 import struct
+import sys
 import time
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
+import bubblefit as bf
+import cloudpickle
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError, SolverFailure
@@ -24,43 +29,44 @@ from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.runs.executor import Executor, run_tasks
+from bubblefit.runs import executor as cluster
+from bubblefit.runs.executor import Executor, executor_of, run_tasks
 from bubblefit.runs.starts import StartRecord
+from bubblefit.solvers import licences
+from bubblefit.solvers.base import Announcement, announce, hearing
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.process import run_process
+from bubblefit.solvers.process import check, run_process
 from bubblefit.solvers.scratch import run_folder
 
-from .. import needs
+from .. import counted_program, needs
+from ..commands import in_process
+from ..complaints import complaint
+from ..counted_program import CountedSolver, seen
 
 MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
 KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
-BOUNDS = LawBounds.of_entries(
-    np.array([1.0, 50.0, 50.0]),
-    np.array([100.0, 1000.0, 1500.0]),
-    {"E1": 5.0, "E2": 5.0, "G12": 0.5},
-)
+LOWER, UPPER = np.array([1.0, 50.0, 50.0]), np.array([100.0, 1000.0, 1500.0])
+BOUNDS = LawBounds.of_entries(LOWER, UPPER, {"E1": 5.0, "E2": 5.0, "G12": 0.5})
 
 
 @cache
-def fields() -> np.ndarray:
-    """What the known law does."""
+def fields():
     return MembraneSolver().run(MODEL, KNOWN).displacement
 
 
-def build(solver: MembraneSolver | None = None) -> FitProblem:
+def build(solver=None):
     data = [FieldTarget(p, u) for p, u in zip(MODEL.pressures, fields(), strict=True)]
     comparison = Comparison("bubble", MODEL, solver or MembraneSolver(), FieldObjective(data))
     unknowns = Unknowns.of(Polynomial(0), KNOWN.nu12, [0.13] * 3, BOUNDS, [comparison])
     return FitProblem((comparison,), KNOWN, unknowns)
 
 
-def run_starts(problem: Any, options: FitOptions, seed: int, numbers: list[int], jobs: int) -> Any:
+def run_starts(problem, options, seed, numbers, jobs):
     return Executor(jobs).run_starts(problem, options, seed, numbers)
 
 
-def study_with(jobs: int, numbers: list[int]) -> dict[int, tuple]:
-    ends: dict[int, tuple] = {}
-    analyses: dict[int, list[int]] = {n: [] for n in numbers}
+def study_with(jobs, numbers):
+    ends, analyses = {}, {n: [] for n in numbers}
     for record in run_starts(build, FitOptions(max_analyses=60), 5, numbers, jobs):
         if isinstance(record, StartRecord):
             assert len(analyses[record.number]) == record.analyses
@@ -80,30 +86,22 @@ def test_jobs_and_order_do_not_change_a_start():
 
 
 class Dying(MembraneSolver):
-    def _analyse(self, *arguments: Any) -> Any:
+    def _analyse(self, *arguments):
         os._exit(9)
 
 
 class Broken(MembraneSolver):
-    def _analyse(self, *arguments: Any) -> Any:
+    def _analyse(self, *arguments):
         raise InputError("mesh.vtu", "quads", "made to fail")
 
 
-def build_dying() -> FitProblem:
-    return build(Dying())
-
-
-def build_broken() -> FitProblem:
-    return build(Broken())
-
-
-def build_failing() -> FitProblem:
+def build_failing():
     raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
 
 
 def test_a_process_that_dies_is_noticed():
     with pytest.raises(BubblefitError, match="--resume") as caught:
-        list(run_starts(build_dying, FitOptions(), 1, [0, 1], 2))
+        list(run_starts(lambda: build(Dying()), FitOptions(), 1, [0, 1], 2))
     assert caught.value.exit_code == 4
 
 
@@ -112,7 +110,7 @@ def test_errors_cross_the_process_border_whole():
         list(run_starts(build_failing, FitOptions(), 1, [0, 1], 2))
     assert failure.value.exit_number == 3004 and failure.value.scratch == Path("/tmp/scratch")
     with pytest.raises(InputError, match=r"mesh.vtu: quads: made to fail") as caught:
-        list(run_starts(build_broken, FitOptions(), 1, [0, 1], 2))
+        list(run_starts(lambda: build(Broken()), FitOptions(), 1, [0, 1], 2))
     assert caught.value.field == "quads"
 
 
@@ -121,15 +119,14 @@ def test_no_shared_memory_is_needed(monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("multiprocessing.synchronize.SemLock.__init__", refuse)
-    assert sorted(filter(None, run_tasks(lambda: lambda n, tell: 10 * n, [1, 2, 3], 2))) == [
-        10, 20, 30,
-    ]  # fmt: skip
+    told = run_tasks(lambda: lambda n, tell: 10 * n, [1, 2, 3], 2)
+    assert sorted(filter(None, told)) == [10, 20, 30]
 
 
-def killed_once(folder: Path, where: str) -> Any:
+def killed_once(folder, where):
     """Task 2 kills its process the first time, before, amid or after what it says."""
 
-    def task(number: int, tell: Any) -> tuple[int, bytes]:
+    def task(number, tell):
         mark = folder / f"{number} was begun"
         first = number == 2 and not mark.exists()
         mark.touch()
@@ -139,8 +136,7 @@ def killed_once(folder: Path, where: str) -> Any:
         if first and where == "amid":
             # The length of a record, and the first bytes of it.
             os.write(tell.__self__.fileno(), struct.pack("!i", 1000) + b"x" * 10)
-            os.kill(os.getpid(), signal.SIGKILL)
-        if first and where == "after":
+        if first:
             os.kill(os.getpid(), signal.SIGKILL)
         return number, bytes(10**5)
 
@@ -150,10 +146,7 @@ def killed_once(folder: Path, where: str) -> Any:
 @pytest.mark.parametrize("where", ["before", "amid", "after"])
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_the_task_of_a_killed_process_is_done_again(tmp_path, caplog, where, jobs):
-    found = []
-    for record in run_tasks(lambda: killed_once(tmp_path, where), [1, 2, 3, 4], jobs):
-        if record is not None:
-            found.append(record)
+    found = [*filter(None, run_tasks(lambda: killed_once(tmp_path, where), [1, 2, 3, 4], jobs))]
     ended = [number for number, content in found if content == bytes(10**5)]
     assert sorted(ended) == [1, 2, 3, 4]
     (said,) = caplog.messages
@@ -248,3 +241,321 @@ def test_processes_end_by_themselves_when_all_is_done(tmp_path):
 
     assert sorted(filter(None, run_tasks(ending, [1, 2, 3, 4], 2))) == [1, 2, 3, 4]
     assert len(list(tmp_path.iterdir())) == 2
+
+
+#: The workers do not have the tests: their functions travel with what they are.
+for module in (sys.modules[__name__], counted_program):
+    cloudpickle.register_pickle_by_value(module)
+
+
+NOBODY = "tcp://127.0.0.1:1"
+
+
+@pytest.fixture(scope="module")
+def scheduler():
+    """The address of one with two workers."""
+    distributed: Any = needs.library("distributed")
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(n_workers=2, processes=True, **options) as local:
+        yield local.scheduler_address
+
+
+def tasks(scheduler, prepare, count, **more):
+    """What the tasks 0 .. count - 1 tell and give."""
+    told = Executor(scheduler=scheduler).run_tasks(prepare, range(count), **more)
+    return [record for record in told if record is not None]
+
+
+def always(task):
+    return lambda: task
+
+
+def test_a_fit_on_a_cluster_is_the_fit_here(scheduler, together, strips_project, tmp_path):
+    fitted = bf.fit(strips_project, scheduler=scheduler)
+    assert fitted.objective == together.objective
+    assert fitted.law.beta.tolist() == together.law.beta.tolist()
+    table, here = (fit.starts().drop(columns="seconds") for fit in (fitted, together))
+    assert table.to_csv() == here.to_csv()
+
+
+def test_what_a_task_tells_comes_once_and_before_its_end(scheduler):
+    def task(number, tell):
+        for k in range(2):
+            tell((number, k))
+        return announce("waiting", f"run {number}") or time.sleep(0.1) or number
+
+    heard: list[Announcement] = []
+    with hearing(heard.append):
+        records = tasks(scheduler, always(task), 5)
+    assert len(records) == 15 and Announcement("waiting", "run 0") in heard
+    for number in range(5):
+        at = records.index((number, 0))
+        assert records[at : at + 3] == [(number, 0), (number, 1), number]
+
+
+def test_it_is_got_ready_once_a_worker(scheduler):
+    def prepare():
+        made = [os.getpid(), 0]
+
+        def task(number, tell):
+            made[1] += 1
+            return list(made)
+
+        return task
+
+    counts: dict[int, list[int]] = {}
+    for pid, count in tasks(scheduler, prepare, 8):
+        counts.setdefault(pid, []).append(count)
+    assert sum(map(len, counts.values())) == 8
+    for own in counts.values():
+        assert sorted(own) == list(range(1, len(own) + 1))
+
+
+def test_no_more_at_once_than_asked_for(scheduler, tmp_path):
+    executor = Executor(1, scheduler)
+    folder = tmp_path / "runs"
+    list(executor.run_tasks(lambda: solving(CountedSolver(folder)), range(4)))
+    assert seen(folder).most == 1
+
+
+def solving(solver):
+    return lambda number, tell: solver.run(number, None)
+
+
+def test_a_worker_that_dies_costs_its_run_only(scheduler, tmp_path):
+    def task(number, tell):
+        tell(("begun", number))
+        if number == 3 and not (tmp_path / "died").exists():
+            (tmp_path / "died").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return number
+
+    begun, heard = time.monotonic(), list[Announcement]()
+    with hearing(heard.append):
+        records = tasks(scheduler, always(task), 8)
+    assert time.monotonic() - begun < 10  # it is noticed and reported by then
+    assert sorted(r for r in records if isinstance(r, int)) == list(range(8))
+    assert sorted(r[1] for r in records if isinstance(r, tuple)) == list(range(8))
+    (words,) = [said.words for said in heard if "died" in said.words]
+    assert words.startswith("worker tcp://127.0.0.1:") and "task 3 of the starts" in words
+
+
+def test_a_task_that_kills_its_worker_thrice_is_a_failure(scheduler, tmp_path):
+    def task(number, tell):
+        if number == 1:
+            with (tmp_path / "tries").open("a") as file:
+                file.write("x")
+            os._exit(9)
+        return number
+
+    records = tasks(scheduler, always(task), 4, what="runs", lost=lambda n, why: (n, why))
+    assert sorted(r for r in records if isinstance(r, int)) == [0, 2, 3]
+    ((number, why),) = [r for r in records if isinstance(r, tuple)]
+    assert number == 1 and why.startswith("3 workers died of it, the last was tcp://")
+    assert (tmp_path / "tries").read_text() == "xxx"
+
+
+def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch):
+    why = "3 workers died of it"
+    lose = lambda self, prepare, numbers, lost: iter([lost(n, why) for n in numbers])  # noqa: E731
+    monkeypatch.setattr(Executor, "run_tasks", lose)
+    (record,) = Executor().run_starts(lambda: None, None, 5, [7], "coarse")
+    lost = StartRecord(7, (5, 7), None, why, 0, (), (), 0.0, failure=why, mesh="coarse")
+    assert record == lost
+
+
+def test_an_error_of_a_task_is_an_error_here(scheduler):
+    def task(number, tell):
+        raise InputError("mesh.vtu", "quads", "made to fail")
+
+    with pytest.raises(InputError, match=r"^mesh.vtu: quads: made to fail$") as caught:
+        tasks(scheduler, always(task), 2)
+    assert caught.value.field == "quads"
+
+
+def test_a_scheduler_that_goes_is_an_error_soon():
+    distributed: Any = needs.library("distributed")
+    options = {"n_workers": 1, "processes": False, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(**options) as local:
+        running = Executor(scheduler=local.scheduler_address).run_tasks(
+            lambda: lambda number, tell: time.sleep(0.1) or number, range(1000), "parts"
+        )
+        while next(running) is None:
+            pass
+        local.close()
+        begun = time.monotonic()
+        with pytest.raises(BubblefitError, match="does not answer any more; finished parts") as end:
+            list(running)
+    assert time.monotonic() - begun < 10 and end.value.exit_code == 4
+
+
+def test_programs_and_tasks_end_when_nobody_wants_their_results(scheduler, tmp_path):
+    def task(number, tell):
+        if number:
+            script = f"echo $$ > {tmp_path}/pid; exec sleep 60"
+            run_process(["sh", "-c", script], tmp_path, tmp_path / "log")
+        for _ in range(600):
+            (tmp_path / "alive").touch()
+            time.sleep(0.05)
+            tell("a word")
+
+    running = Executor(scheduler=scheduler).run_tasks(always(task), range(2))
+    pid, alive = tmp_path / "pid", tmp_path / "alive"
+    wait_for(lambda: next(running) is None and pid.exists() and alive.exists())
+    wait_for(lambda: pid.read_text().strip())
+    running.close()
+    wait_for(lambda: not Path(f"/proc/{pid.read_text().strip()}").exists())
+    wait_for(lambda: time.time() - alive.stat().st_mtime > 1.0)
+
+
+def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
+    class Elsewhere:
+        def __reduce__(self):
+            return __import__, ("no_such_module",)
+
+    ours = cluster.version()
+    for words, other in (
+        ("0.1.9", (ours[0], "0.1.9", ours[2])), ("3.9.1", ("3.9.1", *ours[1:])),
+        ("another code", (*ours[:2], "other")), ("it has no bubblefit of this", Elsewhere()),
+    ):  # fmt: skip
+        monkeypatch.setattr(cluster, "version", lambda other=other: other)
+        heard: list[Announcement] = []
+        with hearing(heard.append):
+            said = complaint(tasks, scheduler, lambda: None, 3)
+        assert said.startswith("--scheduler: worker tcp://127.0.0.1:") and words in said
+        assert sum("is not used" in one.words for one in heard) == 2
+
+
+def test_the_code_counts_by_content(tmp_path, monkeypatch):
+    files = {name: tmp_path / name for name in
+             ("errors.py", "runs/starts.py", "templates/marc/deck.j2", "tests/test_a.py",
+              "docs/make_api.py", "fits/__pycache__/start.pyc")}  # fmt: skip
+    for path in (*files.values(), tmp_path / "runs/__init__.py", tmp_path / "tests/__init__.py"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    monkeypatch.setattr(cluster, "ROOT", tmp_path)
+    counted = {}
+    for name, path in files.items():
+        before = cluster._code()
+        path.write_text("changed")
+        counted[name] = cluster._code() != before
+    assert counted == {name: k < 3 for k, name in enumerate(files)}
+    monkeypatch.undo()
+    assert cluster.version()[2] == cluster._code()
+
+
+def test_workers_that_come_later_are_waited_for_and_used():
+    distributed: Any = needs.library("distributed")
+    options = {"processes": False, "dashboard_address": ":0", "silence_logs": 50}
+    heard: list[Announcement] = []
+    with distributed.LocalCluster(n_workers=0, **options) as local, hearing(heard.append):
+        running = Executor(scheduler=local.scheduler_address).run_tasks(
+            lambda: lambda number, tell: 10 * number, [1, 2, 3]
+        )
+        assert next(running) is None
+        assert heard[-1].words == "waiting for a worker of the cluster"
+        local.scale(1)
+        assert sorted(filter(None, running)) == [10, 20, 30]
+        assert heard[-1] == Announcement("", heard[0].of)
+
+
+def test_without_a_scheduler_the_command_ends_at_once(strips_project, tmp_path, monkeypatch):
+    begun = time.monotonic()
+    arguments = ("fit", strips_project.path, "--out", tmp_path / "out")
+    done = in_process(*arguments, "--scheduler", NOBODY, cwd=tmp_path, code=2)
+    assert f"--scheduler: no Dask scheduler answers at {NOBODY}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1 and not (tmp_path / "out").exists()
+    assert time.monotonic() - begun < 15
+    monkeypatch.setenv("BUBBLEFIT_SCHEDULER", "nonsense://x")
+    done = in_process(*arguments, cwd=tmp_path, code=2)
+    assert "no Dask scheduler answers at nonsense://x" in done.stderr
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert "pip install 'bubblefit[cluster]'" in complaint(check, NOBODY)
+
+
+def test_a_scheduler_counts_licences(scheduler, tmp_path):
+    runs = tmp_path / "runs"
+
+    def prepare():
+        given = {
+            "licences": 1, "licence_folder": str(tmp_path / f"locks-{os.getpid()}"),
+            "licence_scheduler": scheduler,
+        }  # fmt: skip
+        return solving(licences.licensed(CountedSolver(runs, 0.1), "counted", given))
+
+    tasks(scheduler, prepare, 6)
+    found = seen(runs)
+    assert found.most == 1 and found.ended == {str(n): 1 for n in range(6)}
+    assert len(list(tmp_path.glob("locks-*"))) == 2
+
+
+def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(scheduler, tmp_path):
+    runs, given = tmp_path / "runs", {"licences": 2, "licence_folder": str(tmp_path / "locks")}
+
+    def end_with_program():
+        log = runs / "log"
+        while not (log.exists() and "begin 0 " in log.read_text()):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def task(number, tell):
+        dies = number == 0 and not (tmp_path / "died").exists()
+        if dies:
+            (tmp_path / "died").touch()
+            Thread(target=end_with_program).start()
+        solver = CountedSolver(runs, 5.0 if dies else 0.05)
+        return licences.licensed(solver, "counted", given).run(number, None)
+
+    here: list[Any] = []
+    local = Thread(target=lambda: here.extend(Executor(2).run_tasks(always(task), range(10, 18))))
+    local.start()
+    there = tasks(scheduler, always(task), 8)
+    local.join(60)
+    assert sorted(there + [one for one in here if one is not None]) == [*range(8), *range(10, 18)]
+    found = seen(runs)
+    assert found.most == 2
+    assert found.begun == {**found.ended, "0": 2}  # the one that was killed never ended
+    assert set(found.ended.values()) == {1} and len(found.ended) == 16
+
+
+def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
+    def take(count):
+        given = licences.licence_settings(
+            "acme", {"licences": count, "licence_folder": str(tmp_path)}
+        )
+        with licences.held("acme", given, scheduler):
+            pass
+
+    take(2)
+    assert complaint(take, 3).startswith("solver.acme.licences: the cluster counts another number")
+
+
+def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
+    monkeypatch.setattr(licences, "CONNECT_S", 1.0)
+    distributed: Any = needs.library("distributed")
+    given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
+    options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}
+    with distributed.LocalCluster(**options) as local:
+        address = local.scheduler_address
+        with licences.held("acme", given, address):
+            local.close()
+    for place in (address, NOBODY):
+        with pytest.raises(BubblefitError, match="leases no licence") as caught:
+            licences.held("acme", given, place).__enter__()
+        assert caught.value.exit_code == 4 and str(caught.value).startswith(place)
+    with licences.held("acme", given):
+        pass
+
+
+def test_a_fit_hands_its_scheduler_to_the_solver(strips_project):
+    project = strips_project.with_scheduler("tcp://there:1")
+    assert executor_of(project).scheduler == project.options_of("marc")["licence_scheduler"]
+    assert "licence_scheduler" not in strips_project.options_of("marc")
+    assert "licence_scheduler" not in project.solver_options["marc"]
+
+
+def wait_for(there: Callable[[], object]) -> None:
+    end = time.monotonic() + 30
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.01)

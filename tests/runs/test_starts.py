@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,9 +14,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
-from bubblefit.cli.progress import FitsProgress, StudyProgress
+from bubblefit.cli.progress import FitsProgress
 from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
-from bubblefit.experiments.bubble.test import BubbleTest
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
@@ -32,7 +30,7 @@ from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord, run_star
 
 from ..commands import result_in
 from ..places import KNOWN
-from ..projects import BUBBLE, constant_strips, project_file
+from ..projects import BUBBLE, project_file
 
 
 class Problem:
@@ -55,18 +53,15 @@ OPTIMUM = SimpleNamespace(
 )  # fmt: skip
 
 
-def started(
-    monkeypatch: pytest.MonkeyPatch, problem: Problem, optimum: Any
-) -> tuple[StartRecord, list[EvaluationRecord]]:
+def started(monkeypatch, problem, optimum):
     """Two analyses by the surrogate, and one of each of the program's, one of which failed."""
 
-    def fit_from(problem: Any, begun: Any, options: Any, near: bool) -> Any:
+    def fit_from(problem, begun, options, near):
         assert (begun, options, near) == ("at start 4 of 7", "options", False)
-        problem.surrogate.watch(Y, 0.9, "ok", "membrane")
-        problem.surrogate.watch(Y, 0.8, "ok", "membrane")
-        problem.watch(Y, None, "no licence", "calculix")
-        problem.watch(Y, 0.75, "ok", "calculix")
-        problem.watch(Y, 0.75, "ok", "calculix")
+        for value in (0.9, 0.8):
+            problem.surrogate.watch(Y, value, "ok", "membrane")
+        for value, status in ((None, "no licence"), (0.75, "ok"), (0.75, "ok")):
+            problem.watch(Y, value, status, "calculix")
         return optimum
 
     strains = {"a short one": [0.1, 0.3, 0.0], "a long one": [0.2, 0.1, 0.0]}
@@ -102,14 +97,11 @@ def test_what_is_told_and_counted(monkeypatch, problem):
     assert problem.watch is None and problem.surrogate.watch is None
 
 
-def test_runs_from_the_cache_are_counted_apart(monkeypatch, problem):
+def test_runs_from_the_cache_and_of_our_own_are_counted_apart(monkeypatch, problem):
     problem.cached = 2
     record, _ = started(monkeypatch, problem, OPTIMUM)
     assert (record.external_runs, record.cached_runs, record.analyses) == (1, 2, 5)
     assert StartRecord.from_json(record.to_json()) == record
-
-
-def test_runs_of_a_solver_of_our_own_are_no_external_ones(monkeypatch):
     own = Problem("calculix", False, Problem("membrane", False))
     assert started(monkeypatch, own, OPTIMUM)[0].external_runs == 0
 
@@ -129,9 +121,6 @@ def test_no_optimum(monkeypatch, problem, own, leads, why):
         4, (7, 4), None, f"calculix failed: {why}", 5, (), (), record.wall_s, 3, why
     )
     assert len(told) == 5
-
-
-def test_a_failure_that_ended_it_is_kept(monkeypatch, problem):
     cut = SimpleNamespace(**{**vars(OPTIMUM), "failure": "killed", "status": "killed"})
     record, _ = started(monkeypatch, problem, cut)
     assert (record.objective, record.status, record.failure) == (0.75, "killed", "killed")
@@ -142,11 +131,9 @@ def test_no_feasible_start_is_no_failure(monkeypatch, problem):
         raise NoFeasibleStart("none in 1000 draws")
 
     monkeypatch.setattr(room, "feasible_start", none)
-    options: Any = None
-    record = run_start(problem, options, 7, 4, lambda told: None)
-    assert record == StartRecord(
-        4, (7, 4), None, "none in 1000 draws", 0, (), (), record.wall_s, 0, ""
-    )
+    record = run_start(problem, None, 7, 4, lambda told: None)
+    why = "none in 1000 draws"
+    assert record == StartRecord(4, (7, 4), None, why, 0, (), (), record.wall_s, 0, "")
     assert problem.watch is None
 
 
@@ -174,9 +161,9 @@ def test_from_the_optimum_of_the_coarse_mesh(monkeypatch):
 def test_a_record_of_an_older_version():
     record = StartRecord(1, (7, 1), 0.5, "ok", 3, (1.0,), (2.0,), 0.25)
     said = record.to_json()
-    assert (said.pop("external_runs"), said.pop("failure")) == (0, "")
-    later = ("reached", "mesh", "coarse_objective", "coarse_analyses", "same_as", "cached_runs")
-    assert [said.pop(name) for name in later] == [(), "full", None, 0, None, 0]
+    later = {"external_runs": 0, "failure": "", "reached": (), "mesh": "full", "cached_runs": 0,
+             "coarse_objective": None, "coarse_analyses": 0, "same_as": None}  # fmt: skip
+    assert {name: said.pop(name) for name in later} == later
     assert StartRecord.from_json(said) == record
     for key in said:
         with pytest.raises(KeyError):
@@ -203,6 +190,11 @@ def fitted(folder):
     fit = bf.fit(project(folder), out=folder / "out")
     fit.report(folder / "out")
     return fit
+
+
+@pytest.fixture(scope="module")
+def strips(strips_project):
+    return bf.fit(strips_project.with_fit(coarse_to_fine=True), jobs=1)
 
 
 def test_one_start_of_an_optimum_goes_on_to_the_full_mesh(fitted):
@@ -276,15 +268,13 @@ def test_interrupted_in_either_stage_it_ends_the_same(fitted, folder, tmp_path, 
         assert again.result[key] == fitted.result[key]
 
 
-def test_it_is_the_optimum_of_the_full_way(fitted):
+def test_it_is_the_optimum_of_the_full_way(fitted, tmp_path):
     full = bf.fit(fitted.project.with_fit(coarse_to_fine=False, starts=1))
     assert full.objective < 1e-6
     assert moduli_apart(fitted.problem, full.best.ranked[0], fitted.best.ranked[0]) < 1e-3
     assert full.stages == "" and full.coarse_to_fine is None
     assert full.result["coarse_to_fine"] is None and "same_as" not in full.result["starts"][0]
-
-
-def test_without_a_coarser_mesh_every_start_runs_on_the_full_one(tmp_path):
+    # Without a coarser mesh every start runs on the full one.
     fit = bf.fit(project(tmp_path, ("elements = 192", "elements = 48")).with_fit(starts=1))
     assert fit.coarse_to_fine is None and [r.mesh for r in fit.best.records] == ["full"]
     assert fit.stages == "no test has a coarser mesh: every start ran on the full one"
@@ -296,6 +286,8 @@ def test_the_same_data_on_larger_quads(fitted):
     (few,), (many,) = coarse.comparisons, full.comparisons
     assert (len(few.model.mesh.quads), len(many.model.mesh.quads)) == (12, 48)
     assert few.model.increments == many.model.increments
+    with pytest.raises(InputError, match="12 quads are too few for a disk"):
+        setup.tests[0].finer(lambda name=None: None, Weighting(), 0.25)
     y = full.unknowns.at(fitted.law.beta[list(full.unknowns.free)])
     point = coarse.evaluate(y, True)
     assert point is not None and point.jacobian.shape == (len(full.scale), 3)
@@ -303,24 +295,24 @@ def test_the_same_data_on_larger_quads(fitted):
     assert 1e-3 < off.max() < 2.0  # mm, of an apex of 20 mm
 
 
-def test_too_few_quads_are_no_disk(tmp_path):
-    prepared = bf.fit(project(tmp_path).with_fit(starts=1)).setup.tests[0]
-    with pytest.raises(InputError, match="12 quads are too few for a disk"):
-        prepared.finer(lambda name=None: None, Weighting(), 0.25)
-
-
-def test_strips_coarsen_too(tmp_path):
-    settings = bf.read_project(constant_strips(tmp_path)).with_fit(coarse_to_fine=True)
-    fit = bf.fit(settings, jobs=1)
-    quads = fit.coarse_to_fine.quads
+def test_strips_coarsen_and_refine_too(strips):
+    quads = strips.coarse_to_fine.quads
     assert set(quads) == {"one: warp", "one: fill", "two: warp"}
     assert all(coarse < full for coarse, full in quads.values())
     # Straight strips are homogeneous: their optimum is that of any mesh.
-    for record in fit.best.records:
+    for record in strips.best.records:
         assert record.objective == pytest.approx(record.coarse_objective, rel=1e-6)
+    prepared = strips.setup.tests[0]
+    own = prepared.comparisons(strips.setup.make_solver, Weighting())
+    finer = prepared.finer(strips.setup.make_solver, Weighting(), 2.0)
+    for coarse, fine in zip(own, finer, strict=True):
+        assert len(fine.model.mesh.quads) == 4 * len(coarse.model.mesh.quads)
+        assert fine.model.elongations == coarse.model.elongations
+        assert fine.name == coarse.name
+    assert all(np.abs(off).max() < 1e-6 for off in strips.best.certainty.mesh.values())
 
 
-def ended(fit: bf.Fit, number: int, value: float | None, moduli: Any = (80.0, 400.0, 800.0)) -> Any:
+def ended(fit, number, value, moduli=(80.0, 400.0, 800.0)):
     """A start that ended with moduli (G12, E2, E1) in MPa."""
     unknowns = tuple(fit.problem.unknowns.at(np.array(moduli)).tolist())
     return StartRecord(
@@ -329,7 +321,7 @@ def ended(fit: bf.Fit, number: int, value: float | None, moduli: Any = (80.0, 40
     )  # fmt: skip
 
 
-def numbers(groups: Any) -> list[list[int]]:
+def numbers(groups):
     return [[record.number for record in group] for group in groups]
 
 
@@ -348,9 +340,7 @@ def test_optima_are_told_apart_by_moduli_and_by_what_they_leave(fitted):
     fine = [ended(fitted, 0, 1e-9), ended(fitted, 1, 9e-8)]
     assert numbers(distinct(fitted.problem, fine, 1e-7)) == [[0, 1]]
     assert numbers(distinct(fitted.problem, fine, 1e-8)) == [[0], [1]]
-
-
-def test_moduli_are_compared_up_to_what_either_optimum_reached(fitted):
+    # Moduli are compared up to what either optimum reached.
     a, b = ended(fitted, 0, 0.1), ended(fitted, 1, 0.1, (80.0, 400.0, 816.0))
     assert moduli_apart(fitted.problem, b, a) == pytest.approx(0.02)
 
@@ -380,82 +370,75 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
             assert own[-1].objective == 0.0 and own[-1].coarse_objective == 0.2
 
 
-def said(progress: StudyProgress) -> tuple[str, int, int, str]:
-    return progress.what, progress.done, progress.total, progress.note().split(",")[0]
-
-
 def test_progress_counts_each_stage_and_forgets_the_other_meshs_objective(fitted):
-    def events():
-        yield Stage("starts on the coarse mesh", 2)
-        yield ended(fitted, 0, 0.5)
-        yield ended(fitted, 1, 0.25)
-        yield Stage("distinct optima on the full mesh", 1)
-
     progress = FitsProgress(2, quiet=True)
-    heard = []
-    for event in events():
+    coarse, full = "starts on the coarse mesh", "distinct optima on the full mesh"
+    for event, *said in (
+        (Stage(coarse, 2), coarse, 0, 2, "no analysis yet"),
+        (ended(fitted, 0, 0.5), coarse, 1, 2, "best 0.5"),
+        (ended(fitted, 1, 0.25), coarse, 2, 2, "best 0.25"),
+        (Stage(full, 1), full, 0, 1, "no analysis yet"),
+        ("the next fit", "starts", 0, 2, "no analysis yet"),
+    ):
         progress.saw(event)
-        heard.append(said(progress))
-    assert heard == [
-        ("starts on the coarse mesh", 0, 2, "no analysis yet"),
-        ("starts on the coarse mesh", 1, 2, "best 0.5"),
-        ("starts on the coarse mesh", 2, 2, "best 0.25"),
-        ("distinct optima on the full mesh", 0, 1, "no analysis yet"),
-    ]
-    progress.saw("the next fit")
-    assert said(progress) == ("starts", 0, 2, "no analysis yet")
+        note = progress.note().split(",")[0]
+        assert [progress.what, progress.done, progress.total, note] == said
 
 
 #: Quads of the fit's disk; of a mesh so fine beside it that it is the limit.
 COARSE, FINE = 192, 7200
 
 
-@cache
-def fit(own_data: bool = False) -> bf.Fit:
-    """The known solution's data of a fine mesh, matched on a coarse one."""
+def known(elements):
+    """The known solution's data of another mesh, matched on the coarse one."""
     project = bf.read_project(KNOWN).with_fit(starts=1)
     (test,) = project.tests.values()
-    assert isinstance(test, BubbleTest)
-    data = replace(test.data, elements=COARSE if own_data else FINE)
-    case = replace(test, elements=COARSE, data=data)
+    case = replace(test, elements=COARSE, data=replace(test.data, elements=elements))
     return bf.fit(replace(project, tests={test.name: case}))
 
 
-def errors(fitted: bf.Fit) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """By modulus: how far the truth is off the fit along its strains, and how far it is said to
-    be."""
+@pytest.fixture(scope="module")
+def off():
+    return known(FINE)
+
+
+@pytest.fixture(scope="module")
+def own():
+    return known(COARSE)
+
+
+def errors(fitted):
+    """By modulus: how far the truth is off the fit along its strains, and how far it is said to."""
     sure, (test,) = fitted.best.certainty, fitted.setup.tests
-    return {
-        name: (
-            test.known.modulus(name, strain) / fitted.law.modulus(name, strain) - 1.0,
-            sure.mesh[name],
-        )
+    return [
+        (test.known.modulus(name, strain) / fitted.law.modulus(name, strain) - 1.0, sure.mesh[name])
         for name, strain in sure.strain.items()
-    }
+    ]
 
 
-def test_the_estimate_is_the_error():
+def test_the_estimate_is_the_error(off):
     """Moduli of a coarse mesh are off by 7 to 28 %; two thirds of that and more is foretold."""
-    for name, (true, said) in errors(fit()).items():
+    for true, said in errors(off):
         largest = np.abs(true).max()
-        assert largest > 0.07, name
-        assert np.abs((1 + said) / (1 + true) - 1).max() < largest / 3, name
+        assert largest > 0.07
+        assert np.abs((1 + said) / (1 + true) - 1).max() < largest / 3
 
 
-def test_data_of_the_same_model_have_no_mesh_error():
-    for name, (true, said) in errors(fit(own_data=True)).items():
-        assert np.abs(true).max() < 1e-3, name
-        assert np.abs(said).max() < 1e-3, name
+def test_data_of_the_same_model_have_no_mesh_error(own):
+    for true, said in errors(own):
+        assert np.abs(true).max() < 1e-3
+        assert np.abs(said).max() < 1e-3
+    best = replace(own.best.differentiated, residual=0 * own.best.differentiated.residual)
+    limit = limit_of(own.problem, best, best.residual, 2.0)
+    assert not limit.step.any() and not limit.residual.any()
 
 
-def test_noise_and_mesh_are_put_together_everywhere():
-    fitted = fit()
-    sure = fitted.best.certainty
-    table = fitted.moduli()
+def test_noise_and_mesh_are_put_together_everywhere(off):
+    sure, table = off.best.certainty, off.moduli()
+    said = off.result["uncertainty"]
     for name in COMPONENTS:
-        assert sure.total[name] == pytest.approx(
-            np.sqrt(sure.sigma[name] ** 2 + sure.mesh[name] ** 2)
-        )
+        both = np.sqrt(sure.sigma[name] ** 2 + sure.mesh[name] ** 2)
+        assert sure.total[name] == pytest.approx(both)
         rows = table[table["modulus"] == name]
         for column, along in (
             ("sigma_relative", sure.total),
@@ -464,89 +447,63 @@ def test_noise_and_mesh_are_put_together_everywhere():
         ):
             expected = np.interp(rows["strain"], sure.strain[name], along[name])
             assert rows[column].to_numpy() == pytest.approx(expected, rel=1e-12)
-    said = fitted.result["uncertainty"]
-    for name in COMPONENTS:
         assert said["largest_relative_mesh"][name] == np.abs(sure.mesh[name]).max()
         assert said["largest_relative_total"][name] == sure.total[name].max()
 
 
 def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
-    strain = np.array([0.0, 0.05, 0.1])
-    sure = Certainty({}, dict.fromkeys(COMPONENTS, strain), {
-        "E1": np.array([0.02, 0.03, 0.03]), "E2": np.full(3, 0.001), "G12": np.full(3, 0.5),
-    }, ())  # fmt: skip
-    mesh = {
-        "E1": np.array([0.01, -0.044, 0.031]), "E2": np.full(3, 0.009), "G12": np.full(3, -0.4),
-    }  # fmt: skip
-    (note,) = notes_of_mesh(sure, mesh)
+    strain = dict.fromkeys(COMPONENTS, np.array([0.0, 0.05, 0.1]))
+    sigma = {"E1": [0.02, 0.03, 0.03], "E2": [0.001] * 3, "G12": [0.5] * 3}
+    mesh = {"E1": [0.01, -0.044, 0.031], "E2": [0.009] * 3, "G12": [-0.4] * 3}
+    sigma, mesh = ({n: np.array(v) for n, v in of.items()} for of in (sigma, mesh))
+    (note,) = notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
     assert note.kind is MESH
     assert "E1" in note and "-4.4 %" in note and "0.050" in note and "(3 %)" in note
 
 
-def test_strips_are_asked_on_finer_quads(tmp_path):
-    fitted = bf.fit(bf.read_project(constant_strips(tmp_path)), starts=1)
-    prepared = fitted.setup.tests[0]
-    own = prepared.comparisons(fitted.setup.make_solver, Weighting())
-    finer = prepared.finer(fitted.setup.make_solver, Weighting(), 2.0)
-    for coarse, fine in zip(own, finer, strict=True):
-        assert len(fine.model.mesh.quads) == 4 * len(coarse.model.mesh.quads)
-        assert fine.model.elongations == coarse.model.elongations
-        assert fine.name == coarse.name
-    assert all(np.abs(off).max() < 1e-6 for off in fitted.best.certainty.mesh.values())
+class Unable:
+    """A test of a kind that has nothing finer."""
 
 
-def test_where_it_cannot_be_known(monkeypatch):
-    fitted = fit()
-    plain = replace(fitted.best, certainty=None)
+def test_where_it_cannot_be_known(off, monkeypatch):
+    plain = replace(off.best, certainty=None)
 
     def again(**changes):
-        setup = replace(fitted.setup, **changes)
-        return with_certainty(setup, fitted.problem, plain).certainty
+        return with_certainty(replace(off.setup, **changes), off.problem, plain)
 
-    class Unable:
-        """A test of a kind that has nothing finer."""
-
-    assert again(tests=(Unable(),)).mesh is None
-    monkeypatch.setattr(type(fitted.problem.solver), "external", True)
-    assert again().mesh is None
+    assert again(tests=(Unable(),)).certainty.mesh is None
+    # An error that is not known is not taken out.
+    settings = off.project.fit.model_copy(update={"mesh_error": "taken out"})
+    best = again(tests=(Unable(),), project=replace(off.project, fit=settings))
+    assert best.law is off.best.law and not best.certainty.taken_out
+    assert "not taken out" in best.certainty.undetermined[-1]
+    monkeypatch.setattr(type(off.problem.solver), "external", True)
+    assert again().certainty.mesh is None
     monkeypatch.undo()
     for error in (SolverFailure("no equilibrium", "membrane"), InputError(None, "elements", "no")):
         monkeypatch.setattr(mesh_error, "residual_of", lambda *_, e=error: (_ for _ in ()).throw(e))
-        sure = again()
+        sure = again().certainty
         assert sure.mesh is None and sure.total == sure.sigma
         assert sure.undetermined[-1].kind is MESH
         assert str(sure.undetermined[-1]).startswith("the error of the mesh is not known: ")
 
 
-def test_a_finer_model_of_other_rows_is_refused():
-    fitted = fit()
-    problem, best = fitted.problem, fitted.best.differentiated
-    with pytest.raises(SolverFailure, match="does not give what was matched"):
-        residual_of(problem, problem.comparisons * 2, best, fitted.law)
-
-
-def test_nothing_to_move():
-    fitted = fit(own_data=True)
-    best = replace(fitted.best.differentiated, residual=0 * fitted.best.differentiated.residual)
-    limit = limit_of(fitted.problem, best, best.residual, 2.0)
-    assert not limit.step.any() and not limit.residual.any()
-
-
-def test_what_the_mesh_leaves_is_no_noise():
-    fitted = fit()
-    before = fitted.misfits["bubble"].rms
+def test_what_the_mesh_leaves_is_no_noise(off):
+    before = off.misfits["bubble"].rms
     assert before > 0.02
-    assert fitted.best.certainty.noise["bubble"] == 0.05  # the least, whatever is left
-    problem, best = fitted.problem, fitted.best.differentiated
-    (test,) = fitted.setup.tests
-    finer = test.finer(fitted.setup.make_solver, Weighting(), 2.0)
-    limit = limit_of(problem, best, residual_of(problem, finer, best, fitted.law), 2.0)
+    assert off.best.certainty.noise["bubble"] == 0.05  # the least, whatever is left
+    problem, best = off.problem, off.best.differentiated
+    (test,) = off.setup.tests
+    finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
+    limit = limit_of(problem, best, residual_of(problem, finer, best, off.law), 2.0)
     after = float(np.sqrt(np.mean((limit.residual * problem.scale) ** 2)))
     assert after < 0.5 * before
+    with pytest.raises(SolverFailure, match="does not give what was matched"):
+        residual_of(problem, problem.comparisons * 2, best, off.law)
 
 
-def test_the_error_is_taken_out_where_the_project_says_so():
-    fitted = fit()
+def test_the_error_is_taken_out_where_the_project_says_so(off):
+    fitted = off
     settings = fitted.project.fit.model_copy(update={"mesh_error": "taken out"})
     setup = replace(fitted.setup, project=replace(fitted.project, fit=settings))
     plain = replace(fitted.best, certainty=None)
@@ -575,17 +532,3 @@ def test_the_error_is_taken_out_where_the_project_says_so():
     assert again.law is best.law and again.laws[0] is best.law
     rows = again.moduli().query("modulus == 'E1'")
     assert rows["upper_MPa"].to_numpy() == pytest.approx(sure.band["E1"][1], rel=1e-9)
-
-
-def test_an_error_that_is_not_known_is_not_taken_out():
-    fitted = fit()
-    settings = fitted.project.fit.model_copy(update={"mesh_error": "taken out"})
-
-    class Unable:
-        """A test of a kind that has nothing finer."""
-
-    project = replace(fitted.project, fit=settings)
-    setup = replace(fitted.setup, project=project, tests=(Unable(),))
-    best = with_certainty(setup, fitted.problem, replace(fitted.best, certainty=None))
-    assert best.law is fitted.best.law and not best.certainty.taken_out
-    assert "not taken out" in best.certainty.undetermined[-1]

@@ -15,7 +15,7 @@ from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.runs import compare
 from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare_laws
-from bubblefit.runs.series import StudyRecord, mark_of
+from bubblefit.runs.simulation import StudyRecord, mark_of
 from bubblefit.solvers.base import SNAP
 
 from ..projects import ELONGATION, MODULI, constant_strips

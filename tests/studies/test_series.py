@@ -17,10 +17,16 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import study_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import read_page_data
-from bubblefit.runs import series as module
 from bubblefit.runs import simulation as analyses
+from bubblefit.runs import simulation as module
 from bubblefit.runs.folder import FOLDER
-from bubblefit.runs.series import card_of, part_name, parts_of, studied_tests, thickness_notes
+from bubblefit.runs.simulation import (
+    card_of,
+    part_name,
+    parts_of,
+    studied_tests,
+    thickness_notes,
+)
 from bubblefit.solvers.base import SNAP
 
 from ..bars import BarKind, BarTest, project_of
