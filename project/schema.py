@@ -70,7 +70,10 @@ class MarginSection(Section):
 
 
 class LawSection(Section):
-    """[law]: the form of the moduli, and their bounds; keys beyond these are the form's."""
+    """[law]: the form of the moduli, and between what they are looked for.
+
+    Keys beyond these belong to a form (knots, breaks); it checks them.
+    """
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Any] = Field(init=False)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import bubblefit as bf
-import bubblefit.runs.folder
+import bubblefit.runs.fit
 import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
@@ -172,7 +172,7 @@ def test_everything_that_differs_is_named(first, tmp_path):
 
 def test_another_version_is_named(first, tmp_path, monkeypatch):
     setup = prepared(written(tmp_path))
-    for module in (bubblefit.solvers.run_cache, bubblefit.runs.folder):
+    for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'

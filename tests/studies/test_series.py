@@ -84,7 +84,7 @@ def test_analyses_are_told_one_after_the_other(bars):
     assert series.total == 0 and series.solver is bars
     series.total = 2
     for part in parts_of(project_of(test), [test], 0.5).values():
-        history = series.run(part, CARD.law)
+        history = series.run_part(part, CARD.law)
     assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps] == [
         ("warp", 1, 2, 0.0, 4), ("warp", 1, 2, 4.0, 4),
         ("fill", 2, 2, 0.0, 4), ("fill", 2, 2, 4.0, 4),
