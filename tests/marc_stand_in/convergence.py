@@ -14,7 +14,7 @@ from bubblefit.solvers.membrane.newton import Membrane
 
 from .deck import Array, Content, Control, DeckError
 
-#: displacement (n, 3) mm, unbalance (n, 3) N: what supports take; contact (n, 3) N, or None.
+#: displacement (n, 3) mm, unbalance (n, 3) N: what supports take; contact (n, 3) N, or 0.
 State = namedtuple("State", "displacement unbalance contact")
 
 
@@ -59,7 +59,7 @@ def converging(control: Control, found: Callable[[State], None] | None = None) -
             return
         # Residuals hold the push of the bodies as well, with its sign changed: gone from there.
         residual = self.residual.reshape(self.reference.shape).copy()
-        found(State(self.evaluated, residual, sum(self.contact) if bodies else None))
+        found(State(self.evaluated, residual, sum(self.contact) if bodies else 0.0))
 
     def full(original: Any) -> Any:
         def equilibrium(self: Any, u: Array, pressure: float) -> Array | None:

@@ -17,18 +17,16 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import BubblefitError
-from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.mesh import volume_and_gradient
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from marc_files import STS_HEAD, sts_line, t19_frame, t19_head
 
 from .convergence import State, control_of, converging
-from .deck import Array, Content, DeckError, level, read_deck
+from .deck import Array, Content, DeckError, read_deck
 from .laws import NotCompiled, compiled, law_of_subroutine, law_of_tables
 from .models import model_of, schedule_of
 
@@ -72,29 +70,26 @@ def command_of(arguments: Sequence[str]) -> argparse.Namespace:
     return found
 
 
-def fault_of(environment: Mapping[str, str], job: str) -> str:
+def fault_of(job: str) -> str:
     """Return the fault of this run, which is counted."""
-    folder = environment.get("MARC_STAND_IN_FOLDER")
-    said = environment.get("MARC_STAND_IN_FAULT", "")
-    if folder and not said and (Path(folder) / "fault").exists():
-        said = (Path(folder) / "fault").read_text()
+    folder = Path(os.environ.get("MARC_STAND_IN_FOLDER", os.devnull))
+    said = os.environ.get("MARC_STAND_IN_FAULT", "")
+    if not said and (folder / "fault").exists():
+        said = (folder / "fault").read_text()
     kind, _, numbers = said.strip().partition("@")
-    counted, runs = Path(folder or ".") / "runs", 1
-    if folder and counted.exists():
-        runs = len(counted.read_text().splitlines()) + 1
-    if not kind or (numbers and str(runs) not in numbers.split(",")):
+    before = (folder / "runs").read_text() if (folder / "runs").exists() else ""
+    if not kind or (numbers and str(before.count("\n") + 1) not in numbers.split(",")):
         kind = "none"
     if kind not in FAULTS:
         sys.exit(f"marc stand-in: no fault {kind!r}; there are {', '.join(FAULTS)}")
-    if folder:
-        with counted.open("a") as stream:
-            stream.write(f"{job} {kind}\n")
+    if folder.is_dir():
+        (folder / "runs").write_text(f"{before}{job} {kind}\n")
     return kind
 
 
 def run(command: argparse.Namespace) -> tuple[int, str]:
     """Run a job; return what run_marc returns and prints."""
-    fault = fault_of(os.environ, command.job)
+    fault = fault_of(command.job)
     if fault == "silent":
         return 0, ""
     if fault == "stale":
@@ -138,10 +133,8 @@ class Files:
     """What a job writes; every line is on disk at once."""
 
     def __init__(self, folder: Path, name: str) -> None:
-        self.open = {
-            end: (folder / f"{name}.{end}").open("w", encoding="ascii")
-            for end in ("sts", "out", "log", "t19")
-        }
+        ends = ("sts", "out", "log", "t19")
+        self.open = {e: (folder / f"{name}.{e}").open("w", encoding="ascii") for e in ends}
         self.write("sts", STS_HEAD)
         self.write("out", f" MSC Marc stand-in of bubblefit (no MSC software), job {name}\n")
 
@@ -156,7 +149,11 @@ class Files:
 
 def solve(content: Content, command: argparse.Namespace, files: Files, fault: str) -> None:
     """Run the analysis to its end, or raise what ended it."""
-    law = _law(content, command.user, command.folder)
+    library = None if command.user is None else compiled(command.user, command.folder)
+    if library is None and content.law == "hypoelastic":
+        raise DeckError("hypoelastic with a user subroutine, and none was given (-u)")
+    nlelast = content.law == "nlelast"
+    law = law_of_tables(content) if nlelast else law_of_subroutine(library, content.states)
     control = control_of(content)
     running = Running(content, files, fault)
     with converging(control):
@@ -179,15 +176,6 @@ def solve(content: Content, command: argparse.Namespace, files: Files, fault: st
             path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-def _law(content: Content, user: Path | None, folder: Path) -> HypoelasticLaw:
-    library = None if user is None else compiled(user, folder)
-    if content.law == "nlelast":
-        return law_of_tables(content)
-    if library is None:
-        raise DeckError("hypoelastic with a user subroutine, and none was given (-u)")
-    return law_of_subroutine(library, content.states)
-
-
 class Running:
     """What is written with every increment; rests : in which increments nothing moves."""
 
@@ -198,7 +186,7 @@ class Running:
         self.halfway = len(self.schedule.times) - count + max(1, count // 2)
         quads, zero = content.connectivity - 1, np.zeros((content.nodes, 3))
         files.write("t19", t19_head(content.coordinates, quads, content.type, content.title))
-        files.write("t19", t19_frame(0, 0.0, self._vectors(State(zero, zero, None))))
+        files.write("t19", t19_frame(0, 0.0, self._vectors(State(zero, zero, 0.0))))
 
     def found(self, state: State) -> None:
         """Write the solver's next increment, and those after it in which nothing moves."""
@@ -233,26 +221,17 @@ class Running:
             self.files.write("sts", line)
 
     def _vectors(self, state: State) -> dict[str, Array]:
-        """Return displacement (mm), external, reaction and contact forces (N) of every node."""
-        content, i = self.content, self.increment
-        case = content.cases[int(self.schedule.case[i - 1])]
-        held = np.zeros(state.displacement.shape, dtype=bool)
-        external = np.zeros_like(state.displacement)
+        """Return displacement (mm), reaction and contact forces (N) of every node."""
+        content = self.content
+        case = content.cases[int(self.schedule.case[self.increment - 1])]
+        reaction = np.zeros_like(state.displacement)
         for c in (content.conditions[name] for name in case.conditions):
-            for dof in c.dofs:
-                if dof <= 3:
-                    held[content.sets["node"][c.on] - 1, dof - 1] = True
-            # A closed cavity's pressure is in no list of loads.
-            if i and c.kind != "fixed" and c.tables != [0]:
-                push = level(content.tables[c.tables[0]], self.schedule.times[i - 1])
-                quads = (content.connectivity - 1).astype(np.intp)
-                moved = content.coordinates + state.displacement
-                external = push * volume_and_gradient(moved, quads)[1]
-        found = {"Displacement": state.displacement, "External Force": external,
-                 "Reaction Force": np.where(held, state.unbalance, 0.0)}  # fmt: skip
+            for dof in (dof - 1 for dof in c.dofs if dof <= 3):
+                on = content.sets["node"][c.on] - 1
+                reaction[on, dof] = state.unbalance[on, dof]
+        found = {"Displacement": state.displacement, "Reaction Force": reaction}
         if content.bodies:
-            none = np.zeros_like(state.displacement)
-            found["Contact Normal Force"] = none if state.contact is None else state.contact
+            found["Contact Normal Force"] = state.contact + np.zeros_like(reaction)
         return found
 
 

@@ -1,10 +1,9 @@
 """Find the law that a deck holds: in tables of NLELAST, or by calling its subroutine HYPELA2.
 
-The membrane solver takes piecewise cubics; a table is straight between its points. Each stretch of
-points on ONE cubic (least squares, to `EXACT` of the largest) is found, with jumps between two. So
-the stand-in's moduli are those of the law and not of its table, which differs by up to 2e-4 between
-two of 121 points. Points on no such curve are refused. Points of a subroutine are the moduli in its
-stiffness at zero increments, and its stress after one increment has to agree with them.
+Each stretch of points on ONE cubic (least squares, to `EXACT` of the largest) is found, with jumps
+between two: so the moduli are those of the law and not of its table, which differs by up to 2e-4
+between two of 121 points. Points on no such curve are refused. Those of a subroutine are the moduli
+in its stiffness, and its stress after one increment has to agree with them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """What a killed process leaves goes with the next one; what is in use, or kept, stays."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -125,7 +124,7 @@ def left(place, **said):
     return folder
 
 
-def test_whose_is_swept(tmp_path):
+def test_whose_is_swept(tmp_path, monkeypatch):
     stays = [
         left(tmp_path),  # of this process, on a file system without locks
         left(tmp_path, machine="other", boot="other"),
@@ -136,28 +135,26 @@ def test_whose_is_swept(tmp_path):
         left(tmp_path, boot="before the restart"),
         left(tmp_path, machine="another container", process="999999999"),
     ]
+    # In another container a process of ours has another number: what is locked stays.
+    locked = left(tmp_path, process="999999999")
+    code = "import sys, filelock; f = open(sys.argv[1], 'r+b'); "
+    code += "filelock.lock_descriptor(f.fileno()); print(1, flush=True); sys.stdin.read()"
+    holder = subprocess.Popen([sys.executable, "-c", code, locked / OWNER],
+                              stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # fmt: skip
+    holder.stdout.readline()
     assert sorted(sweep([tmp_path])) == sorted(goes)
-    assert all(folder.exists() for folder in stays)
-
-
-def test_what_is_locked_stays_whatever_it_says(tmp_path):
-    """In another container a process of ours has another number."""
-    folder = left(tmp_path, process="999999999")
-    process = os.fork()
-    if process == 0:
-        import fcntl
-
-        with open(folder / OWNER, "r+b") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            (tmp_path / "locked").touch()
-            time.sleep(60)
-        os._exit(0)
-    while not (tmp_path / "locked").exists():
-        time.sleep(0.01)
-    assert sweep([tmp_path]) == []
-    os.kill(process, signal.SIGKILL)
-    os.waitpid(process, 0)
-    assert sweep([tmp_path]) == [folder]
+    assert all(folder.exists() for folder in (*stays, locked))
+    holder.communicate()
+    assert sweep([tmp_path]) == [locked]
+    # A removal that is cut off leaves an owner.
+    folder = tmp_path / "bubblefit-t-1"
+    (folder / "deep").mkdir(parents=True)
+    (folder / "file").touch()
+    lock = claim(folder)
+    monkeypatch.setattr(scratch.shutil, "rmtree", lambda path, **_: None)  # cut off
+    clear(folder)
+    assert [path.name for path in folder.iterdir() if path.is_file()] == [OWNER]
+    os.close(lock)
 
 
 def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path):
@@ -175,17 +172,6 @@ def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path):
         os.utime(folder, (1e9, 1e9))
     assert sorted(sweep([tmp_path])) == [cut, empty]
     assert others.exists() and plain.exists() and link.is_symlink()
-
-
-def test_removal_that_is_cut_off_leaves_an_owner(tmp_path, monkeypatch):
-    folder = tmp_path / "bubblefit-t-1"
-    (folder / "deep").mkdir(parents=True)
-    (folder / "file").touch()
-    lock = claim(folder)
-    monkeypatch.setattr(scratch.shutil, "rmtree", lambda path, **_: None)  # cut off
-    clear(folder)
-    assert [path.name for path in folder.iterdir() if path.is_file()] == [OWNER]
-    os.close(lock)
 
 
 def test_the_usual_places_are_swept(tmp_path, monkeypatch):

@@ -36,27 +36,21 @@ def build(machine, code):
     return done.stderr
 
 
-def test_what_is_there_is_not_built_again(machine):
-    ccx = program(
-        machine / "cache" / "calculix" / "ccx-2.99-external" / "ccx",
-        "#!/bin/sh\necho 'This is Version 2.99'\n",
-    )
-    assert f"{ccx} is there already" in build(machine, 0)
-
-
-def test_without_apt_it_says_what_to_do(machine):
-    text = build(machine, 1)
-    assert text.count("\n") == 1
-    assert "apt-get is not there" in text and "BUBBLEFIT_CCX" in text
-    assert not list(machine.glob("cache/**/*"))
-
-
-def test_a_ccx_that_does_not_run_any_more_is_not_taken(machine):
-    program(machine / "cache" / "calculix" / "ccx-2.99-external" / "ccx", "#!/bin/sh\nexit 127\n")
-    assert "does not run any more" in build(machine, 1)
-    assert not list(machine.glob("cache/**/ccx"))
-
-
-def test_without_a_compiler_it_says_what_to_do(machine):
-    (machine / "bin" / "cc").unlink()
-    assert "as root: apt-get install gcc" in build(machine, 1)
+@pytest.mark.parametrize(
+    ("ccx", "code", "words"),
+    [
+        ("#!/bin/sh\necho 'This is Version 2.99'\n", 0, "ccx is there already"),
+        ("#!/bin/sh\nexit 127\n", 1, "does not run any more"),
+        (None, 1, "apt-get is not there"),
+        ("no compiler", 1, "as root: apt-get install gcc"),
+    ],
+)
+def test_what_is_there_is_not_built_again_and_what_lacks_is_named(machine, ccx, code, words):
+    if ccx == "no compiler":
+        (machine / "bin" / "cc").unlink()
+    elif ccx:
+        program(machine / "cache" / "calculix" / "ccx-2.99-external" / "ccx", ccx)
+    text = build(machine, code)
+    assert words in text
+    assert bool(list(machine.glob("cache/**/ccx"))) == (code == 0)
+    assert ccx is not None or (text.count("\n") == 1 and "BUBBLEFIT_CCX" in text)

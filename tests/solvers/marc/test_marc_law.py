@@ -21,15 +21,8 @@ from ...fortran_build import (
     reals,
     strain_path,
 )
+from ...marc_stand_in.laws import QUIT
 
-# What Marc has: a way to end the job.
-QUIT = """
-      subroutine quit(number)
-      integer number, last
-      common /asked/ last
-      last = number
-      end
-"""
 COUNTS = {"membrane": (3, 1), "thick shell": (5, 3)}  # ngens, nshear
 
 
@@ -210,34 +203,31 @@ def test_thick_shells_have_linear_transverse_shear(libraries):
     assert not point.call(np.zeros(5))[2].any()
 
 
-def test_free_form_is_the_same_subroutine(libraries):
-    fixed = Point(libraries("tri-linear"))
-    free = Point(libraries("tri-linear", "-ffree-form"))
+def test_wide_integers_free_form_and_materials_by_their_number(tmp_path, libraries):
+    """Marc compiles with 8-byte integers where its own are."""
+    law, new = LAWS["cubic"], reals(0.02, 0.01, 0.03)
+    options = ("-ffixed-form", "-fdefault-integer-8")
+    library = build(tmp_path / "wide", hypela2_source({1: law}), *options, beside=QUIT)
+    point = Point(library, integer=np.int64)
+    close(point.commit(new)[0], law.increment(np.zeros(3), new, np.zeros(3))[0][0])
+    assert point.asked.value == 0
+    fixed, free = (Point(libraries("tri-linear", f"-f{form}-form")) for form in ("fixed", "free"))
     for increment in np.diff(strain_path(5), axis=0, prepend=0):
         for one, other in zip(fixed.commit(increment), free.commit(increment), strict=True):
             assert np.array_equal(one, other)
-
-
-def test_wide_integers(tmp_path):
-    """Marc compiles with 8-byte integers where its own are."""
-    law = LAWS["cubic"]
-    source = hypela2_source({1: law})
-    library = build(tmp_path, source, "-ffixed-form", "-fdefault-integer-8", beside=QUIT)
-    point = Point(library, integer=np.int64)
-    s, _ = point.commit(reals(0.02, 0.01, 0.03))
-    close(s, law.increment(np.zeros(3), [0.02, 0.01, 0.03], np.zeros(3))[0][0])
-    assert point.asked.value == 0
-
-
-def test_materials_by_their_number(tmp_path):
     source = hypela2_source({3: LAWS["cubic"], 7: LAWS["tri-linear"]})
-    library = build(tmp_path, source, "-ffixed-form", beside=QUIT)
+    library = build(tmp_path / "two", source, "-ffixed-form", beside=QUIT)
     for number, name in ((3, "cubic"), (7, "tri-linear")):
-        s, _ = Point(library, number=number).commit(reals(0.02, 0.01, 0.03))
-        close(s, LAWS[name].increment(np.zeros(3), [0.02, 0.01, 0.03], np.zeros(3))[0][0])
+        s, _ = Point(library, number=number).commit(new)
+        close(s, LAWS[name].increment(np.zeros(3), new, np.zeros(3))[0][0])
     stranger = Point(library, number=4)
-    s, *_ = stranger.call(reals(0.02, 0.01, 0.03))
+    s, *_ = stranger.call(new)
     assert stranger.asked.value == 4003 and np.isnan(s).all()
+    text = hypela2(MaterialCard(LAWS["tri-linear"], 0.5, "n" * 200, "s" * 300), NoOptions())
+    for line in text.files[".f"].splitlines():
+        # Column 73 marks what the next line continues in free form; fixed form does not see it.
+        assert len(line) <= 72 or (line[72:] == "&" and line[:6].strip() in ("", "&")), line
+        assert line.isascii()
 
 
 def test_what_the_law_cannot_be_asked_ends_the_job(tmp_path, libraries):
@@ -253,11 +243,9 @@ def test_what_the_law_cannot_be_asked_ends_the_job(tmp_path, libraries):
     point = Point(library)
     point.commit(reals(0.04, 0.0, 0.0))
     assert point.asked.value == 0
-    point.call(reals(0.04, 0.0, 0.0))
-    assert point.asked.value == 4001
-    point = Point(library)
-    point.call(reals(np.nan, 0.0, 0.0))
-    assert point.asked.value == 4001
+    for one, strain in ((point, 0.04), (Point(library), np.nan)):
+        one.call(reals(strain, 0.0, 0.0))
+        assert one.asked.value == 4001
 
 
 @pytest.mark.parametrize("name", ["cubic", "incompressible"])
@@ -278,11 +266,3 @@ def test_the_check_in_the_heading_is_what_the_subroutine_answers(tmp_path, name)
     assert f"must be {s[0]:.4f} MPa" in text
     s, _ = Point(library).commit(reals(0.0, 0.0, 0.01))
     assert f"tau12 = {s[2]:.6f} MPa" in text
-
-
-def test_every_line_fits_fixed_form():
-    text = hypela2(MaterialCard(LAWS["tri-linear"], 0.5, "n" * 200, "s" * 300), NoOptions())
-    for line in text.files[".f"].splitlines():
-        # Column 73 marks what the next line continues in free form; fixed form does not see it.
-        assert len(line) <= 72 or (line[72:] == "&" and line[:6].strip() in ("", "&")), line
-        assert line.isascii()
