@@ -10,7 +10,7 @@ elongations. Contact needs faces to meet: supports and collar are solids of pres
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,16 @@ Numbers = NDArray[np.intp]
 BEYOND = 1.02
 #: mm of elongation over mm of gauge below which a gauge is as long as it should be.
 AS_WANTED = 1e-9
+
+
+def held_dofs(directions: Sequence[int]) -> tuple[int, ...]:
+    """Return a shell's degrees of freedom held where the membrane's directions are (from 0).
+
+    One direction: a plane of symmetry, where the shell does not turn about the other two axes.
+    More: a pinned edge, which may turn.
+    """
+    turns = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
+    return (*directions, *(turns[directions[0]] if len(directions) == 1 else ()))
 
 
 def grip_pulls(

@@ -22,7 +22,7 @@ from ...meshes.strip_models import (
     elongations,
 )
 from ..base import History, extremes, log_strain
-from ..prescribed import at_elongations, grip_pulls
+from ..prescribed import at_elongations, grip_pulls, held_dofs
 from .deck import (
     FIRST_OF_STEP,
     Run,
@@ -51,7 +51,6 @@ FIRST = 0.003
 #: needs more cuts has met an instability, along which CalculiX would creep for hours.
 LEAST = (1e-6, 1 / 256)
 MOST_INCREMENTS = 200
-ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
 #: Of the force of a patch's edge: its corners and, where there is one, its midside.
 SHARES = {2: (0.5, 0.5), 3: (1 / 6, 1 / 6, 2 / 3)}
 
@@ -104,7 +103,7 @@ def bubble_decks(
     `folder` has the user's templates; InputError: one that cannot be used.
     """
     supports = {
-        name: held_directions(directions)
+        name: held_dofs(directions)
         for name, directions in model.supports.items()
         if name in model.mesh.node_sets
     }
@@ -124,15 +123,6 @@ def bubble_decks(
     }
     sheet = without_stress(shells, model)
     return deck_files("bubble.inp.j2", "Bubble", sheet, element, TOLERANCES, context, folder)
-
-
-def held_directions(directions: tuple[int, ...]) -> tuple[int, ...]:
-    """Return a shell's degrees of freedom held where the membrane's directions are (from 0).
-
-    One direction: a plane of symmetry, where the shell does not turn about the other two axes.
-    More: a pinned edge, which may turn.
-    """
-    return (*directions, *(ROTATIONS[directions[0]] if len(directions) == 1 else ()))
 
 
 def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:

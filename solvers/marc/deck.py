@@ -18,6 +18,7 @@ from ...materials.law import HypoelasticLaw
 from ...materials.responses import modulus_tables
 from ...meshes.mesh import Mesh
 from ..decks import render
+from ..prescribed import held_dofs
 from .settings import MarcSettings
 
 JOB = "job"
@@ -28,7 +29,6 @@ TABLES = (("E1", "e1", 11), ("E2", "e2", 12), ("G12", "g12", 13))
 #: Strain beyond the ends of a table in which its modulus is held.
 GUARD = 1.0
 MEMBRANE, THICK = 18, 75
-ROTATIONS = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
 
 
 def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
@@ -86,20 +86,9 @@ def fixed(
 def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
     """Return conditions `fix_SET` from directions held at zero by node set."""
     return [
-        fixed(f"fix_{name.lower()}", name.lower(), held_dofs(directions, element))
-        for name, directions in held.items()
+        fixed(f"fix_{name.lower()}", name.lower(), dofs if element == MEMBRANE else held_dofs(dofs))
+        for name, dofs in held.items()
     ]
-
-
-def held_dofs(directions: Sequence[int], element: int) -> tuple[int, ...]:
-    """Return degrees of freedom of a node held where the membrane's `directions` are (from 0).
-
-    One direction: a plane of symmetry, where a shell does not turn about the other two axes.
-    More: a pinned edge, which may turn.
-    """
-    if len(directions) == 1 and element != MEMBRANE:
-        return (*directions, *ROTATIONS[directions[0]])
-    return tuple(directions)
 
 
 def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any]:
