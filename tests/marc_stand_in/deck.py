@@ -103,7 +103,6 @@ class Deck:
 
     @property
     def coming(self) -> str:
-        """The next line; empty at the end of the file."""
         return self.lines[0][1] if self.lines else ""
 
     def next(self) -> str:
@@ -113,7 +112,6 @@ class Deck:
         return self.text
 
     def row(self, layout: str) -> list[Any]:
-        """Return the fields of the next line that the layout does not fix."""
         self.next()
         return self.fields(layout)
 
@@ -124,7 +122,6 @@ class Deck:
             yield self.row(layout)
 
     def fields(self, layout: str) -> list[Any]:
-        """Return the fields of this line that the layout does not fix."""
         found, end = [], 0
         for kind, times in re.findall(r"(\S+?)(?:\*(\d+))?(?= |$)", layout):
             for _ in range(int(times or 1)):
@@ -166,7 +163,6 @@ class Deck:
 
 
 def read_deck(path: Path) -> Content:
-    """Return everything in a deck; DeckError where Marc would refuse it."""
     deck = Deck(path)
     content = _parameters(deck)
     while (word := deck.next()[:20].rstrip()) != "end option":
@@ -200,7 +196,6 @@ def _parameters(deck: Deck) -> Content:
 
 
 def _block(deck: Deck, content: Content, word: str) -> None:
-    """Read a model block, whose keyword is in this line."""
     p, more = content, {"define": "t20 t20 name", "table": "name", "loadcase": "name"}
     head = deck.fields(f"t20 {'11' if word == 'optimize' else more.get(word, '')}")[1:]
     match word:
@@ -328,7 +323,6 @@ def set_members(deck: Deck) -> list[int]:
 
 
 def _names(deck: Deck) -> list[str]:
-    """Return the conditions that a load case names."""
     names = [deck.row("name")[0] for _ in range(*deck.row("i"))]
     if len(set(names)) < len(names):
         raise deck.fail("a condition twice in a load case")
@@ -336,7 +330,6 @@ def _names(deck: Deck) -> list[str]:
 
 
 def _each_condition(deck: Deck, content: Content, head: str) -> Iterator[tuple[str, int]]:
-    """Yield name and line of each condition of a block."""
     deck.row("")
     while deck.coming[:1] == " ":
         (name,) = deck.row(head)
@@ -346,7 +339,6 @@ def _each_condition(deck: Deck, content: Content, head: str) -> Iterator[tuple[s
 
 
 def _case(deck: Deck) -> LoadCase:
-    """Return a load case, which ends with `continue`."""
     found: dict[str, Any] = {"title": ""}
     while (word := deck.next()[:20].rstrip()) != "continue":
         word = "title" if word.startswith("title ") else word
@@ -400,7 +392,6 @@ def _check(content: Content) -> None:
 
 
 def _check_references(content: Content) -> None:
-    """Raise DeckError unless sets and tables that are named are there."""
     on = [content.law_on, *(f[0] for f in content.frames), *(t[1] for t in content.thickness)]
     on += [body.on for body in content.bodies if not body.rigid]
     uses = [("element", name, content.law) for name in on + [content.gas_on] * bool(content.gas)]

@@ -71,7 +71,6 @@ def command_of(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def fault_of(job: str) -> str:
-    """Return the fault of this run, which is counted."""
     folder = Path(os.environ.get("MARC_STAND_IN_FOLDER", os.devnull))
     said = os.environ.get("MARC_STAND_IN_FAULT", "")
     if not said and (folder / "fault").exists():
@@ -88,7 +87,6 @@ def fault_of(job: str) -> str:
 
 
 def run(command: argparse.Namespace) -> tuple[int, str]:
-    """Run a job; return what run_marc returns and prints."""
     fault = fault_of(command.job)
     if fault == "silent":
         return 0, ""
@@ -148,7 +146,6 @@ class Files:
 
 
 def solve(content: Content, command: argparse.Namespace, files: Files, fault: str) -> None:
-    """Run the analysis to its end, or raise what ended it."""
     library = None if command.user is None else compiled(command.user, command.folder)
     if library is None and content.law == "hypoelastic":
         raise DeckError("hypoelastic with a user subroutine, and none was given (-u)")

@@ -94,7 +94,6 @@ def piecewise_law(
 
 
 def law_of_tables(content: Content) -> HypoelasticLaw:
-    """Return the law of a deck with NLELAST."""
     if content.moduli[2] != 0:
         raise DeckError("nlelast: nu12 with a table")
     curves: list[ArrayLike] = []
@@ -177,7 +176,6 @@ def _cubic(x: Array, y: Array, size: float) -> Array | None:
 
 
 def compiled(source: Path, folder: Path) -> ctypes.CDLL:
-    """Return the subroutine as a library."""
     compiler = shutil.which("gfortran")
     if compiler is None or not source.exists():
         raise NotCompiled(f"gfortran: command not found, or no such file: {source.name}")
@@ -222,7 +220,6 @@ def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
     for k in range(3):
 
         def modulus(own: float, k: int = k) -> float:
-            """Return E1, E2 or G12 from the stress over strain in its direction."""
             if k == 0:
                 return 0.5 * (own + np.sqrt(own * own - 4.0 * own * nu12**2 * d[1, 1] * coupling))
             return own / (1.0 + own * nu12**2 / (d[0, 0] * coupling)) if k == 1 else own

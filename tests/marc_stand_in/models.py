@@ -28,7 +28,6 @@ Schedule = namedtuple("Schedule", "times case steps first last")
 
 
 def schedule_of(content: Content) -> Schedule:
-    """Return the increments; DeckError where a table ends before them."""
     case = np.repeat(np.arange(len(content.cases)), [case.increments for case in content.cases])
     steps = np.array([content.cases[i].step for i in case])
     times = np.cumsum(steps)

@@ -185,7 +185,6 @@ def options_of(name, **given):
 
 
 def test_what_of_our_solvers_settings_counts():
-    """Where files lie does not, nor how long a run may take."""
     assert options_of("calculix", element="S4", timeout=7.0, scratch=Path("x"), ccx="y") == {
         "element": "S4"
     }

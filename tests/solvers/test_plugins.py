@@ -47,7 +47,6 @@ def site(tmp_path_factory):
 
 @pytest.fixture
 def strips(tmp_path):
-    """The strips with 10 increments, a project and a card."""
     text = (STRIPS / "project.toml").read_text()
     (tmp_path / "project.toml").write_text(text.replace("increments = 100", "increments = 10"))
     shutil.copy(STRIPS / "curves.csv", tmp_path)

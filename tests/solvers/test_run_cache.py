@@ -138,7 +138,6 @@ def key(number):
 
 
 def filled(cache, count):
-    """Runs that were last used one after the other; bytes of one."""
     for number in range(count):
         cache.write(key(number), history(number), 1.0)
     for number in range(count):

@@ -40,7 +40,6 @@ def begun(place):
 
 
 def members(group):
-    """How many processes of a group live."""
     count = 0
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -115,7 +114,6 @@ def test_what_is_kept_is_never_swept(tmp_path, monkeypatch):
 
 
 def left(place, **said):
-    """A folder whose owner's file says what it says, locked by nobody."""
     own = dict(zip(("machine", "boot", "process", "started"), scratch._self(), strict=True))
     folder = place / f"bubblefit-t-{len(list(place.iterdir()))}"
     folder.mkdir()

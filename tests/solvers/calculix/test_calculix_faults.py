@@ -62,7 +62,6 @@ def failure(solver, **options):
 
 
 def gone(pid, seconds=5.0):
-    """Whether a process ends soon (a zombie has ended)."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         try:
@@ -155,7 +154,6 @@ def test_no_child_goes_on_writing(fake, tmp_path, end, timeout):
 
 @pytest.fixture(scope="module")
 def results(ccx, tmp_path_factory):
-    """Folder of a real run that ended well."""
     folder = tmp_path_factory.mktemp("real")
     CalculixSolver(element="S4", scratch=folder, keep=True).run(model(), LAW)
     (kept,) = folder.iterdir()
@@ -213,7 +211,6 @@ def test_progress_is_told_while_it_runs(fake, results, tmp_path):
 
 
 def test_a_full_disk(ccx, fake, monkeypatch):
-    """Files may be 4 kB at most: what a full disk does, without one."""
     solver = fake(f'ulimit -f 8; exec {ccx.path} "$@"')
     monkeypatch.undo()  # the real library
     found = failure(solver)

@@ -42,12 +42,10 @@ def function(folder):
 
 @pytest.fixture(autouse=True)
 def where_ccx_runs(tmp_path, monkeypatch):
-    """The library looks for laws in the current folder."""
     monkeypatch.chdir(tmp_path)
 
 
 def constants(law, *given, **named):
-    """Those of a deck, once the law lies beside it."""
     for name, text in law_files(law).items():
         Path(name).write_text(text)
     return library.constants(law, *given, **named)
@@ -208,7 +206,6 @@ def test_increments_of_any_size_from_anywhere(function, name, size):
 
 
 def stretch(strain):
-    """U (2, 2) of the log strain (eps1, eps2, gamma12)."""
     values, axes = np.linalg.eigh([[strain[0], 0.5 * strain[2]], [0.5 * strain[2], strain[1]]])
     return axes @ np.diag(np.exp(values)) @ axes.T
 
@@ -452,7 +449,6 @@ ORIENTATIONS = {
 
 
 def patch_deck(element, law, gradient, increments, angle, orientation):
-    """Every node is moved to F X in equal increments."""
     nodes, name, solid = PATCHES[element], library.MATERIAL, element == "C3D8I"
     moves = np.array(nodes) @ (gradient - np.eye(3)).T
     written = [f"{v:.12e}" for v in constants(law, angle=angle)]

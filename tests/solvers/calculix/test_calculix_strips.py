@@ -8,7 +8,14 @@ import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.files import TEMPLATES
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
+from bubblefit.materials.responses import biaxial_response
+from bubblefit.meshes.strip_models import (
+    PatchModel,
+    UniaxialModel,
+    bias_strip,
+    elongations,
+    straight_strip,
+)
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import shell_mesh
 from bubblefit.solvers.calculix.sheets import StripRun, strip_history
@@ -56,7 +63,6 @@ def off(found, expected) -> float:
     ],
 )
 def test_agrees_with_the_membrane(ccx, name, element, law, increments, counts, most, apart):
-    """Loads within `most` of the end load, nodes within `apart` mm."""
     strip_model = model(name, increments, **counts)
     found = CalculixSolver(element=element).run(strip_model, law)
     expected = MembraneSolver().run(strip_model, law)
@@ -121,7 +127,6 @@ def test_the_same_element_gives_the_same(ccx, tmp_path, thickness_change, angle)
 
 
 def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
-    """Cut into four each, they still meet every whole time."""
     text = (TEMPLATES / "calculix" / "strip.inp.j2").read_text()
     cut = text.replace("least | number }}, 1\n", "least | number }}, 0.25\n")
     (tmp_path / "strip.inp.j2").write_text(cut)
@@ -214,3 +219,21 @@ def test_a_run_that_takes_too_long(ccx, tmp_path):
     with pytest.raises(SolverFailure, match=r"did not end within 0\.5 s"):
         solver.run(model("bias"), LAW, timeout=0.5)
     assert len(list(tmp_path.iterdir())) == 1  # no second try
+
+
+# Loads N/mm; 2 and 1 N/mm is the prestress of such a test.
+UP = np.linspace(0.0, 20.0, 9)[1:]
+
+
+@pytest.mark.parametrize("element", ["S8R", "S4"])
+@pytest.mark.parametrize("shares", [(1.0, 0.5), (1.0, 0.02)], ids=["2:1", "1:0"])
+@pytest.mark.parametrize("name", ["cubic", "incompressible"])
+def test_calculix_has_the_strains_of_the_law(ccx, element, shares, name):
+    loads = np.outer(np.concatenate([UP, UP[-2::-2]]), shares)
+    history = CalculixSolver(ccx.path, element=element).run(PatchModel(loads, 0.8), LAWS[name])
+    wanted = biaxial_response(LAWS[name], loads, 0.8).elongation
+    found = elongations(history.displacement)
+    np.testing.assert_allclose(found, wanted, atol=5e-6 * np.abs(wanted).max())
+    np.testing.assert_allclose(history.load, loads.sum(axis=1))
+    np.testing.assert_allclose(history.strain_max[:2], np.log1p(wanted).max(axis=0), rtol=1e-4)
+    assert history.iterations > 0

@@ -33,7 +33,6 @@ def model():
 
 @pytest.fixture(scope="module")
 def grown(model):
-    """The inflated cylinder: 5 % wider."""
     return model.mesh.points * [0.05, 0.05, 0.0]
 
 

@@ -30,7 +30,6 @@ def bubble(elements=48, increments=(0.01, 0.03, 0.1)):
 
 @pytest.fixture(scope="session")
 def read(tmp_path_factory):
-    """Reads a deck as Marc would."""
     path = tmp_path_factory.mktemp("decks") / "job.dat"
 
     def content(text, reader=read_deck):
@@ -41,7 +40,6 @@ def read(tmp_path_factory):
 
 
 def conditions(content):
-    """Supports by name: degrees of freedom, values, tables, node set."""
     return {name: (c.dofs, c.values, c.tables, c.on) for name, c in content.conditions.items()}
 
 

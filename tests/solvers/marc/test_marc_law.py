@@ -79,7 +79,6 @@ class Point:
 
 @pytest.fixture(scope="module")
 def libraries(tmp_path_factory):
-    """Each law's library, compiled when it is asked for."""
     folder, made = tmp_path_factory.mktemp("hypela2"), {}
 
     def library(name, form="-ffixed-form", **options):
@@ -204,7 +203,6 @@ def test_thick_shells_have_linear_transverse_shear(libraries):
 
 
 def test_wide_integers_free_form_and_materials_by_their_number(tmp_path, libraries):
-    """Marc compiles with 8-byte integers where its own are."""
     law, new = LAWS["cubic"], reals(0.02, 0.01, 0.03)
     options = ("-ffixed-form", "-fdefault-integer-8")
     library = build(tmp_path / "wide", hypela2_source({1: law}), *options, beside=QUIT)

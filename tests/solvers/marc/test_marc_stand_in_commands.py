@@ -42,14 +42,12 @@ SITE = 'executable = "./run_marc"\nincrements = 0\n'
 
 
 def marc_rows(folder):
-    """Rows of history.csv of Marc's runs."""
     history = pd.read_csv(folder / "history.csv", comment="#")
     return history[history.solver == "marc"]
 
 
 @pytest.fixture
 def site(marc):
-    """A site's file beside the program."""
     path = marc.folder / "site.toml"
     path.write_text(SITE + f'scratch = "{marc.folder}"\n')
     return path
@@ -120,7 +118,6 @@ def test_a_fit_whose_last_run_fails_is_resumed(marc, finer, tmp_path):
 
 
 def told_alike(folder, name, command, site, *stiff, atol):
-    """Marc's table of a simulation is the membrane's, to six digits."""
     bubblefit(*command, "--solver", "marc", "--marc", site, "--out", "marc-out", cwd=folder)
     bubblefit(*command, *stiff, "--out", "membrane-out", cwd=folder)
     found, expected = (
@@ -145,7 +142,6 @@ def test_simulated_bubble_and_strips_are_the_membranes(site, card, tmp_path):
 
 
 def strips(folder):
-    """The example of strip tests, coarse."""
     shutil.copy(EXAMPLES / "uniaxial-valmex7318/curves.csv", folder)
     text = (EXAMPLES / "uniaxial-valmex7318/project.toml").read_text()
     assert "increments = 100" in text
