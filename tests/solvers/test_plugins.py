@@ -269,7 +269,7 @@ def test_one_name_is_one_plug_in(packages, tmp_path, monkeypatch):
     assert solver_named("acme").name == "acme"  # listed twice
     install(packages, "twice", "Solver = 1")
     install(packages, "twice", "Solver = 1", "other-solvers", "acme_other")
-    words = r"twice: is offered by acme-solvers 2\.5 and other-solvers 2\.5"
+    words = r"twice: is offered by (acme|other)-solvers 2\.5 and (acme|other)-solvers 2\.5"
     with pytest.raises(SolverFailure, match=words):
         solver_named("twice")
     assert solver_names().count("twice") == 1

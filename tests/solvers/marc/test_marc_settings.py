@@ -154,7 +154,7 @@ def ready(tmp_path):
 
 def test_simulate_bubble_with_marc(ready, tmp_path):
     path, card, program, history = ready
-    simulate = ("simulate", "bubble", path, "--card", card, "--solver", "marc")
+    simulate = ("simulate", "bubble", path, "--card", card, "--solver", "marc", "--overwrite")
     done = command(*simulate, "--marc", program, "--json", cwd=path.parent)
     result = json.loads(done.stdout)
     assert result["solver"] == "marc"
