@@ -1,19 +1,13 @@
 """What several test files share."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from bubblefit.experiments import registry as experiments
 from bubblefit.reports import vega
-from bubblefit.reports.charts import Charts
 from bubblefit.solvers import registry as solvers
-from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 
@@ -37,36 +31,36 @@ settings.register_profile("bubblefit", deadline=None)
 settings.load_profile("bubblefit")
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser):
     """Add the option that writes tests/golden/."""
     parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
 
 
 @pytest.fixture(scope="session")
-def golden(request: pytest.FixtureRequest) -> Golden:
+def golden(request):
     """Compare the terminal output of a command with its file in tests/golden/."""
     return Golden(request.config.getoption("--rewrite-golden"))
 
 
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
+def shared_data():
     """Folder of measured data beside the repository; see `needs`."""
     return needs.measured_data()
 
 
 @pytest.fixture(scope="session")
-def ccx() -> Executable:
+def ccx():
     """A ccx that can load material libraries; see `needs`."""
     return needs.calculix()
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Charts]]:
+def drawn(monkeypatch):
     """Charts of every file saved by the test, in turn; each is still written, and checked."""
-    found: list[Charts] = []
+    found = []
     rendered = vega.rendered
 
-    def keep(charts: Charts, suffix: str) -> bytes:
+    def keep(charts, suffix):
         found.append(charts)
         return rendered(charts, suffix)
 
@@ -88,7 +82,7 @@ def packages(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def bars(monkeypatch: pytest.MonkeyPatch) -> BarSolver:
+def bars(monkeypatch):
     """A solver and a kind of test, both named bars; the solver is the one that runs."""
     solver, known = BarSolver(), dict(experiments.kinds())
     for module in ("runs.simulation", "project.project"):

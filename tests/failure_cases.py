@@ -1,9 +1,5 @@
 """Solvers that fail in earnest, for the tests of what every command then says."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 #: What a shell does around the real ccx, by fault. The deck is `job.inp`, its mesh `mesh.inp`.
 #: Inside out: two corners of the first element change places. Collapse: no increment may be
 #: shorter than 0.9, and none is good enough.
@@ -30,7 +26,7 @@ MARC = {
 }  # fmt: skip
 
 
-def failing_ccx(folder: Path, real: Path) -> Path:
+def failing_ccx(folder, real):
     """A ccx that fails as the file `fault` beside it says, and tells its runs to `runs`.
 
     Those whose number is not in the file `good`.

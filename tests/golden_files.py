@@ -4,8 +4,6 @@
 to place and from day to day is replaced.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -24,7 +22,7 @@ REPLACED = (
 )
 
 
-def normalised(text: str, folder: Path) -> str:
+def normalised(text, folder):
     """Return the text without paths, dates, times, versions and digits of rounding."""
     for place, name in ((folder, "FOLDER"), (folder.name, "NAME"), (ROOT, "ROOT")):
         text = text.replace(str(place), name)
@@ -36,10 +34,10 @@ def normalised(text: str, folder: Path) -> str:
 class Golden:
     """Compare texts with their files, or write the files."""
 
-    def __init__(self, rewrite: bool) -> None:
+    def __init__(self, rewrite):
         self.rewrite = rewrite
 
-    def __call__(self, name: str, text: str, folder: Path) -> None:
+    def __call__(self, name, text, folder):
         """Assert that a command run in `folder` printed what NAME.txt holds."""
         path, said = FOLDER / f"{name}.txt", normalised(text, folder)
         if self.rewrite:

@@ -4,32 +4,27 @@ The one place where a test is left out. Without the thing it skips and says why;
 `.ci/run` sets `CI`, it fails: a green run there has run everything.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import shutil
 import sys
-from pathlib import Path
-from types import ModuleType
-from typing import NoReturn
 
 import pytest
 from bubblefit.errors import BubblefitError
-from bubblefit.solvers.calculix.executable import Executable, find_ccx
+from bubblefit.solvers.calculix.executable import find_ccx
 from bubblefit.solvers.calculix.library import compiler
 
 from .places import SHARED
 
 
-def missing(what: str) -> NoReturn:
+def missing(what):
     """Skip the test, in CI fail it; `what` is not there, and how to get it."""
     if os.environ.get("CI"):
         pytest.fail(f"CI runs every test: {what}", pytrace=False)
     pytest.skip(what, allow_module_level=True)
 
 
-def program(*names: str, package: str) -> str:
+def program(*names, package):
     """Path of the first of these programs that there is; `package` brings one."""
     for name in names:
         if path := shutil.which(name):
@@ -37,12 +32,12 @@ def program(*names: str, package: str) -> str:
     missing(f"there is no {' or '.join(names)}: install {package}")
 
 
-def fortran() -> str:
+def fortran():
     """The Fortran compiler."""
     return program("gfortran", package="gfortran")
 
 
-def c_compiler() -> list[str]:
+def c_compiler():
     """The C compiler as a command, as the CalculiX adapter looks for it."""
     try:
         return compiler()
@@ -50,7 +45,7 @@ def c_compiler() -> list[str]:
         missing(str(error))
 
 
-def library(name: str) -> ModuleType:
+def library(name):
     """A Python library, or one that cannot be loaded here."""
     try:
         return importlib.import_module(name)
@@ -58,13 +53,13 @@ def library(name: str) -> ModuleType:
         missing(f"{name} cannot be loaded: {error}")
 
 
-def linux(what: str) -> None:
+def linux(what):
     """`what` is tried on Linux only."""
     if sys.platform != "linux":
         missing(f"{what}: tried on Linux")
 
 
-def calculix() -> Executable:
+def calculix():
     """A ccx that can load material libraries."""
     try:
         return find_ccx()
@@ -72,7 +67,7 @@ def calculix() -> Executable:
         missing(str(error))
 
 
-def measured_data() -> Path:
+def measured_data():
     """Folder of the measured data beside the repository."""
     if not SHARED.is_dir():
         missing(f"no measured data: {SHARED} is not there")

@@ -1,7 +1,5 @@
 """What pip leaves of distributions that add something to bubblefit, written by hand."""
 
-from __future__ import annotations
-
 
 def install(folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"):
     """One distribution with one entry point into `folder`, which `packages` has on sys.path."""

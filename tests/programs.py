@@ -1,12 +1,9 @@
 """Programs of a test: files that can be run."""
 
-from __future__ import annotations
-
 import stat
-from pathlib import Path
 
 
-def program(path: Path, text: str) -> Path:
+def program(path, text):
     """The text as a file that can be run, in a folder that is made for it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)

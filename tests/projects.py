@@ -1,11 +1,7 @@
 """Small projects and changed ones, for the tests of reading them and of whole fits."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
-from bubblefit.project.project import Project, read_project
+from bubblefit.project.project import read_project
 
 from .places import KNOWN
 
@@ -13,7 +9,7 @@ from .places import KNOWN
 EASY = "[law.bounds]\nE1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]\n\n"
 
 
-def changed(text: str, *changes: tuple[str, str]) -> str:
+def changed(text, *changes):
     """The text after each replacement of an old text, which has to be there, by a new one."""
     for old, new in changes:
         assert old in text, old
@@ -21,24 +17,24 @@ def changed(text: str, *changes: tuple[str, str]) -> str:
     return text
 
 
-def project_file(folder: Path, text: str, *changes: tuple[str, str]) -> Path:
-    """The same as the folder's project.toml."""
+def project_file(folder, text, *changes):
+    """Write the text after each replacement to the folder; return its path."""
     path = folder / "project.toml"
     path.write_text(changed(text, *changes))
     return path
 
 
-def edited(folder: Path, old: str, new: str, source: Path = KNOWN, **options) -> Project:
+def edited(folder, old, new, source=KNOWN, **options):
     """The known-solution example, or another, read from `folder` after one replacement."""
     return read_project(project_file(folder, source.read_text(), (old, new)), **options)
 
 
-def small(folder: Path, *changes: tuple[str, str]) -> Path:
+def small(folder, *changes):
     """The known-solution example with 48 quads, changed further by replacing text."""
     return project_file(folder, KNOWN.read_text(), ("elements = 800", "elements = 48"), *changes)
 
 
-def with_form(folder: Path, form: str) -> Path:
+def with_form(folder, form):
     """The same with bounds on the moduli and another `[law] form` (lines of TOML)."""
     text = small(folder).read_text()
     first, last = text.index("# Table 4.2. Order"), text.index("[[bubble]]")
@@ -106,7 +102,7 @@ MODULI = {"one": {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}, "two": {"warp
 ELONGATION = np.linspace(0.2, 3.0, 12)
 
 
-def constant_strips(folder: Path, *changes: tuple[str, str]) -> Path:
+def constant_strips(folder, *changes):
     """A project of `STRIPS`, changed by replacing text, and its points.
 
     Without contraction a load is 0.8 mm times 25 mm times E ln(1 + elongation / 20).

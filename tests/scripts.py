@@ -1,15 +1,12 @@
 """Scripts of the repository that are in no package, as modules: benchmarks, .ci, docs."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
-from types import ModuleType
 
 from .places import ROOT
 
 
-def script(place: str) -> ModuleType:
+def script(place):
     """The module of a file below the root, such as "benchmarks/bench_kills.py"."""
     path = ROOT / place
     spec = importlib.util.spec_from_file_location(path.stem, path)

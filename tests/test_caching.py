@@ -47,7 +47,6 @@ def _compiles(file):
 
 
 def test_every_file_with_compiled_functions_is_among_the_kernels():
-    """One left out would keep code that was compiled before its edit."""
     outside = {"tests", "benchmarks", "build", "out"}
     sources = (file.relative_to(files.ROOT) for file in files.ROOT.rglob("*.py"))
     ours = [f for f in sources if f.parts[0] not in outside and not f.parts[0].startswith(".")]

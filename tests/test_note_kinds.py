@@ -1,7 +1,5 @@
 """Every kind of note comes when there is cause for it, and stands wherever the reader looks."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
@@ -63,7 +61,7 @@ from .note_cases import fits, membrane, programs, series
 
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
 #: Who makes notes of a kind, and their words.
-CASES: tuple[tuple[NoteKind, Maker, str], ...] = (
+CASES = (
     (EARLY, membrane.notes_of_bending,
      "the run stopped early: no equilibrium between 6 and 8 mm"),
     (EARLY, programs.notes_of_marc_bending,
@@ -139,7 +137,7 @@ CASES: tuple[tuple[NoteKind, Maker, str], ...] = (
 
 
 @cache
-def notes_by(maker: Maker) -> list[Note]:
+def notes_by(maker):
     with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         return list(maker(Path(folder), patch))
 
@@ -163,7 +161,7 @@ class Told(NamedTuple):
     page: str | None = None
 
 
-def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_fit(folder, patch, notes):
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
     for name in ("_optima", "_moduli"):
@@ -174,7 +172,7 @@ def told_by_fit(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> T
     return Told(lines_of(fit, folder, every=True), _json(folder), folder, page.read_text())
 
 
-def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_comparison(folder, patch, notes):
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
     patch.setattr(study_pages, "save", lambda *_: None)
@@ -185,7 +183,7 @@ def told_by_comparison(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note
     return Told(lines(done.notes), _json(folder), folder, page.read_text())
 
 
-def told_by_predictions(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_predictions(folder, patch, notes):
     patch.setitem(registry.SOLVERS, "formula", Formula)
     patch.setattr(cylinders, "draw_figures", lambda *_: [])
     patch.setattr(cylinders, "write_beams", lambda *_: [])
@@ -196,28 +194,28 @@ def told_by_predictions(folder: Path, patch: pytest.MonkeyPatch, notes: list[Not
     return Told(done.lines(), _json(folder / "out"), folder / "out", page.read_text())
 
 
-def told_by_simulation(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_simulation(folder, patch, notes):
     done = simulate_cards(
         series.bars(patch, notes), [BarTest("a bar")], {"soft": series.CARD}, folder
     )
     return Told(done.lines, _json(folder), folder)
 
 
-def told_by_nu12(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_nu12(folder, patch, notes):
     patch.setattr(vega, "rendered", lambda *_: b"")
     study = vary_nu12(series.bars(patch, notes), series.CARD, [0.2])
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
-def told_by_refinement(folder: Path, patch: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_refinement(folder, patch, notes):
     patch.setattr(vega, "rendered", lambda *_: b"")
     study = refine(series.bars(patch, notes), series.CARD)
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
-def told_by_gauge(folder: Path, _: pytest.MonkeyPatch, notes: list[Note]) -> Told:
+def told_by_gauge(folder, _, notes):
     table = series.gauge(folder)
     table = replace(table, record=replace(table.record, warnings=tuple(notes)))
     table.write(folder / "gauge.csv")
@@ -225,9 +223,8 @@ def told_by_gauge(folder: Path, _: pytest.MonkeyPatch, notes: list[Note]) -> Tol
     return Told(said, table.numbers()["notes"])
 
 
-def _json(folder: Path) -> list[dict[str, str]]:
-    found: list[dict[str, str]] = json.loads((folder / "result.json").read_text())["notes"]
-    return found
+def _json(folder):
+    return json.loads((folder / "result.json").read_text())["notes"]
 
 
 TOLD_BY = (

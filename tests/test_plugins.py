@@ -1,24 +1,23 @@
 """The loader of plug-ins, for all groups: names without imports, faults in one line each."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import bubblefit
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import PlugInFailure
-from bubblefit.files import names_with, plug_in_named, plug_ins
+from bubblefit.errors import PlugInFailure, SolverFailure
+from bubblefit.files import names_with, plug_in_named
 from bubblefit.materials.forms.base import Form, form_named, pieces_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
+from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.registry import format_names, format_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
@@ -51,75 +50,31 @@ BROKEN = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_plug_in_is_one_line_with_its_distribution(packages, name):
-    text, words = BROKEN[name]
-    install(packages, name, text)
-    with pytest.raises(PlugInFailure) as failure:
-        plug_in_named("bubblefit.laws", name).load("form", ("real", "pieces", "labels"))
-    message = str(failure.value)
-    assert message.startswith(f"the plug-in {name!r} of acme-things 2.5 {words}")
-    assert message.endswith("; repair or uninstall it") and "\n" not in message
-    assert name in names_with("bubblefit.laws", ())  # it is still listed, and nothing else breaks
+def test_a_broken_plug_in_is_one_line_with_its_distribution(packages):
+    for name, (text, words) in BROKEN.items():
+        install(packages, name, text)
+        with pytest.raises(PlugInFailure) as failure:
+            plug_in_named("bubblefit.laws", name).load("form", ("real", "pieces", "labels"))
+        message = str(failure.value)
+        assert message.startswith(f"the plug-in {name!r} of acme-things 2.5 {words}")
+        assert message.endswith("; repair or uninstall it") and "\n" not in message
+    # They are still listed, and nothing else breaks.
+    assert BROKEN.keys() <= set(names_with("bubblefit.laws", ()))
 
 
-def test_two_distributions_of_one_name(packages):
-    install(packages, "acme", "THING = 1")
-    install(packages, "acme", "THING = 2", "other-things", "acme_other")
-    with pytest.raises(
-        PlugInFailure, match=r"acme: is offered by acme-things 2\.5 and other-things 2\.5; uninst"
-    ):
-        plug_in_named("bubblefit.laws", "acme")
-    assert [one.name for one in plug_ins("bubblefit.laws")].count("acme") == 2
-    assert names_with("bubblefit.laws", ()).count("acme") == 1
-
-
-def test_the_same_one_listed_twice_is_one(packages, tmp_path, monkeypatch):
+def test_two_distributions_of_one_name(packages, tmp_path, monkeypatch):
     install(packages, "acme", "THING = 1")
     shutil.copytree(packages, tmp_path / "again")
     monkeypatch.syspath_prepend(str(tmp_path / "again"))
     assert plug_in_named("bubblefit.laws", "acme").load() == 1
-
-
-def test_one_of_our_names_adds_none(packages):
+    install(packages, "acme", "THING = 2", "other-things", "acme_other")
+    with pytest.raises(PlugInFailure, match=r"acme: .* acme-things 2\.5 and other-things 2\.5"):
+        plug_in_named("bubblefit.laws", "acme")
+    assert names_with("bubblefit.laws", ()).count("acme") == 1
+    # A name of ours is ours.
     install(packages, "cubic", "raise RuntimeError")
     assert names_with("bubblefit.laws", ["linear", "cubic"])[:2] == ("linear", "cubic")
     assert names_with("bubblefit.laws", ["linear", "cubic"]).count("cubic") == 1
-
-
-#: Slow to import, or not wanted until a figure or a table is asked for.
-LATER = {"numba", "scipy", "matplotlib", "pandas", "pydantic", "gmsh", "nlopt", "jinja2", "click"}
-
-
-def modules_after(code: str) -> set[str]:
-    """Names of all modules that are there when the code has run."""
-    code = f"import sys\n{code}\nprint(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
-
-
-def test_importing_is_quick():
-    modules = modules_after("import bubblefit")
-    assert not LATER & modules
-    assert len([name for name in modules if name.split(".")[0] == "bubblefit"]) < 15
-
-
-def test_result_files_of_other_programs_are_read_by_meshio():
-    code = """
-import bubblefit, meshio
-known = meshio.extension_to_filetypes
-assert ".frd" in known and ".t19" in known, known
-"""
-    assert "meshio" in modules_after(code)
-
-
-def test_a_project_is_read_without_figures():
-    known = "examples/bubble-known-solution/project.toml"
-    code = f"""
-import bubblefit, pathlib
-bubblefit.read_project(pathlib.Path(bubblefit.__file__).parent / "{known}")
-"""
-    assert not {"matplotlib", "gmsh", "click"} & modules_after(code)
 
 
 def test_every_name_is_there():
@@ -131,13 +86,9 @@ def test_every_name_is_there():
         _ = bubblefit.nothing
 
 
-def test_the_interface_knows_no_terminal():
-    code = "import bubblefit\nfor name in bubblefit.__all__: getattr(bubblefit, name)"
-    assert not {"click", "bubblefit.cli"} & modules_after(code)
-
-
 TEXT = (ROOT / "docs" / "adding.md").read_text()
-EXTRAS = ROOT / "examples" / "plug-in" / "bubblefit_extras"
+PLUG_IN = ROOT / "examples" / "plug-in"
+EXTRAS = PLUG_IN / "bubblefit_extras"
 COBYLA = ROOT / "inference" / "methods" / "cobyla.py"
 
 
@@ -148,6 +99,9 @@ def test_the_code_is_that_of_the_example():
     assert len(blocks) > 8
     for block in blocks:
         assert any(plain(block) in source for source in sources), block
+    said = {name: int(lines) for name, lines in re.findall(r"(\w+\.py), (\d+) \|", TEXT)}
+    counted = {path.name: len(path.read_text().splitlines()) for path in EXTRAS.glob("[!_]*.py")}
+    assert said == counted
 
 
 def plain(text):
@@ -155,13 +109,14 @@ def plain(text):
     return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
-def test_the_lines_of_the_example_are_counted():
-    said = {name: int(lines) for name, lines in re.findall(r"(\w+\.py), (\d+) \|", TEXT)}
-    assert said == {
-        path.name: len(path.read_text().splitlines())
-        for path in EXTRAS.glob("*.py")
-        if path.name != "__init__.py"
-    }
+#: Where a module of the example goes, and what it then ends with.
+PLACES = {
+    "materials/forms/saturating.py": "from bubblefit.materials.forms.base import register_form\n"
+    "register_form(SATURATING)\n",
+    "readers/formats/riglog.py": "from bubblefit.readers.registry import register_format\n"
+    "register_format(RIGLOG)\n",
+    "experiments/datasheet/__init__.py": "",
+}
 
 
 @pytest.mark.slow
@@ -169,29 +124,21 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
     house = tmp_path / "bubblefit"
     skip = shutil.ignore_patterns(".*", "tests", "docs", "examples", "benchmarks", "__pycache__")
     shutil.copytree(ROOT, house, ignore=skip, symlinks=True)
-    before = {path: path.read_bytes() for path in house.rglob("*") if path.is_file()}
-    put(
-        house / "materials/forms/saturating.py",
-        "saturating.py",
-        "from bubblefit.materials.forms.base import register_form\n\nregister_form(SATURATING)",
-    )
-    put(
-        house / "readers/formats/riglog.py",
-        "riglog.py",
-        "from bubblefit.readers.registry import register_format\n\nregister_format(RIGLOG)",
-    )
-    put(house / "experiments/datasheet/__init__.py", "datasheet.py", "")
-    files = {path for path in house.rglob("*") if path.is_file()}
-    assert len(files - before.keys()) == 3  # and none was changed
+    for place, last in PLACES.items():
+        path = house / place
+        path.parent.mkdir(exist_ok=True)
+        assert not path.exists()
+        name = "datasheet.py" if path.name == "__init__.py" else path.name
+        path.write_text(f"{(EXTRAS / name).read_text()}\n{last}")
     code = f"""if True:
         import bubblefit as bf
         from bubblefit.readers.registry import format_of
         from bubblefit.runs.setup import law_of
         assert bf.__file__.startswith({str(house)!r})
-        project = bf.read_project({str(ROOT / "examples/plug-in/project.toml")!r})
+        project = bf.read_project({str(PLUG_IN / "project.toml")!r})
         assert list(project.tests) == ["supplier", "strips"], list(project.tests)
         print(law_of(project, list(project.tests.values())).form.name)
-        print(format_of("machine table", {str(ROOT / "examples/plug-in/warp.rig")!r}).name)
+        print(format_of("machine table", {str(PLUG_IN / "warp.rig")!r}).name)
         """
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path,
@@ -201,12 +148,6 @@ def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
     assert done.stdout.split() == ["saturating", "riglog"]
 
 
-def put(path, name, last):
-    path.parent.mkdir(exist_ok=True)
-    path.write_text(f"{(EXTRAS / name).read_text()}\n{last}\n")
-
-
-PLUG_IN = Path(__file__).resolve().parents[1] / "examples" / "plug-in"
 #: What the example's files were computed from: G12, E2 and E1, at rest and far away, MPa.
 BETA = np.array([20.0, 5.0, 300.0, 150.0, 900.0, 400.0])
 SCALE = {"warp": 0.03, "fill": 0.06, "shear": 0.15}
@@ -237,11 +178,7 @@ def here(plug_in, monkeypatch):
 
 def run(plug_in, *command):
     """Run Python beside a copy of the example's project, where only the installed plug-in is."""
-    cwd = plug_in.parent / "work"
-    if not cwd.is_dir():
-        cwd.mkdir()
-        for file in (*PLUG_IN.glob("*.rig"), PLUG_IN / "project.toml"):
-            shutil.copy(file, cwd)
+    cwd = plug_in.parent / "source"
     path = os.pathsep.join([str(plug_in), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
         [sys.executable, *map(str, command)], cwd=cwd, capture_output=True, text=True,
@@ -279,26 +216,20 @@ def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
     tests = json.loads((simulated / "result.json").read_text())["tests"]
     ((_, strips),) = tests["strips"]["cards"].items()
     assert strips["directions"]["fill"]["rms_N"] < 2.0  # of 720: the polynomial is 0.3 off itself
-
-
-@pytest.mark.slow
-def test_the_python_interface_fits_by_its_solver(plug_in):
+    # The Python interface fits by its solver, and the doctor pulls bars with it.
     out = run(plug_in, "-c", """if True:
         import bubblefit as bf
+        from bubblefit.cli.main import main
         project = bf.read_project("project.toml").with_fit(solver="bar")
         fit = bf.fit(project, tests="datasheet", starts=1, jobs=1)
         (row,) = fit.residuals().itertuples()
         print(fit.objective, row.quantity, row.measured, row.modelled)
+        main(["doctor"], standalone_mode=False)
         """)  # fmt: skip
-    objective, quantity, measured, modelled = out.split()
+    objective, quantity, measured, modelled = out.splitlines()[0].split()
     assert float(objective) < 1e-6 and quantity == "load"
     assert float(measured) == pytest.approx(611.4)
     assert float(modelled) == pytest.approx(611.4, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_the_doctor_pulls_bars_with_the_solver(plug_in):
-    out = run(plug_in, "-m", "bubblefit.cli", "doctor")
     assert "bar         ok  version 1.0  plug-in of bubblefit-extras 1.0  bars within 0.0" in out
 
 
@@ -324,12 +255,9 @@ def test_the_law_is_a_form_close_to_its_exponential(here):
 
 
 def test_the_laws_settings_are_checked(here):
-    words = "scale: a saturating law needs scale = { warp = ..., fill = ..., shear = ... }"
-    assert complaint(form_named, "saturating", {}, ENDS) == words
+    assert complaint(form_named, "saturating", {}, ENDS).startswith("scale: ")
     wrong = {"scale": {**SCALE, "fill": -1.0}}
-    assert "scale.fill: expected a strain above 0" in complaint(
-        form_named, "saturating", wrong, ENDS
-    )
+    assert "scale.fill: " in complaint(form_named, "saturating", wrong, ENDS)
 
 
 @pytest.mark.parametrize("direction", ["warp", "fill"])
@@ -344,39 +272,24 @@ def test_the_solver_agrees_with_the_membrane(here, direction, thickness_change):
     np.testing.assert_allclose(theirs.strain_max, ours.strain_max, atol=1e-9)
     for name, force in theirs.reactions.items():
         np.testing.assert_allclose(force, ours.reactions[name], atol=1e-5)
-
-
-def test_the_solver_refuses_what_it_cannot_do(here):
-    from bubblefit.errors import SolverFailure
-
     with pytest.raises(SolverFailure, match="bar: takes strips along warp or fill only"):
         solver_named("bar").run(bias_strip(20.0, 25.0, 0.81), law())
 
 
 def test_the_reader_is_found_by_content(here, tmp_path):
-    from bubblefit.readers.curves import read_load_curves
-    from bubblefit.readers.registry import format_names, format_of
-
-    path = PLUG_IN / "warp.rig"
-    assert format_of("machine table", path).name == "riglog"
-    assert "riglog" in format_names("machine table")
-    (curve,) = read_load_curves(path, direction="warp")
-    assert curve.load[-1] == pytest.approx(1385.603) and curve.elongation[-1] == 3.0
-    broken = tmp_path / "broken.rig"
-    broken.write_text("RIGLOG 1\nchannel Extension mm\nchannel Force kN\n0 0\n1\n")
-    message = complaint(read_load_curves, broken, direction="warp")
-    assert message == f"{broken}: line 5: expected 2 numbers, found 1"
-    broken.write_text("RIGLOG 1\n0 0\n")
-    assert "expected lines 'channel NAME UNIT'" in complaint(
-        read_load_curves, broken, direction="warp", format="riglog"
-    )
-
-
-def test_the_example_is_what_its_files_say(here):
-    from bubblefit.readers.curves import read_load_curves
-
     for direction, final in (("warp", 23.0), ("fill", 24.0)):
-        (curve,) = read_load_curves(PLUG_IN / f"{direction}.rig", direction=direction)
+        path = PLUG_IN / f"{direction}.rig"
+        assert format_of("machine table", path).name == "riglog"
+        (curve,) = read_load_curves(path, direction=direction)
         model = straight_strip(direction, 20.0, final, 0.81, increments=60)
         load = solver_named("bar").run(model, law()).load
         np.testing.assert_allclose(curve.load[1:], load[2::3], atol=2e-3)
+        assert curve.elongation[-1] == final - 20.0
+    assert "riglog" in format_names("machine table")
+    broken = tmp_path / "broken.rig"
+    broken.write_text("RIGLOG 1\nchannel Extension mm\nchannel Force kN\n0 0\n1\n")
+    message = complaint(read_load_curves, broken, direction="warp")
+    assert message.startswith(f"{broken}: line 5: ")
+    broken.write_text("RIGLOG 1\n0 0\n")
+    message = complaint(read_load_curves, broken, direction="warp", format="riglog")
+    assert "expected lines 'channel NAME UNIT'" in message

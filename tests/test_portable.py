@@ -1,11 +1,8 @@
 """The main path where the operating system has nothing of POSIX to offer, as on Windows."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 from bubblefit.solvers.process import run_process
 
@@ -61,7 +58,7 @@ assert not place.exists()
 """
 
 
-def without(program: str, folder: Path, *arguments: object) -> str:
+def without(program, folder, *arguments):
     """Return what a program prints in an interpreter that lacks the names of `WITHOUT`."""
     site = folder / "site"
     site.mkdir()
@@ -77,18 +74,18 @@ def without(program: str, folder: Path, *arguments: object) -> str:
     return done.stdout
 
 
-def test_a_bubble_is_fitted_by_two_spawned_processes(tmp_path: Path) -> None:
+def test_a_bubble_is_fitted_by_two_spawned_processes(tmp_path):
     project = small(tmp_path)
     printed = without(FIT, tmp_path, project, tmp_path / "out").splitlines()[-1].split()
     assert float(printed[0]) >= 0.0 and int(printed[1]) == 2
     assert (tmp_path / "out" / "history.csv").stat().st_size > 0
 
 
-def test_a_program_is_run_ended_in_time_and_its_folder_removed(tmp_path: Path) -> None:
+def test_a_program_is_run_ended_in_time_and_its_folder_removed(tmp_path):
     without(PROGRAM, tmp_path, tmp_path)
 
 
-def test_what_a_program_started_is_killed_where_there_are_no_groups(tmp_path, monkeypatch) -> None:
+def test_what_a_program_started_is_killed_where_there_are_no_groups(tmp_path, monkeypatch):
     monkeypatch.setattr("bubblefit.solvers.process.GROUPS", False)
     script = f'{sys.executable} -c \'import time; time.sleep(3); open("late", "w")\' & sleep 60'
     ended = run_process(["/bin/sh", "-c", script], tmp_path, tmp_path / "log", timeout=0.5)

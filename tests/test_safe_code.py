@@ -1,7 +1,5 @@
 """What the code itself never does: shells, pickles, evaluated text. Beside ruff's rules `S`."""
 
-from __future__ import annotations
-
 import ast
 import time
 from pathlib import Path
@@ -41,7 +39,7 @@ CALLS = {
 }  # fmt: skip
 
 
-def faults(source: str) -> list[str]:
+def faults(source):
     found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
@@ -144,7 +142,7 @@ def test_a_plug_in_says_which_of_its_options_are_programs(monkeypatch, packages,
     complaint_with(words, solver_settings, path, {"bars": {"program": "evil"}})
 
 
-def deck(folder: Path, text: str, **context) -> str:
+def deck(folder, text, **context):
     (folder / "a.j2").write_text(text)
     return render("calculix", "a.j2", context, folder)
 

@@ -2,8 +2,6 @@
 
 import sys
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ CYLINDERS = tuple(
 )
 
 
-def made_up(buckling: float = 1.9) -> Any:
+def made_up(buckling=1.9):
     """Runs in which everything is as the thesis says."""
     runs = {}
     for case in CYLINDERS:
@@ -41,51 +39,39 @@ def made_up(buckling: float = 1.9) -> Any:
     return bending.Study(CYLINDERS, CARDS, runs)
 
 
-def test_statements_that_hold() -> None:
-    checked = bending.statements(made_up())
-    assert [s.verdict for s in checked[:8]] == ["holds"] * 8
-    # Nothing was measured.
-    assert [s.verdict for s in checked[8:]] == ["not checked"] * 2
+def verdicts(study, runs=None):
+    return [s.verdict for s in bending.statements(replace(study, runs=runs or study.runs))]
 
 
-def test_statements_that_do_not_hold() -> None:
+def test_statements():
+    study = made_up()
+    assert verdicts(study) == ["holds"] * 8 + ["not checked"] * 2  # nothing was measured
+    off = {key: -3.0 if key[1] == "uniaxial" else 4.0 for key in study.runs}
+    measured = {key: replace(run, mean_error=off[key]) for key, run in study.runs.items()}
+    assert verdicts(study, measured) == ["holds"] * 10
+    nothing = bending.statements(replace(study, runs={}))
+    assert {s.verdict for s in nothing} == {"not checked"}
+    assert all(s.runs.startswith("needs") for s in nothing)
     study = made_up(buckling=1.4)
-    runs = dict(study.runs)
-    for key, run in study.runs.items():
-        case, card = key
-        strain = run.strain + 0.011
-        runs[key] = replace(run, straightness=(0.98, 0.01), pressure_rise=2.0, strain=strain)
-        if card == "uniaxial":
-            runs[key] = replace(runs[key], loads=(1e4, None, None))
-        if case == "200 mm, 80 kPa":
-            runs[key] = replace(runs[key], stiffness=1.0)
-    checked = bending.statements(replace(study, runs=runs))
-    verdicts = [s.verdict for s in checked[:8]]
-    assert verdicts == [
+    runs = {}
+    for (case, card), run in study.runs.items():
+        runs[case, card] = replace(
+            run,
+            straightness=(0.98, 0.01),
+            pressure_rise=2.0,
+            strain=run.strain + 0.011,
+            loads=(1e4, None, None) if card == "uniaxial" else run.loads,
+            stiffness=1.0 if case == "200 mm, 80 kPa" else run.stiffness,
+        )
+    assert verdicts(study, runs)[:8] == [
         "does not hold", "holds in 25 of 30", "holds in 4 of 5", "does not hold",
         "holds in 25 of 30", "does not hold", "does not hold", "does not hold",
     ]  # fmt: skip
+    checked = bending.statements(replace(study, runs=runs))
     assert any("200 mm, 80 kPa" in s.runs for s in checked)
 
 
-def test_statements_about_measured_loads() -> None:
-    study = made_up()
-    off = {key: -3.0 if key[1] == "uniaxial" else 4.0 for key in study.runs}
-    runs = {key: replace(run, mean_error=off[key]) for key, run in study.runs.items()}
-    checked = bending.statements(replace(study, runs=runs))
-    assert [s.verdict for s in checked[8:]] == ["holds"] * 2
-
-
-def test_statements_without_runs() -> None:
-    checked = bending.statements(replace(made_up(), runs={}))
-    assert {s.verdict for s in checked} == {"not checked"}
-    assert all(s.runs.startswith("needs") for s in checked)
-
-
-def test_the_example_s_folder_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """On the formula's tubes, of linear cards: stiffer with diameter, but not with a card."""
+def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
     in_process(
         "bend", EXAMPLE, "--solver", "formula", "--out", "out", "--card", "uniaxial",

@@ -6,7 +6,7 @@ import pytest
 from ..scripts import script
 
 
-def test_figure_4_2() -> None:
+def test_figure_4_2():
     """Largest displacement of the known solution at 300 kPa, relative to the mean of five nu12.
 
     Published: 1.029 to 0.967. With pressure that follows the surface ours are 1.036 to 0.960, at

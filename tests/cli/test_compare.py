@@ -1,19 +1,14 @@
 """`bubblefit compare`: forms of the moduli, cross-validated."""
 
-from __future__ import annotations
-
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.cli.main import main
-from bubblefit.reports.charts import Charts
-from click.testing import CliRunner
 
+from ..commands import in_process, one_line, result_in
 from ..drawings import data
-from ..golden_files import Golden
+from ..projects import project_file
 
 PROJECT = """
 [fabric]
@@ -38,7 +33,7 @@ seed = 3
 
 
 @pytest.fixture
-def project(tmp_path: Path) -> Path:
+def project(tmp_path):
     """Three specimens a direction of a fabric whose E1 is linear in strain and E2 constant."""
     random = np.random.default_rng(1)
     lines = ["direction,specimen,elongation (mm),load (N)"]
@@ -56,15 +51,12 @@ def project(tmp_path: Path) -> Path:
     return tmp_path / "project.toml"
 
 
-def test_the_form_behind_the_data_is_found(
-    project: Path, tmp_path: Path, drawn: list[Charts], golden: Golden
-) -> None:
+def test_the_form_behind_the_data_is_found(project, tmp_path, drawn, golden):
     out = tmp_path / "out"
     forms = ["--form", "constant", "--form", "linear", "--form", "cubic"]
-    arguments = ["compare", str(project), "--out", str(out), "--starts", "1", "--quiet", *forms]
-    done = CliRunner().invoke(main, [*arguments, "--json"])
-    assert done.exit_code == 0, done.output
-    result = json.loads((out / "result.json").read_text())
+    arguments = ["compare", project, "--out", out, "--starts", 1, "--quiet", *forms]
+    done = in_process(*arguments, "--json", cwd=tmp_path)
+    result = result_in(out)
     assert json.loads(done.stdout) == result
     found = {f["form"]: f for f in result["forms"]}
     assert [f["coefficients"] for f in result["forms"]] == [3, 6, 12]
@@ -87,33 +79,28 @@ def test_the_form_behind_the_data_is_found(
         wanted = [form[key] for form in result["forms"]]
         assert any(line[1] == pytest.approx(wanted, rel=1e-5) for line in data(laws)), key
     # A result is not written over; --resume takes every form as it is.
-    assert CliRunner().invoke(main, arguments).exit_code == 2
+    in_process(*arguments, cwd=tmp_path, code=2)
     before = (out / "linear" / "starts.jsonl").read_text()
     (out / "result.json").unlink()
-    again = CliRunner().invoke(main, [*arguments, "--resume"])
-    assert again.exit_code == 0, again.output
+    again = in_process(*arguments, "--resume", cwd=tmp_path)
     golden("compare", again.stdout, tmp_path)
     assert (out / "linear" / "starts.jsonl").read_text() == before
-    assert json.loads((out / "result.json").read_text()) == result
+    assert result_in(out) == result
 
 
-@pytest.mark.parametrize(
-    "old, new, says",
-    [
+def test_what_cannot_be_compared_is_refused(project, tmp_path):
+    (tmp_path / "p.csv").write_text(
+        "direction,gauge_length_mm,final_length_mm,c1\nwarp,20,23,300\nfill,20,24,200\n"
+    )
+    text = project.read_text()
+    for old, new, says in (
         ('files = ["points.csv"]', 'polynomials = "p.csv"', "strips[0].match"),
         ("E1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.005, 0.2]",
          "lower = [0.005, 0.02, 0.02]\nupper = [0.2, 1.0, 2.0]", "E1, E2, G12"),
         ('match = "points"', 'match = "polynomial"', 'match = "points"'),
         ('name = "made"', 'name = "made"\nwidth = 3', "fabric.width"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_compared_is_refused(
-    project: Path, tmp_path: Path, old: str, new: str, says: str
-) -> None:
-    (tmp_path / "p.csv").write_text(
-        "direction,gauge_length_mm,final_length_mm,c1\nwarp,20,23,300\nfill,20,24,200\n"
-    )
-    project.write_text(project.read_text().replace(old, new))
-    done = CliRunner().invoke(main, ["compare", str(project), "--out", str(tmp_path / "o"),
-                                     "--form", "constant"])  # fmt: skip
-    assert done.exit_code == 2 and says in done.output and not (tmp_path / "o").exists()
+    ):  # fmt: skip
+        project_file(tmp_path, text, (old, new))
+        run = ("compare", "project.toml", "--out", "o", "--form", "constant")
+        one_line(in_process(*run, cwd=tmp_path, code=2), says)
+        assert not (tmp_path / "o").exists()

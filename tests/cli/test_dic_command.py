@@ -1,15 +1,12 @@
 """`bubblefit dic sphere`: balls of the radii of Table A.1 give its errors."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from ..commands import bubblefit, in_process, one_line
+from ..commands import in_process, one_line
 from ..readers.test_surfaces import cap
 
 #: Table A.1 of the thesis: radius, mm, and error, %, of a ball of 40.0 mm.
@@ -46,7 +43,7 @@ def test_errors_of_the_radius_are_those_of_the_thesis(folder):
     assert table["radius_mm"].tolist() == [row["radius_mm"] for row in said["frames"]]
     assert out.with_suffix(".png").stat().st_size > 20_000
     # Nothing is written over.
-    one_line(bubblefit(*run, "--out", out, cwd=folder, code=2), str(out), "--overwrite")
+    one_line(in_process(*run, "--out", out, cwd=folder, code=2), str(out), "--overwrite")
 
 
 def test_the_table_on_the_terminal(folder, golden):
@@ -66,17 +63,14 @@ def test_metres_and_columns_of_other_names(folder):
     assert "deviation_percent" not in said["frames"][0]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
+def test_bad_input_is_one_line(folder):
+    (folder / "flat.csv").write_text("x,y,z\n" + "".join(f"{k},{k * k},1\n" for k in range(20)))
+    for arguments, words in (
         (["nowhere*.csv"], ["FRAMES", "no file matches"]),
         (["ball1.csv", "--columns", "x"], ["--columns", "expected such as"]),
         (["ball1.csv", "--format", "davis-9"], ["--format", "is not one of"]),
         (["flat.csv"], ["flat.csv", "in a plane"]),
         (["ball1.csv", "--out", "a.png"], ["a.png", "CSV"]),
         (["ball1.csv", "--out", "ball1.csv"], ["ball1.csv", "one of the files to be read"]),
-    ],
-)
-def test_bad_input_is_one_line(folder: Path, arguments, words):
-    (folder / "flat.csv").write_text("x,y,z\n" + "".join(f"{k},{k * k},1\n" for k in range(20)))
-    one_line(bubblefit("dic", "sphere", *arguments, cwd=folder, code=2), *words)
+    ):
+        one_line(in_process("dic", "sphere", *arguments, cwd=folder, code=2), *words)

@@ -1,57 +1,43 @@
 """--events: a JSON object a line, from the beginning to the end, however it ends."""
 
-from __future__ import annotations
-
 import json
 import os
 import threading
-from pathlib import Path
-from typing import Any
 
 import pytest
 from bubblefit.cli import terminal
-from bubblefit.cli.main import COMMANDS, main
-from bubblefit.cli.terminal import EVENTS, Events
-from click import Context, Group
-from click.testing import CliRunner
+from bubblefit.cli.main import main
+from bubblefit.cli.terminal import EVENTS, Events, every_command
+from click import Group
 
+from ..commands import in_process, one_line
 from ..projects import BUBBLE
 
 
-def told(path: Path) -> list[dict[str, Any]]:
+def told(path):
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert [line["seconds"] for line in lines] == sorted(line["seconds"] for line in lines)
     return lines
 
 
-def command(folder: Path, *arguments: object) -> tuple[int, list[dict[str, Any]], str]:
-    path = folder / "events.jsonl"
-    done = CliRunner().invoke(main, [*map(str, arguments), "--events", str(path)])
-    return done.exit_code, told(path), done.stdout
-
-
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
+def test_a_fit_tells_its_starts_and_its_end(tmp_path):
     (tmp_path / "p.toml").write_text(BUBBLE)
-    return tmp_path / "p.toml"
-
-
-def test_a_fit_tells_its_starts_and_its_end(project: Path, tmp_path: Path) -> None:
-    out = ("--out", tmp_path / "out", "--starts", 2, "--jobs", 1, "--json")
-    code, events, said = command(tmp_path, "fit", project, *out, "--fail-above", 1)
-    begin, *progress, end = events
-    assert code == 0 and end == {**end, "event": "end", "exit_code": 0, "error": None}
+    run = ("fit", "p.toml", "--out", "out", "--starts", 2, "--jobs", 1, "--json", "--events", "e")
+    done = in_process(*run, "--fail-above", 1, cwd=tmp_path)
+    begin, *progress, end = told(tmp_path / "e")
+    assert end == {**end, "event": "end", "exit_code": 0, "error": None}
     assert begin["event"] == "begin" and begin["command"].endswith(" fit")
     assert {one["event"] for one in progress} == {"progress"}
     assert {one["what"] for one in progress} == {"starts"}
     assert [one["done"] for one in progress][-1] == progress[-1]["total"] == 2
-    assert json.loads(said)["objective"] < 1
+    assert json.loads(done.stdout)["objective"] < 1
     # It is there already: a line for people and one for machines.
-    code, (begin, end), said = command(tmp_path, "fit", project, *out)
-    assert code == end["exit_code"] == 2 and "already holds" in end["error"] and not said
+    done = in_process(*run, cwd=tmp_path, code=2)
+    begin, end = told(tmp_path / "e")
+    assert end["exit_code"] == 2 and "already holds" in end["error"] and not done.stdout
 
 
-def test_every_end_is_told(tmp_path: Path) -> None:
+def test_every_end_is_told(tmp_path):
     path = tmp_path / "e"
     for error, code, words in (
         (KeyboardInterrupt(), 130, "interrupted"),
@@ -60,7 +46,7 @@ def test_every_end_is_told(tmp_path: Path) -> None:
         (ValueError("x"), 1, "ValueError: x"),
     ):
 
-        def fails(error=error) -> None:
+        def fails(error=error):
             raise error
 
         EVENTS.begin(path, "c")
@@ -72,7 +58,7 @@ def test_every_end_is_told(tmp_path: Path) -> None:
     assert path.read_text() == before
 
 
-def test_progress_is_told_where_more_is_done(tmp_path: Path) -> None:
+def test_progress_is_told_where_more_is_done(tmp_path):
     path, events = tmp_path / "e", Events()
     events.progress("a", 1, 2, "nobody listens")
     events.begin(path, "c")
@@ -81,12 +67,11 @@ def test_progress_is_told_where_more_is_done(tmp_path: Path) -> None:
     assert [line["done"] for line in told(path)[1:]] == [0, 1, 2]
 
 
-def test_a_pipe_whose_reader_has_gone_ends_nothing(tmp_path: Path) -> None:
-    pipe, events = tmp_path / "pipe", Events()
+def test_a_pipe_whose_reader_has_gone_ends_nothing(tmp_path):
+    pipe, events, lines = tmp_path / "pipe", Events(), []
     os.mkfifo(pipe)
-    lines: list[str] = []
 
-    def read() -> None:
+    def read():
         with pipe.open() as file:
             lines.append(file.readline())
 
@@ -100,15 +85,7 @@ def test_a_pipe_whose_reader_has_gone_ends_nothing(tmp_path: Path) -> None:
     assert json.loads(lines[0])["event"] == "begin"
 
 
-def test_a_file_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    done = CliRunner().invoke(main, ["doctor", "--events", str(tmp_path)])
-    assert done.exit_code == 2 and str(tmp_path) in done.stderr
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_takes_it(name: str) -> None:
-    found = main.get_command(Context(main), name)
-    assert found is not None
-    each = found.commands.values() if isinstance(found, Group) else [found]
-    for one in each:
-        assert any("--events" in param.opts for param in one.params), one.name
+def test_every_command_takes_it_and_says_where_it_cannot_write(tmp_path):
+    one_line(in_process("doctor", "--events", tmp_path, cwd=tmp_path, code=2), str(tmp_path))
+    for path, one in every_command(main):
+        assert isinstance(one, Group) or any("--events" in param.opts for param in one.params), path

@@ -1,7 +1,5 @@
 """Every fault of every solver in every command, and docs/reference/failures.md beside it."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import time
@@ -17,7 +15,7 @@ from ..commands import in_process, result_in
 from ..failure_cases import MARC, failing_ccx
 from ..marc_stand_in_runs import stand_in
 from ..places import EXAMPLES, ROOT
-from ..projects import BUBBLE
+from ..projects import BUBBLE, changed
 
 TEXT = (ROOT / "docs" / "reference" / "failures.md").read_text()
 FAULTS = ("inside out", "killed", "time-out", "disk full", "no licence", "collapse")
@@ -47,13 +45,13 @@ beta = [-7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1,
 """
 
 
-def strips() -> str:
+def strips():
     text = (EXAMPLES / "uniaxial-valmex7318/project.toml").read_text()
-    text = text.replace("increments = 100", "increments = 4").replace('"cubic"', '"constant"')
+    text = changed(text, ("increments = 100", "increments = 4"), ('"cubic"', '"constant"'))
     return text[: text.index("[fit]")]
 
 
-def test_the_table_is_whole() -> None:
+def test_the_table_is_whole():
     assert set(REASONS) == {
         (fault, solver, command)
         for fault in FAULTS for solver in ("calculix", "marc") for command in COMMANDS
@@ -65,7 +63,7 @@ def test_the_table_is_whole() -> None:
 class Stage:
     """A folder with a project whose solver fails."""
 
-    def __init__(self, folder: Path, fault: str, solver: str, command: str, real: Path) -> None:
+    def __init__(self, folder, fault, solver, command, real):
         self.folder, self.command, self.solver = folder, command, solver
         text = {"bubble": BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
         if command == "uniaxial":
@@ -93,29 +91,29 @@ class Stage:
         )  # fmt: skip
 
     @property
-    def runs(self) -> int:
+    def runs(self):
         path = self.place / "runs"
         return len(path.read_text().splitlines()) if path.exists() else 0
 
-    def monotonic(self) -> float:
+    def monotonic(self):
         """A clock that has gone far beyond every time limit when the program is at rest."""
         return time.monotonic() + (1e6 if (self.place / "pids").exists() else 0.0)
 
-    def run(self, *more: str, code: int):
+    def run(self, *more, code):
         (self.place / "pids").unlink(missing_ok=True)
         return in_process(self.command, "project.toml", "--out", "out", "--jobs", 1, "--quiet",
                           *more, cwd=self.folder, code=code)  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick(monkeypatch):
     """One run that fails ends a start, and nothing is drawn."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     monkeypatch.setattr(correction, "MOST_SHORTER", 0)
     monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
 
 
-def of(text: str) -> re.Pattern[str]:
+def of(text):
     """A reason of the table, in which N is any number and ... anything."""
     found = re.escape(text).replace(r"\.\.\.", ".*?")
     return re.compile(re.sub(r"\bN\b", r"[0-9.]+", found))
@@ -125,9 +123,7 @@ def of(text: str) -> re.Pattern[str]:
     ("fault", "solver", "command"),
     [key for key, reason in REASONS.items() if not reason.startswith("cannot occur")],
 )
-def test_a_fault_is_told_as_the_document_says(
-    ccx, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: str, solver: str, command: str
-) -> None:
+def test_a_fault_is_told_as_the_document_says(ccx, tmp_path, monkeypatch, fault, solver, command):
     reason = REASONS[fault, solver, command]
     stage = Stage(tmp_path, fault, solver, command, ccx.path)
     monkeypatch.setattr(process, "time", stage)
@@ -155,7 +151,7 @@ def test_a_fault_is_told_as_the_document_says(
     if command != "bend":
         assert of(reason).search((out / "history.csv").read_text())
     before = stage.runs
-    if solver == "calculix" or fault == "no licence":
+    if fault == "no licence" or (fault, solver) == ("killed", "calculix"):
         (stage.place / "good").write_text(f"{before + 1}\n" if stage.first else "")
         if solver == "marc":
             (stage.place / "fault").write_text(f"licence@{before + 1 + stage.first}")

@@ -1,18 +1,13 @@
 """`bubblefit gauge`: DIC frames of a strip in, a load curve that a project reads out."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.main import main
 from bubblefit.project.project import read_project
-from click.testing import CliRunner, Result
 
-from ..commands import bubblefit
+from ..commands import in_process
 
 LOWER, UPPER = ("12.3", "20.1"), ("12.3", "40.122")
 GAUGE = ["--lower", *LOWER, "--upper", *UPPER]
@@ -22,13 +17,7 @@ STRETCHES = np.linspace(1.0, 1.165, 12)
 LOST = (4, 7)
 
 
-def write_frames(
-    folder: Path,
-    lost: tuple[int, ...] = (),
-    stretches: np.ndarray = STRETCHES,
-    header: str = "x,y,z,dx,dy,dz",
-    scale: float = 1.0,
-) -> list[Path]:
+def write_frames(folder, lost=(), stretches=STRETCHES, header="x,y,z,dx,dy,dz", scale=1.0):
     """Frames f0.csv ... of a 25 x 60 mm strip: stretched, turned about x, slipped in the grips."""
     x, y = np.meshgrid(np.arange(0, 25.1), np.arange(0, 60.1))
     points = np.column_stack([x.ravel(), y.ravel(), 0.02 * y.ravel() + 1.0])
@@ -48,41 +37,32 @@ def write_frames(
     return files
 
 
-def load_at(time: np.ndarray) -> np.ndarray:
+def load_at(time):
     """N, linear in s: so interpolation between the machine's readings is exact."""
     return 350.0 * np.asarray(time) + 5.0
 
 
-def machine_export(folder: Path, end: float = 6.0) -> Path:
+def machine_export(folder, end=6.0):
     """As MTS TestSuite writes it, at 10 Hz; 12 frames at 2 Hz end at 5.5 s."""
-    rows = [
-        f"{0.9 * t:.6f},{float(load_at(t)) / 1e3!r},{t!r}" for t in np.arange(0, end, 0.1).tolist()
-    ]
-    head = (
-        "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
-    )
-    path = folder / "machine.csv"
-    path.write_text(head + "\n".join(rows) + "\n")
-    return path
+    rows = [f"{0.9 * t:.6f},{load_at(t) / 1e3},{t!r}" for t in np.arange(0, end, 0.1).tolist()]
+    head = "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,s\n"
+    (folder / "machine.csv").write_text(head + "\n".join(rows) + "\n")
 
 
-def gauge(*arguments: object, code: int = 0) -> Result:
-    done = CliRunner().invoke(main, ["gauge", *map(str, arguments)])
-    assert done.exit_code == code, done.output + done.stderr
-    return done
+def gauge(*arguments, code=0, cwd="."):
+    return in_process("gauge", *arguments, cwd=cwd, code=code)
 
 
-def refusal(*arguments: object) -> str:
-    """The one line of a refusal, without "bubblefit: "."""
+def refusal(*arguments):
+    """Return the one line of a refusal, without "bubblefit: "."""
     done = gauge(*arguments, code=2)
     assert done.stdout == ""
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("warning: ")]
-    (line,) = lines
+    (line,) = [line for line in done.stderr.splitlines() if not line.startswith("warning: ")]
     return line.removeprefix("bubblefit: ")
 
 
 @pytest.fixture(scope="module")
-def strip(tmp_path_factory) -> Path:
+def strip(tmp_path_factory):
     """A folder with frames/ (12, none lost) and machine.csv. Not to be written to."""
     folder = tmp_path_factory.mktemp("strip")
     write_frames(folder / "frames")
@@ -90,7 +70,7 @@ def strip(tmp_path_factory) -> Path:
     return folder
 
 
-def read_curve(path: Path) -> pd.DataFrame:
+def read_curve(path):
     return pd.read_csv(path, comment="#")
 
 
@@ -105,12 +85,11 @@ thickness = 0.81
 
 
 def test_from_pictures_to_a_project(tmp_path, golden):
-    """A real command: lost frames and frames without a load are named and left out."""
     write_frames(tmp_path / "frames", LOST)
     machine_export(tmp_path, end=5.3)
     pairing = "--loads machine.csv --frame-interval 0.5 --direction Warp".split()
     command = ("gauge", "frames/f*.csv", *GAUGE, *pairing, "--specimen", "W 1", "--out", "w1.csv")
-    done = bubblefit(*command, cwd=tmp_path)
+    done = in_process(*command, cwd=tmp_path)
     golden("gauge", done.stdout + done.stderr, tmp_path)
     left_out = "1 of 12 frames have a length and no load; they are left out: f11.csv"
     assert f"# note: {left_out}\n" in (tmp_path / "w1.csv").read_text()
@@ -152,23 +131,21 @@ def test_without_loads_every_frame_has_a_row(tmp_path):
     assert about.startswith("# virtual strain gauge between (12.3, 20.1) and (12.3, 40.122) mm")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Load (kN)\n{}\n",
-        "picture;Kraft in kN\n{}\n",
-        "Load cell,30,kN\nTime,Extension,Load\n(s),(mm),(kN)\n{}\n",
-    ],
-)
-def test_one_load_a_frame(strip, tmp_path, text):
+LOADS_OF_FRAMES = [
+    ("Load (kN)\n{}\n", ""),
+    ("picture;Kraft in kN\n{}\n", "7;"),
+    ("Load cell,30,kN\nTime,Extension,Load\n(s),(mm),(kN)\n{}\n", "0.1,0.2,"),
+]
+
+
+@pytest.mark.parametrize(("text", "before"), LOADS_OF_FRAMES)
+def test_one_load_a_frame(strip, tmp_path, text, before):
     loads = np.linspace(0, 1.5, 12)
-    before = {"L": "", "p": "7;", "T": "0.1,0.2,"}[text[0] if text[5:9] != "cell" else "T"]
     rows = "\n".join(f"{before}{load!r}" for load in loads.tolist())
-    machine = tmp_path / "loads.csv"
+    machine, out = tmp_path / "loads.csv", tmp_path / "F-3.csv"
     machine.write_text(text.format(rows.replace(".", ",") if ";" in text else rows))
-    out = tmp_path / "F-3.csv"
-    gauge(strip / "frames" / "f*.csv", *GAUGE, "--loads", machine, "--direction", "weft",
-          "--out", out)  # fmt: skip
+    run = ("--loads", machine, "--direction", "weft", "--out", out)
+    gauge(strip / "frames" / "f*.csv", *GAUGE, *run)
     table = read_curve(out)
     np.testing.assert_allclose(table["load_N"], 1e3 * loads)
     assert set(table["specimen"]) == {"F-3"} and set(table["direction"]) == {"fill"}
@@ -204,7 +181,6 @@ def test_named_columns_flags_and_metres(strip, tmp_path):
 
 
 def test_several_specimens_by_direction(strip, tmp_path):
-    """Curves of the command beside exports that do not name their direction."""
     for name, direction in (("w1", "warp"), ("w2", "warp"), ("b1", "bias")):
         gauge(strip / "frames/f*.csv", *GAUGE, "--loads", strip / "machine.csv",
               "--frame-interval", 0.5, "--direction", direction,
@@ -219,9 +195,9 @@ def test_several_specimens_by_direction(strip, tmp_path):
     assert found == {"warp": ["w1", "w2"], "fill": ["fill"], "bias": ["b1"]}
 
 
-def test_nothing_is_written_over(strip, tmp_path):
-    out = tmp_path / "gauge.csv"
-    ask = [strip / "frames/f*.csv", *GAUGE, "--out", out]
+def test_nothing_is_written_over_least_of_all_data(strip, tmp_path):
+    out, frames = tmp_path / "gauge.csv", sorted((strip / "frames").glob("f*.csv"))
+    ask = [*frames, *GAUGE, "--out", out]
     gauge(*ask)
     first = out.read_bytes()
     assert "is already there; use --overwrite" in refusal(*ask)
@@ -231,79 +207,66 @@ def test_nothing_is_written_over(strip, tmp_path):
     assert out.read_bytes() == first
     gauge(*changed)
     assert out.read_bytes() != first
-    assert [f.name for f in tmp_path.iterdir()] == ["gauge.csv"]
-
-
-def test_data_are_never_written_over(tmp_path):
-    files = write_frames(tmp_path / "frames", stretches=np.array([1.0, 1.1]))
-    before = files[0].read_bytes()
-    link = tmp_path / "link.csv"
-    link.symlink_to(files[0])
-    for out in (files[0], link):
-        message = refusal(*files, *GAUGE, "--out", out, "--overwrite")
-        assert "is one of the files to be read" in message
-    assert files[0].read_bytes() == before
-
-
-def test_a_folder_that_cannot_be_written(strip, tmp_path):
-    (tmp_path / "file").write_text("")
-    message = refusal(strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "file" / "gauge.csv")
+    message = refusal(*ask[:-1], out / "gauge.csv")
     assert "cannot be written" in message and "--out" in message
+    assert [f.name for f in tmp_path.iterdir()] == ["gauge.csv"]
+    before, link = frames[0].read_bytes(), tmp_path / "link.csv"
+    link.symlink_to(frames[0])
+    for out in (frames[0], link):
+        message = refusal(*ask[:-1], out, "--overwrite")
+        assert "is one of the files to be read" in message
+    assert frames[0].read_bytes() == before
 
 
 LOADS = ["--loads", "{strip}/machine.csv", "--direction", "warp"]
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--loads", "{strip}/machine.csv"], "--direction: this option is missing"),
-        (["--loads", "{strip}/machine.csv", "--direction", "90"], "--direction: unknown direction"),
-        (["--direction", "warp"], "--direction: means nothing without --loads"),
-        (["--frame-interval", "1"], "--frame-interval: means nothing without --loads"),
-        ([*LOADS, "--time-offset", "1"], "--time-offset: means nothing without --frame-times or"),
-        ([*LOADS, "--frame-time-column", "t"], "--frame-time-column: means nothing without --fr"),
-        (
-            [*LOADS, "--frame-interval", "1", "--frame-times", "{tmp}/t.csv"],
-            "--frame-times, --frame-interval: give one of them, not both",
-        ),
-        ([*LOADS, "--frame-interval", "nan"], "--frame-interval: expected a finite number"),
-        ([*LOADS, "--frame-interval", "1", "--time-offset", "inf"], "--time-offset: expected a f"),
-        ([*LOADS, "--specimen", " "], "--specimen: expected a name on one line"),
-        ([*LOADS, "--specimen", "a\nb"], "--specimen: expected a name on one line"),
-        (LOADS, "machine.csv: expected one load for each of the 12 frames, got 60; --frame-times"),
-        ([*LOADS, "--load-column", "F"], "'F'; name them with --load-column; line 4, above"),
-        (
-            [*LOADS, "--frame-times", "{strip}/frames/f0.csv"],
-            "f0.csv: no header row with the columns one of time; name them with --frame-time-col",
-        ),
-        ([*LOADS, "--load-unit", "N"], "the file says 'kN', load_unit says 'N'"),
-        (["--loads", "{tmp}/none.csv", "--direction", "warp"], "none.csv: no such file"),
-        ([*LOADS, "--frame-times", "{tmp}/none.csv"], "none.csv: no such file"),
-        (
-            [*LOADS, "--frame-times", "{strip}/machine.csv"],
-            "machine.csv: expected one time for each of the 12 frames, got 60",
-        ),
-        ([*LOADS, "--frame-interval", "9"], "specimen 'out': only 1 of 12 frames"),
-        (["--columns", "x"], "--columns: expected such as x=X,y=Y"),
-        (["--columns", ""], "--columns: expected such as x=X,y=Y"),
-        (["--columns", "w=W"], "--columns: unknown quantity 'w'; expected x, y, z, dx, dy, dz"),
-        (["--columns", "x=dx,dx=dx"], "--columns: column 'dx' is named for x and for dx"),
-        (["--columns", "x=dx"], "f0.csv: column 'dx': this column is missing; the file has: x, y"),
-        (["--columns", "x=X"], "f0.csv: column 'X': this column is missing; the file has: x, y"),
-        (["--flag-column", "mask"], "f0.csv: column 'mask': this column is missing"),
-        (["--max-gap", "inf"], "--max-gap: expected a finite number"),
-        (["--lower", "nan", "2"], "lower: expected x and y in mm"),
-        (["--lower", *UPPER], "gauge: lower and upper are the same point"),
-        (["--lower", "-5", "20"], "lower end of the gauge at (-5, 20) mm: lost in every frame"),
-        (["--length-unit", "m"], "f0.csv: gauge: the ends are 20.02 mm apart, the points 1414 mm"),
-        (["{tmp}/none.csv"], "none.csv: no such file"),
-        (["{tmp}/no*.csv"], "FRAMES: no file matches"),
-        (["{strip}/frames"], "frames: FRAMES: is a folder, expected files; quote a pattern such"),
-        (["{strip}/frames/f3.csv"], "f3.csv: FRAMES: is given twice"),
-        (["{strip}/machine.csv"], "machine.csv"),
-    ],
+NO_LOADS, FRAMES = (
+    "means nothing without --loads",
+    "expected one {} for each of the 12 frames, got 60",
 )
+BAD = [
+    (["--loads", "{strip}/machine.csv"], "--direction: this option is missing"),
+    (["--loads", "{strip}/machine.csv", "--direction", "90"], "--direction: unknown direction"),
+    (["--direction", "warp"], f"--direction: {NO_LOADS}"),
+    (["--frame-interval", "1"], f"--frame-interval: {NO_LOADS}"),
+    ([*LOADS, "--time-offset", "1"], "--time-offset: means nothing without --frame-times or"),
+    ([*LOADS, "--frame-time-column", "t"], "--frame-time-column: means nothing without --fr"),
+    ([*LOADS, "--frame-interval", "1", "--frame-times", "{tmp}/t.csv"],
+     "--frame-times, --frame-interval: give one of them, not both"),
+    ([*LOADS, "--frame-interval", "nan"], "--frame-interval: expected a finite number"),
+    ([*LOADS, "--frame-interval", "1", "--time-offset", "inf"], "--time-offset: expected a f"),
+    ([*LOADS, "--specimen", " "], "--specimen: expected a name on one line"),
+    ([*LOADS, "--specimen", "a\nb"], "--specimen: expected a name on one line"),
+    (LOADS, f"machine.csv: {FRAMES.format('load')}; --frame-times"),
+    ([*LOADS, "--load-column", "F"], "'F'; name them with --load-column; line 4, above"),
+    ([*LOADS, "--frame-times", "{strip}/frames/f0.csv"], "f0.csv: no header row with the columns"),
+    ([*LOADS, "--load-unit", "N"], "the file says 'kN', load_unit says 'N'"),
+    (["--loads", "{tmp}/none.csv", "--direction", "warp"], "none.csv: no such file"),
+    ([*LOADS, "--frame-times", "{tmp}/none.csv"], "none.csv: no such file"),
+    ([*LOADS, "--frame-times", "{strip}/machine.csv"], f"machine.csv: {FRAMES.format('time')}"),
+    ([*LOADS, "--frame-interval", "9"], "specimen 'out': only 1 of 12 frames"),
+    (["--columns", "x"], "--columns: expected such as x=X,y=Y"),
+    (["--columns", ""], "--columns: expected such as x=X,y=Y"),
+    (["--columns", "w=W"], "--columns: unknown quantity 'w'; expected x, y, z, dx, dy, dz"),
+    (["--columns", "x=dx,dx=dx"], "--columns: column 'dx' is named for x and for dx"),
+    (["--columns", "x=dx"], "f0.csv: column 'dx': this column is missing; the file has: x, y"),
+    (["--columns", "x=X"], "f0.csv: column 'X': this column is missing; the file has: x, y"),
+    (["--flag-column", "mask"], "f0.csv: column 'mask': this column is missing"),
+    (["--max-gap", "inf"], "--max-gap: expected a finite number"),
+    (["--lower", "nan", "2"], "lower: expected x and y in mm"),
+    (["--lower", *UPPER], "gauge: lower and upper are the same point"),
+    (["--lower", "-5", "20"], "lower end of the gauge at (-5, 20) mm: lost in every frame"),
+    (["--length-unit", "m"], "f0.csv: gauge: the ends are 20.02 mm apart, the points 1414 mm"),
+    (["{tmp}/none.csv"], "none.csv: no such file"),
+    (["{tmp}/no*.csv"], "FRAMES: no file matches"),
+    (["{strip}/frames"], "frames: FRAMES: is a folder, expected files; quote a pattern such"),
+    (["{strip}/frames/f3.csv"], "f3.csv: FRAMES: is given twice"),
+    (["{strip}/machine.csv"], "machine.csv"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("options", "words"), BAD)
 def test_bad_input_is_one_line(strip, tmp_path, options, words):
     given = [option.format(strip=strip, tmp=tmp_path) for option in options]
     ask = [strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "out.csv", *given]
@@ -311,8 +274,8 @@ def test_bad_input_is_one_line(strip, tmp_path, options, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_order_that_looks_unmeant_is_said(tmp_path):
-    files = sorted(map(str, write_frames(tmp_path / "frames")))
+def test_an_order_that_looks_unmeant_is_said(strip, tmp_path):
+    files = sorted(map(str, (strip / "frames").glob("f*.csv")))
     done = gauge(*files, *GAUGE, "--out", tmp_path / "out.csv", "--json")
     assert "f10.csv before f2.csv" in done.stderr
     assert "f10.csv before f2.csv" in json.loads(done.stdout)["warnings"][0]

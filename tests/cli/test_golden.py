@@ -1,15 +1,11 @@
 """Terminal output of the commands that no other file of this folder runs: tests/golden/."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.cli.terminal import every_command
 
 from ..commands import in_process
-from ..golden_files import FOLDER, Golden
+from ..golden_files import FOLDER
 from ..projects import constant_strips
 
 CARD = ("--card", "out/material.toml")
@@ -36,7 +32,7 @@ COMMANDS = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A project of strips with constant moduli, and the folder of its fit."""
     folder = tmp_path_factory.mktemp("golden")
     constant_strips(folder)
@@ -45,17 +41,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_prints_its_golden_file(name: str, folder: Path, golden: Golden) -> None:
+def test_a_command_prints_its_golden_file(name, folder, golden):
     golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
 
 
-def test_doctor_lists_the_embedded_solver(golden: Golden, tmp_path: Path) -> None:
-    """The first line; the others depend on the machine."""
+def test_doctor_lists_the_embedded_solver(golden, tmp_path):
     golden("doctor", in_process("doctor", cwd=tmp_path).stdout.splitlines()[0], tmp_path)
 
 
-def test_every_command_has_a_golden_file() -> None:
-
+def test_every_command_has_a_golden_file():
     names = {"-".join(path) for path, _ in every_command(main)}
     groups = {"simulate", "simulate-strips", "study", "dic"}  # strips: another name of uniaxial
     assert names - groups <= {path.stem for path in FOLDER.iterdir()}

@@ -1,9 +1,6 @@
 """Progress: on a terminal and elsewhere, from the first analysis on."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable
 
 import pytest
 from bubblefit import files
@@ -11,33 +8,29 @@ from bubblefit.cli.progress import COMPILING, SeriesProgress, StudyProgress
 from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 
-Clock = Callable[[float], None]
+ENDED = StartRecord(1, (1, 1), 0.25, "done", 1, (), (), 0.1)
 
 
-def analysis(start: int, objective: float | None) -> EvaluationRecord:
+def analysis(start, objective):
     return EvaluationRecord(start, 1, objective, "ok", (), ())
 
 
-def ended(number: int, objective: float | None) -> StartRecord:
-    return StartRecord(number, (1, number), objective, "done", 1, (), (), 0.1)
-
-
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     """Lets so many seconds pass."""
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
 
-    def pass_by(seconds: float) -> None:
+    def pass_by(seconds):
         now[0] += seconds
 
     return pass_by
 
 
-def test_the_start_under_way_is_told_from_its_first_analysis_on(clock: Clock) -> None:
+def test_the_start_under_way_is_told_from_its_first_analysis_on(clock):
     shown = StudyProgress(4, quiet=True)
     said = []
-    records = [None, analysis(0, 2.98), analysis(1, 0.5), analysis(1, None), ended(1, 0.25)]
+    records = [None, analysis(0, 2.98), analysis(1, 0.5), analysis(1, None), ENDED]
     for record in [*records, analysis(0, 0.125)]:
         shown.saw(record)
         said.append(shown.note())
@@ -53,9 +46,7 @@ def test_the_start_under_way_is_told_from_its_first_analysis_on(clock: Clock) ->
     ]
 
 
-def test_elsewhere_than_on_a_terminal_a_plain_line_a_minute(
-    clock: Clock, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_elsewhere_than_on_a_terminal_a_plain_line_a_minute(clock, capsys):
     shown = StudyProgress(4, quiet=False)
     for _ in range(59):
         shown.saw(analysis(0, 0.5))
@@ -69,7 +60,7 @@ def test_elsewhere_than_on_a_terminal_a_plain_line_a_minute(
     assert capsys.readouterr().err == ""
 
 
-def test_a_series_says_where_it_is_too(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_series_says_where_it_is_too(clock, capsys):
     for quiet in (False, True):
         shown = SeriesProgress(quiet)
         shown.saw(Step("bubble", 1, 3, 2, 7))
@@ -80,21 +71,15 @@ def test_a_series_says_where_it_is_too(clock: Clock, capsys: pytest.CaptureFixtu
         assert capsys.readouterr() == ("", said)
 
 
-@pytest.mark.parametrize(("there", "quiet"), [(False, False), (True, False), (False, True)])
-def test_compilation_is_announced_where_it_comes(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], there: bool, quiet: bool
-) -> None:
-    monkeypatch.setattr(files, "kernels_are_compiled", lambda: there)
-    with StudyProgress(1, quiet):
-        pass
-    assert capsys.readouterr().err == ("" if there or quiet else f"{COMPILING}\n")
+def test_compilation_is_announced_until_kernels_are_kept(tmp_path, monkeypatch, capsys):
+    def said(quiet):
+        with StudyProgress(1, quiet):
+            return capsys.readouterr().err
 
-
-def test_kernels_are_there_once_they_are_kept(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files, "_kernel_folder", lambda: tmp_path)
-    assert not files.kernels_are_compiled()
+    assert (said(False), said(True)) == (f"{COMPILING}\n", "")
     (tmp_path / "membrane").mkdir()
     (tmp_path / "membrane" / "kernel.assemble.1.nbc").touch()
-    assert files.kernels_are_compiled()
+    assert said(False) == ""
     monkeypatch.setattr(files, "_kernel_folder", lambda: None)
-    assert not files.kernels_are_compiled()
+    assert said(False) == f"{COMPILING}\n"

@@ -1,19 +1,16 @@
 """bubblefit report: the page again, of what is not finished, of two folders, on paper."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
 
 import pytest
-from bubblefit.cli.main import main
-from bubblefit.reports import html as pdf
+from bubblefit.reports import html
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
-from click.testing import CliRunner, Result
 
+from ..commands import in_process, one_line
 from ..reports.test_html import drawn, full_report
 
 START = {
@@ -22,12 +19,12 @@ START = {
 }  # fmt: skip
 
 
-def report(*arguments: Path | str) -> Result:
-    return CliRunner().invoke(main, ["report", *map(str, arguments)])
+def report(*arguments, code=0):
+    return in_process("report", *arguments, cwd=".", code=code)
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """An output folder with a page."""
     path = tmp_path / "one"
     path.mkdir()
@@ -36,16 +33,20 @@ def folder(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_same_bytes_again(folder: Path) -> None:
+def test_the_same_bytes_again_and_none_without_a_browser(folder, monkeypatch):
     page = folder / "report.html"
     first = page.read_bytes()
     page.unlink()
-    done = report(folder)
-    assert (done.exit_code, done.output) == (0, f"page: {page}\n")
+    assert report(folder).output == f"page: {page}\n"
     assert page.read_bytes() == first
+    tables = [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1", [])]
+    assert read_page_data(folder).tables == tables
+    monkeypatch.setattr(html, "find_browser", lambda: None)
+    one_line(report(folder, "--format", "pdf", code=2), "report.pdf: needs a browser")
+    assert not (folder / "report.pdf").exists()
 
 
-def unfinished(folder: Path) -> Path:
+def unfinished(folder):
     """What a fit that was killed leaves: two starts, one written half, eleven analyses."""
     folder.mkdir()
     (folder / "run.json").write_text("{}")
@@ -60,8 +61,7 @@ def unfinished(folder: Path) -> Path:
     return folder
 
 
-def test_an_unfinished_fit(tmp_path: Path) -> None:
-    """It says first that it is none, then what is there."""
+def test_an_unfinished_fit(tmp_path):
     made = page_of_folder(unfinished(tmp_path / "fit"))
     assert made.title == "fabric.toml: unfinished" and made.summary == UNFINISHED
     facts, starts, record = made.parts
@@ -69,14 +69,13 @@ def test_an_unfinished_fit(tmp_path: Path) -> None:
     assert starts.rows == [[3, "full", 0.25, 7, "converged"]]
     assert ["command", "bubblefit fit fabric.toml"] in record.rows
     assert ["data: a.csv", "sha256 0123456789ab …"] in record.rows
-    assert report(tmp_path / "fit").exit_code == 0
+    report(tmp_path / "fit")
     assert "Unfinished: there is no result yet" in (tmp_path / "fit" / "report.html").read_text()
     # It leaves no data of a page behind, which would be taken for a result's.
     assert not (tmp_path / "fit" / "page.json").exists()
 
 
-def test_an_unfinished_study(tmp_path: Path) -> None:
-    """A folder of fits: which of them are finished."""
+def test_an_unfinished_study(tmp_path):
     unfinished(tmp_path / "without one")
     (tmp_path / "without two").mkdir()
     (tmp_path / "without two" / "result.json").write_text("{}")
@@ -86,25 +85,23 @@ def test_an_unfinished_study(tmp_path: Path) -> None:
     assert table.rows == [["without one", "unfinished"], ["without two", "finished"]]
 
 
-@pytest.mark.parametrize(
-    ("holds", "said"),
-    [
-        ([], "is no output folder: neither page.json nor run.json is there"),
-        (["result.json"], "has a result but no page.json: an older version wrote it"),
-        (["page.json"], "is damaged"),
-    ],
-)
-def test_what_is_no_folder_of_a_page(tmp_path: Path, holds: list[str], said: str) -> None:
-    for name in holds:
-        (tmp_path / name).write_text("")
-    done = report(tmp_path)
-    assert done.exit_code == 2 and said in done.stderr and done.stderr.count("\n") == 1
-    assert not (tmp_path / "report.html").exists()
-    done = report(tmp_path / "nowhere")
-    assert done.exit_code == 2 and "there is no such folder" in done.stderr
+def test_what_is_no_folder_of_a_page(tmp_path):
+    for name, said in (
+        (None, "is no output folder: neither page.json nor run.json is there"),
+        ("result.json", "has a result but no page.json: an older version wrote it"),
+        ("page.json", "is damaged"),
+        ("nowhere", "there is no such folder"),
+    ):
+        folder = tmp_path / str(name)
+        if name != "nowhere":
+            folder.mkdir()
+        if name and folder.is_dir():
+            (folder / name).write_text("")
+        one_line(report(folder, code=2), said)
+        assert not (folder / "report.html").exists()
 
 
-def test_two_side_by_side(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_side_by_side(folder, tmp_path, monkeypatch):
     """Tables of one heading as one, curves in one chart, pictures of both folders."""
     monkeypatch.chdir(tmp_path)
     other = Path(shutil.copytree(folder, tmp_path / "two"))
@@ -112,8 +109,7 @@ def test_two_side_by_side(folder: Path, tmp_path: Path, monkeypatch: pytest.Monk
     (section,) = [own for own in content["sections"] if own["title"] == "Tables"]
     section["parts"][0]["rows"] = [[22, 0.5], [59, 1]]
     (other / "page.json").write_text(json.dumps(content))
-    done = report(folder, other)
-    assert (done.exit_code, done.output) == (0, "page: one-beside-two.html\n")
+    assert report(folder, other).output == "page: one-beside-two.html\n"
     text = (tmp_path / "one-beside-two.html").read_text()
     assert "one: Good. two: Good." in text and text.count("data:image/png") == 2
     # Told apart by colour and dashes.
@@ -122,20 +118,5 @@ def test_two_side_by_side(folder: Path, tmp_path: Path, monkeypatch: pytest.Monk
     assert '<tr><td>one</td><td class="text">22</td><td>0.9997</td>' in text
     assert '<td>two</td><td class="text">22</td><td>0.5</td>' in text
     assert '<td>two</td><td class="text">59</td><td>1</td>' in text
-    assert report(folder, folder).exit_code == 2
-    assert report(folder, other, folder).exit_code == 2
-
-
-def test_no_browser(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pdf, "find_browser", lambda: None)
-    done = report(folder, "--format", "pdf")
-    assert done.exit_code == 2 and done.stderr.count("\n") == 1
-    assert "report.pdf: needs a browser to print with" in done.stderr
-    assert not (folder / "report.pdf").exists()
-
-
-def test_tables_stay_tables(folder: Path) -> None:
-    """A page that was read back has what was written."""
-    assert read_page_data(folder).tables == [
-        Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1", [])
-    ]
+    report(folder, folder, code=2)
+    report(folder, other, folder, code=2)

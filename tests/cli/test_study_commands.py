@@ -1,25 +1,21 @@
 """`bubblefit study` as a user runs it: files, lines, levels that fail, bad input."""
 
-from __future__ import annotations
-
-import contextlib
 import json
 import re
-from pathlib import Path
+import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.main import main
 from bubblefit.errors import SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.reports.charts import Charts
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from click.testing import CliRunner
 
+from ..commands import in_process, result_in
 from ..drawings import check_convergence, data, legend, shown
-from ..places import EXAMPLES
+from ..places import EXAMPLES, KNOWN
+from ..projects import project_file
 from ..published_laws import TABLE_4_2
 
 #: Seconds of a level, in the table on the terminal.
@@ -28,40 +24,38 @@ SECONDS = re.compile(r"(?m)^( +\d+ +\d+) +\d+\.\d+")
 FALLING = [0, 0, 0, 0.015, 0, 0, 0, 0.15, 0, -3.0, -1.5, 0.7]
 
 
-def study(*arguments, cwd: Path, code: int = 0) -> str:
-    """Run the command; assert its exit code; return what it printed."""
-    with contextlib.chdir(cwd):
-        done = CliRunner().invoke(main, ["study", *map(str, arguments)])
-    assert done.exit_code == code, done.output
-    return done.output
+def study(*arguments, cwd, code=0, card="card.toml"):
+    """Run the command on project.toml and a card; assert its exit code; return its output."""
+    name, *options = arguments
+    run = ("study", name, "project.toml", "--card", card, *options)
+    return in_process(*run, cwd=cwd, code=code).output
 
 
 @pytest.fixture
-def bubble(tmp_path: Path) -> Path:
+def bubble(tmp_path):
     """A folder with a small bubble project and the card of Table 4.2."""
-    text = (EXAMPLES / "bubble-known-solution" / "project.toml").read_text()
-    (tmp_path / "project.toml").write_text(text.replace("elements = 800", "elements = 80", 1))
+    project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 80"))
     law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.13] * 3)
     write_card(MaterialCard(law, 0.81, "Table 4.2"), tmp_path / "card.toml")
     return tmp_path
 
 
 @pytest.fixture
-def strips(tmp_path: Path) -> Path:
+def strips(tmp_path):
     """A folder with the strips, 10 increments, and a card that fine bias strips cannot carry."""
     example = EXAMPLES / "uniaxial-valmex7318"
     text = (example / "project.toml").read_text()
-    (tmp_path / "project.toml").write_text(text.replace("increments = 100", "increments = 10", 1))
-    (tmp_path / "curves.csv").write_bytes((example / "curves.csv").read_bytes())
+    project_file(tmp_path, text, ("increments = 100", "increments = 10"))
+    shutil.copy(example / "curves.csv", tmp_path)
     card = MaterialCard(HypoelasticLaw(1000 * np.array(FALLING)), 0.81)
     write_card(card, tmp_path / "card.toml")
     return tmp_path
 
 
-def test_mesh_of_a_bubble(bubble: Path, drawn: list[Charts], golden) -> None:
-    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 3, "--coarser", 0,
-                 "--out", "out", cwd=bubble)  # fmt: skip
-    result = json.loads((bubble / "out/result.json").read_text())
+def test_mesh_of_a_bubble(bubble, drawn, golden):
+    run = ("mesh", "--levels", 3, "--coarser", 0, "--out", "out")
+    done = study(*run, cwd=bubble)
+    result = result_in(bubble / "out")
     model = result["models"]["bubble"]
     counts = [level["elements"] for level in model["levels"]]
     assert counts[2] == 4 * counts[1]
@@ -72,8 +66,7 @@ def test_mesh_of_a_bubble(bubble: Path, drawn: list[Charts], golden) -> None:
     assert len(model["quantities"]) == 8 and "rms_N" not in model
     table = pd.read_csv(bubble / "out/convergence.csv")
     assert len(table) == 3 * 8
-    finest = table[table.elements == counts[-1]]
-    assert (finest.off_finest == 0).all()
+    assert (table[table.elements == counts[-1]].off_finest == 0).all()
     coarse = table[(table.factor == 1) & (table.quantity == "apex at 300 kPa, mm")].iloc[0]
     assert coarse.value - coarse.off_finest == pytest.approx(apex["finest"])
     assert (bubble / "out/convergence.png").stat().st_size > 10_000
@@ -81,16 +74,13 @@ def test_mesh_of_a_bubble(bubble: Path, drawn: list[Charts], golden) -> None:
     names = {s.name for s in drawn[-1].charts[0].series[:-2]}
     assert names == set(model["quantities"])
     golden("study-mesh", SECONDS.sub(r"\1  N", done), bubble)
-    again = study("mesh", "project.toml", "--card", "card.toml", "--out", "out", cwd=bubble, code=2)
-    assert "--overwrite" in again
+    assert "--overwrite" in study(*run, cwd=bubble, code=2)
 
 
-def test_increments_of_strips(strips: Path) -> None:
-    done = study("mesh", "project.toml", "--card", "card.toml", "--what", "increments",
-                 "--levels", 3, "--json", cwd=strips)  # fmt: skip
+def test_increments_of_strips(strips):
+    done = study("mesh", "--what", "increments", "--levels", 3, "--json", cwd=strips)
     result = json.loads(done)
-    folder = strips / "out" / f"{strips.name}-increments"
-    assert result == json.loads((folder / "result.json").read_text())
+    assert result == result_in(strips / "out" / f"{strips.name}-increments")
     for name in ("warp", "fill"):
         model = result["models"][name]
         assert [level["increments"] for level in model["levels"]] == [10, 20, 40]
@@ -100,12 +90,10 @@ def test_increments_of_strips(strips: Path) -> None:
         assert max(model["rms_N"]["to_next_finer"]) < 1e-6 * model["rms_N"]["largest_load"]
 
 
-def test_a_level_that_fails_is_named_and_left_out(strips: Path) -> None:
-    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 3, "--out", "out",
-                 cwd=strips)  # fmt: skip
-    result = json.loads((strips / "out/result.json").read_text())
-    bias = result["models"]["bias"]["levels"]
-    failed = [level for level in bias if level["values"] is None]
+def test_a_level_that_fails_is_named_and_left_out(strips):
+    done = study("mesh", "--levels", 3, "--out", "out", cwd=strips)
+    result = result_in(strips / "out")
+    failed = [one for one in result["models"]["bias"]["levels"] if one["values"] is None]
     assert failed and all("elongation" in level["failed"] for level in failed)
     assert "failed: " in done
     table = pd.read_csv(strips / "out/convergence.csv")
@@ -113,17 +101,17 @@ def test_a_level_that_fails_is_named_and_left_out(strips: Path) -> None:
     assert all(level["values"] for level in result["models"]["warp"]["levels"])
 
 
-def test_nothing_that_ends_well_is_exit_code_4(bubble: Path) -> None:
+def test_nothing_that_ends_well_is_exit_code_4(bubble):
     card = MaterialCard(HypoelasticLaw(1000 * np.array([*TABLE_4_2[:11], -0.1])), 0.81)
     write_card(card, bubble / "bad.toml")
     for command in ("mesh", "nu12"):
-        done = study(command, "project.toml", "--card", "bad.toml", cwd=bubble, code=4)
+        done = study(command, cwd=bubble, code=4, card="bad.toml")
         assert len(done.splitlines()) == 1 and not (bubble / "out").exists()
 
 
-def test_nu12_of_a_bubble(bubble: Path, drawn: list[Charts], golden) -> None:
-    done = study("nu12", "project.toml", "--card", "card.toml", "--out", "out", cwd=bubble)
-    result = json.loads((bubble / "out/result.json").read_text())
+def test_nu12_of_a_bubble(bubble, drawn, golden):
+    done = study("nu12", "--out", "out", cwd=bubble)
+    result = result_in(bubble / "out")
     last = result["models"]["bubble"]["responses"]["300 kPa"]
     assert result["base_nu12"] == 0.24 and last["nu12"] == [0.05, 0.15, 0.25, 0.35, 0.45]
     assert last["to_base"] == sorted(last["to_base"], reverse=True)
@@ -143,13 +131,12 @@ def test_nu12_of_a_bubble(bubble: Path, drawn: list[Charts], golden) -> None:
     assert result["models"]["bubble"]["failed"] == {}
 
 
-def test_what_a_reader_should_know_is_said(bubble: Path) -> None:
+def test_what_a_reader_should_know_is_said(bubble):
     law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.05, 0.13, 0.13])
     write_card(MaterialCard(law, 0.81), bubble / "card.toml")
     for name, *options in (["nu12", "--nu12", 0.3], ["mesh", "--levels", 2]):
-        done = study(name, "project.toml", "--card", "card.toml", *options, "--out", name,
-                     cwd=bubble)  # fmt: skip
-        result = json.loads((bubble / name / "result.json").read_text())
+        done = study(name, *options, "--out", name, cwd=bubble)
+        result = result_in(bubble / name)
         told = [note for note in result["notes"] if note["kind"] == "beyond card range"]
         assert told == result["notes"] and len(told) == 2
         for note in told:
@@ -159,79 +146,66 @@ def test_what_a_reader_should_know_is_said(bubble: Path) -> None:
         assert table.to_dict("records") == told
 
 
-def test_a_nu12_that_fails_is_named_and_left_out(
-    bubble: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_nu12_that_fails_is_named_and_left_out(bubble, monkeypatch):
     run = MembraneSolver.run
 
-    def picky(self: MembraneSolver, model, law, *args, **kwargs):
+    def picky(self, model, law, *args, **kwargs):
         if law.nu12 > 0.4:
             raise SolverFailure("no equilibrium at 186 kPa")
         return run(self, model, law, *args, **kwargs)
 
     monkeypatch.setattr(MembraneSolver, "run", picky)
-    options = ["project.toml", "--card", "card.toml", "--out", "out"]
-    done = study("nu12", *options, cwd=bubble)
+    done = study("nu12", "--out", "out", cwd=bubble)
     assert "nu12 = 0.45: no equilibrium at 186 kPa" in done
-    model = json.loads((bubble / "out/result.json").read_text())["models"]["bubble"]
+    model = result_in(bubble / "out")["models"]["bubble"]
     assert model["failed"] == {"0.45": "no equilibrium at 186 kPa"}
     assert model["responses"]["300 kPa"]["to_base"][-1] is None
-    study("nu12", *options, "--overwrite", "--nu12", 0.45, cwd=bubble, code=4)
+    study("nu12", "--out", "out", "--overwrite", "--nu12", 0.45, cwd=bubble, code=4)
 
 
-def test_chosen_values_of_nu12(strips: Path) -> None:
-    study("nu12", "project.toml", "--card", "card.toml", "--nu12", 0.3, "--nu12", 0, "--out", "out",
-          cwd=strips)  # fmt: skip
-    models = json.loads((strips / "out/result.json").read_text())["models"]
+def test_chosen_values_of_nu12(strips):
+    study("nu12", "--nu12", 0.3, "--nu12", 0, "--out", "out", cwd=strips)
+    models = result_in(strips / "out")["models"]
     assert set(models) == {"warp", "fill", "bias"}
     for model in models.values():
         (response,) = model["responses"].values()
         assert response["nu12"] == [0.0, 0.3]
-
-
-@pytest.mark.parametrize(
-    "options, words",
-    [
-        (["mesh", "--levels", 3, "--coarser", 3], "--coarser: expected fewer than the 3 levels"),
-        (["mesh", "--what", "increments", "--coarser", 1], "use --coarser 0"),
-        (["mesh", "--levels", 5, "--coarser", 4], "elements: expected 8 to"),
-        (["mesh", "--factor", 10, "--levels", 8], "elements: expected 8 to"),
-        (["nu12", "--nu12", 1.5], "--nu12: expected 0 <= nu12 < 1, got 1.5"),
-        (["nu12", "--element", "S4"], "means nothing to the solver 'membrane'"),
-        (["nu12", "--solver", "none"], "is not one of"),
-    ],
-)
-def test_bad_options_end_in_one_line(bubble: Path, options: list, words: str) -> None:
-    command, *rest = options
-    done = study(command, "project.toml", "--card", "card.toml", *rest, cwd=bubble, code=2)
-    assert words in done and len(done.splitlines()) == 1
-    assert not (bubble / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "old, new, words",
-    [("radius = 100.0", "radius = -1", "bubble[0].radius"), ("[fabric]", "[fabric", "TOML syntax")],
-)
-def test_bad_projects_end_in_one_line(bubble: Path, old: str, new: str, words: str) -> None:
-    path = bubble / "project.toml"
-    path.write_text(path.read_text().replace(old, new, 1))
-    done = study("mesh", "project.toml", "--card", "card.toml", cwd=bubble, code=2)
-    assert words in done and "project.toml" in done
-    assert len(done.splitlines()) == 1
-
-
-def test_a_strip_too_coarse_to_coarsen(strips: Path) -> None:
-    done = study("mesh", "project.toml", "--card", "card.toml", "--levels", 8, "--coarser", 6,
-                 cwd=strips, code=2)  # fmt: skip
+    done = study("mesh", "--levels", 8, "--coarser", 6, cwd=strips, code=2)
     assert "come out the same" in done
 
 
+BAD = [
+    (["mesh", "--levels", 3, "--coarser", 3], "--coarser: expected fewer than the 3 levels"),
+    (["mesh", "--what", "increments", "--coarser", 1], "use --coarser 0"),
+    (["mesh", "--levels", 5, "--coarser", 4], "elements: expected 8 to"),
+    (["mesh", "--factor", 10, "--levels", 8], "elements: expected 8 to"),
+    (["nu12", "--nu12", 1.5], "--nu12: expected 0 <= nu12 < 1, got 1.5"),
+    (["nu12", "--element", "S4"], "means nothing to the solver 'membrane'"),
+    (["nu12", "--solver", "none"], "is not one of"),
+]
+BAD_PROJECTS = [("radius = 100.0", "radius = -1", "bubble[0].radius"), ("[fabric]", "[fabric", "")]
+
+
+def test_bad_input_ends_in_one_line(bubble):
+    path = bubble / "project.toml"
+    text = path.read_text()
+    for options, words in BAD:
+        done = study(*options, cwd=bubble, code=2)
+        assert words in done and len(done.splitlines()) == 1
+    for old, new, words in BAD_PROJECTS:
+        project_file(bubble, text, (old, new))
+        done = study("mesh", cwd=bubble, code=2)
+        assert words in done and "project.toml" in done and len(done.splitlines()) == 1
+    assert not (bubble / "out").exists()
+
+
 @pytest.mark.slow
-def test_a_study_on_calculix(bubble: Path, ccx) -> None:
-    options = ["project.toml", "--card", "card.toml", "--nu12", 0.45, "--json", "--overwrite"]
-    done = study("nu12", *options, "--solver", "calculix", "--ccx", ccx.path, cwd=bubble)
-    other = study("nu12", *options, cwd=bubble)
-    both = [json.loads(d)["models"]["bubble"]["responses"] for d in (done, other)]
+def test_a_study_on_calculix(bubble, ccx):
+    run = ("nu12", "--nu12", 0.45, "--json", "--overwrite")
+    both = [
+        json.loads(study(*run, *own, cwd=bubble))["models"]["bubble"]["responses"]
+        for own in (("--solver", "calculix", "--ccx", ccx.path), ())
+    ]
     assert list(both[0]) == list(both[1])
     for pressure in both[0]:
         ratios = [b[pressure]["to_base"][0] for b in both]

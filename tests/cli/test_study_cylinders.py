@@ -1,15 +1,10 @@
 """`bubblefit study` of cylinders: tests by name, cards of the project, runs that stop early."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.reports.charts import Charts
-from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import in_process, one_line, result_in
@@ -19,19 +14,19 @@ from ..places import KNOWN
 
 
 @pytest.fixture
-def project(tmp_path: Path) -> Path:
+def project(tmp_path):
     path = tmp_path / "project.toml"
     path.write_text(STUDIED_PROJECT)
     return path
 
 
-def study(*arguments, cwd: Path, code: int = 0):
-    return in_process("study", *arguments, cwd=cwd, code=code)
+def study(name, *arguments, cwd, code=0):
+    return in_process("study", name, "project.toml", *arguments, cwd=cwd, code=code)
 
 
-def test_increments_of_a_cylinder_converge(project: Path, drawn: list[Charts]) -> None:
-    done = study("mesh", "project.toml", "--card", "known", "--test", "narrow", "--what",
-                 "increments", "--levels", 3, "--out", "out", cwd=project.parent)  # fmt: skip
+def test_increments_of_a_cylinder_converge(project, drawn):
+    run = ("mesh", "--card", "known", "--test", "narrow", "--what", "increments", "--levels", 3)
+    done = study(*run, "--out", "out", cwd=project.parent)
     result = result_in(project.parent / "out")
     assert list(result["models"]) == ["narrow"] and result["card"] == "known"
     found = result["models"]["narrow"]["quantities"]
@@ -49,12 +44,10 @@ def test_increments_of_a_cylinder_converge(project: Path, drawn: list[Charts]) -
     assert "load at 40 mm" in done.stdout
 
 
-def test_levels_without_a_quantity_are_left_out_of_it(
-    project: Path, monkeypatch: pytest.MonkeyPatch, drawn: list[Charts]
-) -> None:
+def test_levels_without_a_quantity_are_left_out_of_it(project, monkeypatch, drawn):
     run = MembraneSolver.run
 
-    def tired(self: MembraneSolver, model, law, *args, **kwargs) -> History:
+    def tired(self, model, law, *args, **kwargs):
         history = run(self, model, law, *args, **kwargs)
         if len(model.increments) > len(model.deflections):
             return history
@@ -64,8 +57,8 @@ def test_levels_without_a_quantity_are_left_out_of_it(
         )  # fmt: skip
 
     monkeypatch.setattr(MembraneSolver, "run", tired)
-    done = study("mesh", "project.toml", "--card", "known", "--case", "narrow", "--what",
-                 "increments", "--levels", 2, "--out", "out", cwd=project.parent)  # fmt: skip
+    run = ("mesh", "--card", "known", "--case", "narrow", "--what", "increments", "--levels", 2)
+    done = study(*run, "--out", "out", cwd=project.parent)
     found = result_in(project.parent / "out")["models"]["narrow"]
     assert "load at 40 mm, N" not in found["levels"][0]["values"]
     assert found["quantities"]["load at 40 mm, N"]["own_error"] is None
@@ -77,9 +70,8 @@ def test_levels_without_a_quantity_are_left_out_of_it(
     assert "-" in done.stdout
 
 
-def test_nu12_of_all_cylinders(project: Path, drawn: list[Charts]) -> None:
-    study("nu12", "project.toml", "--card", "known", "--nu12", 0.4, "--out", "out",
-          cwd=project.parent)  # fmt: skip
+def test_nu12_of_all_cylinders(project, drawn):
+    study("nu12", "--card", "known", "--nu12", 0.4, "--out", "out", cwd=project.parent)
     models = result_in(project.parent / "out")["models"]
     assert list(models) == ["narrow", "wide"]
     for model in models.values():
@@ -92,21 +84,15 @@ def test_nu12_of_all_cylinders(project: Path, drawn: list[Charts]) -> None:
     assert drawn[-1].charts[0].y_label == "load / that at nu12 = 0.24"
 
 
-@pytest.mark.parametrize(
-    "options, words",
-    [
+def test_mistakes_end_in_one_line(project):
+    for options, words in (
         (["--card", "other"], "--card: there is no card (and no file) 'other'"),
         (["--card", "known", "--test", "slim"], "--test: there is no test 'slim'"),
         (["--card", "known", "--coarser", 3], "size: expected at most the radius"),
         (["--card", "known", "--solver", "none"], "fit.solver (or --solver)"),
-    ],
-)
-def test_mistakes_end_in_one_line(project: Path, options: list, words: str) -> None:
-    one_line(study("mesh", "project.toml", *options, cwd=project.parent, code=2), words)
-    assert not (project.parent / "out").exists()
-
-
-def test_other_projects_have_no_cylinders(tmp_path: Path) -> None:
-    (tmp_path / "project.toml").write_text(KNOWN.read_text())
-    done = study("mesh", "project.toml", "--card", "x", "--test", "a", cwd=tmp_path, code=2)
+    ):
+        one_line(study("mesh", *options, cwd=project.parent, code=2), words)
+        assert not (project.parent / "out").exists()
+    project.write_text(KNOWN.read_text())
+    done = study("mesh", "--card", "x", "--test", "a", cwd=project.parent, code=2)
     one_line(done, "there is no")

@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import shutil
-from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
@@ -15,19 +14,18 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import a_start_is_stored, bubblefit, interrupted, one_line, result_in
 from ..commands import in_process as quick
+from ..commands import one_line, result_in
+from ..places import EXAMPLES
 from ..projects import project_file
 from ..published_laws import TABLE_3_2
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "examples"
 EXAMPLE = EXAMPLES / "uniaxial-valmex7318"
 COARSE = ("increments = 100", "increments = 10")
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
 
 
-def small(folder: Path, *changes: tuple[str, str]) -> Path:
+def small(folder, *changes):
     """The example with 10 increments, changed further by replacing text."""
     shutil.copy(EXAMPLE / "curves.csv", folder)
     return project_file(folder, (EXAMPLE / "project.toml").read_text(), COARSE, *changes)
@@ -37,11 +35,8 @@ def small(folder: Path, *changes: tuple[str, str]) -> Path:
 def study(tmp_path_factory):
     """An uninterrupted study of three starts: its folder and the terminal's output."""
     folder = tmp_path_factory.mktemp("uniaxial")
-    done = bubblefit("uniaxial", small(folder), "--out", "out", "--starts", 3, cwd=folder)
+    done = quick("uniaxial", small(folder), "--out", "out", "--starts", 3, cwd=folder)
     return folder, done.stdout
-
-
-# uniaxial
 
 
 def test_the_files_of_a_study_agree(study, golden):
@@ -110,54 +105,39 @@ def test_the_files_of_a_study_agree(study, golden):
 
 
 def test_json_fail_above_and_overwrite(study, tmp_path):
-    project = small(tmp_path)
-    arguments = ("uniaxial", project, "--out", "out", "--starts", 1, "--quiet")
-    done = bubblefit(*arguments, "--json", "--fail-above", 1e3, cwd=tmp_path)
-    assert json.loads(done.stdout) == result_in(tmp_path / "out")
+    shutil.copytree(study[0] / "out", tmp_path / "out")
+    arguments = ("uniaxial", small(tmp_path), "--out", "out", "--starts", 3, "--quiet")
     one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
-    done = bubblefit(*arguments, "--overwrite", "--fail-above", 1, cwd=tmp_path, code=1)
+    again = (*arguments, "--resume", "--json", "--fail-above", 1)
+    done = quick(*again, cwd=tmp_path, code=1)
     assert "--fail-above" in done.stderr
-    # Start 0 of one is start 0 of three.
-    first = result_in(study[0] / "out")["starts"][0]
-    assert result_in(tmp_path / "out")["starts"] == [first]
-
-
-def test_interrupted_and_resumed_ends_the_same(study, tmp_path):
-    folder, _ = study
-    arguments = ["uniaxial", str(small(tmp_path)), "--out", "out", "--starts", "3", "--jobs", "1"]
-    out = tmp_path / "out"
-    ended = interrupted(*arguments, cwd=tmp_path, when=lambda: a_start_is_stored(out))
-    assert ended.returncode == 130
-    assert not (tmp_path / "out" / "result.json").exists()
-    bubblefit(*arguments, "--resume", cwd=tmp_path)
-    ours, theirs = result_in(tmp_path / "out"), result_in(folder / "out")
-    for key in ("objective", "beta", "starts", "analyses", "tests", "uncertainty", "warnings"):
-        assert ours[key] == theirs[key], key
-    histories = [(f / "out/history.csv").read_text() for f in (tmp_path, folder)]
-    assert histories[0] == histories[1]
+    assert json.loads(done.stdout) == result_in(tmp_path / "out")
 
 
 WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
 RANGE = ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.153, 0.232, 0.883]")
+#: What is changed, and how --resume names it.
 OTHER_STUDIES = {
-    "weights": ("fill = 1.0", "fill = 2.0"),
-    "increments": ("increments = 10", "increments = 11"),
-    "gauge": ("[strips.data]", "[strips.warp]\ngauge_length = 21.0\n[strips.data]"),
-    "width": ("width = 25.0", "width = 24.0"),
-    "objective": ('objective = "N"', 'objective = "relative"'),
-    "bounds": ("E1 = [0.02, 2.0]", "E1 = [0.03, 2.0]"),
-}
-#: What --resume says of each.
-DIFFERENCES = {
-    "weights": "strips.weights.fill = 1.0, now 2.0",
-    "increments": "strips.increments = 10, now 11",
-    "gauge": "strips.fill.gauge_length = 22.78, now 22.7",
-    "width": "strips.width = 25.0, now 24.0",
-    "objective": 'strips.objective = "N", now "relative"',
-    "bounds": "law.bounds.E1[0] = 0.02, now 0.03",
-    "data": "data file points.csv of 'strips' (sha256 ",
-    "gauge length": "strips.warp.gauge_length = 20.022, now 21.0",
-    "final length": "strips.bias.final_length = 30.734, now 31.0",
+    "weights": ("fill = 1.0", "fill = 2.0", "strips.weights.fill = 1.0, now 2.0"),
+    "increments": ("increments = 10", "increments = 11", "strips.increments = 10, now 11"),
+    "gauge": (
+        "gauge_length = 22.78",
+        "gauge_length = 22.7",
+        "strips.fill.gauge_length = 22.78, now 22.7",
+    ),
+    "width": ("width = 25.0", "width = 24.0", "strips.width = 25.0, now 24.0"),
+    "objective": (
+        'objective = "N"',
+        'objective = "relative"',
+        'strips.objective = "N", now "relative"',
+    ),
+    "bounds": ("E1 = [0.02, 2.0]", "E1 = [0.03, 2.0]", "law.bounds.E1[0] = 0.02, now 0.03"),
+    "final length": (
+        "final_length = 30.734",
+        "final_length = 31.0",
+        "strips.bias.final_length = 30.734, now 31.0",
+    ),
+    "data": None,
 }
 
 
@@ -167,11 +147,11 @@ def of_points(tmp_path_factory):
     folder = tmp_path_factory.mktemp("points")
     write_points(folder / "points.csv")
     project = small(folder, *POINTS, RANGE, WIDER)
-    bubblefit("uniaxial", project, "--out", "out", "--starts", 1, cwd=folder)
+    quick("uniaxial", project, "--out", "out", "--starts", 1, cwd=folder)
     return folder
 
 
-def write_points(path: Path, law: HypoelasticLaw | None = None, factor: float = 1.0) -> None:
+def write_points(path, law=None, factor=1.0):
     """Points as a test machine lists them: what a law gives, at the ten increments."""
     law = law or HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
     lines = ["direction,elongation_mm,load_N"]
@@ -202,29 +182,20 @@ POINTS = (
 )
 
 
-@pytest.mark.parametrize("what", [*OTHER_STUDIES, "data", "gauge length", "final length"])
+@pytest.mark.parametrize("what", OTHER_STUDIES)
 def test_another_study_is_not_resumed(of_points, tmp_path, what):
     shutil.copytree(of_points / "out", tmp_path / "out")
     shutil.copy(of_points / "points.csv", tmp_path)
-    changes = [*POINTS, RANGE, WIDER]
+    changes, said = [*POINTS, RANGE, WIDER], "data file points.csv of 'strips' (sha256 "
     if what == "data":
         write_points(tmp_path / "points.csv", factor=1.01)
-    elif what == "gauge length":
-        changes.append(("gauge_length = 20.022", "gauge_length = 21.0"))
-    elif what == "final length":
-        changes.append(("final_length = 30.734", "final_length = 31.0"))
-    elif what == "gauge":
-        changes.append(("gauge_length = 22.78", "gauge_length = 22.7"))
     else:
-        changes.append(OTHER_STUDIES[what])
+        *change, said = OTHER_STUDIES[what]
+        changes.append(change)
     arguments = ("uniaxial", small(tmp_path, *changes), "--out", "out", "--starts", 1, "--resume")
     before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
     done = quick(*arguments, cwd=tmp_path, code=2)
-    one_line(
-        done,
-        "--overwrite",
-        f"run.json: parts: these results are of something else: {DIFFERENCES[what]}",
-    )
+    one_line(done, "--overwrite", f"run.json: parts: these results are of something else: {said}")
     assert done.stderr.count(", now ") == 1
     assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
 
@@ -291,7 +262,6 @@ def test_bad_projects_end_in_one_line(tmp_path, change, words):
 
 
 def test_no_feasible_start_is_exit_code_3(tmp_path):
-    """Between these coefficients every modulus is negative at the end of its range."""
     bounds = (
         "lower = [-9e9, 1e-3, -9e9, 1e-3, -9e9, 1e-3]\nupper = [-9e8, 2e-3, -9e8, 2e-3, -9e8, 2e-3]"
     )
@@ -309,16 +279,14 @@ def test_a_solver_that_is_not_one(tmp_path):
     """A program of another name is a failure of the solver, a wrong path bad input."""
     run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
     one_line(quick(*run, "no-ccx", cwd=tmp_path, code=2), "no-ccx")
-    done = quick(*run, shutil.which("false"), cwd=tmp_path, code=4)
-    assert "Traceback" not in done.stderr and done.stderr
+    assert quick(*run, shutil.which("false"), cwd=tmp_path, code=4).stderr
     assert not (tmp_path / "out" / "result.json").exists()
 
 
 @pytest.mark.slow
 def test_the_example_is_better_than_the_published_fit(tmp_path):
     """Thesis section 3.4: e_uniaxial = 50.1 N on the same polynomials; here at 100 increments."""
-    project = EXAMPLE / "project.toml"
-    bubblefit("uniaxial", project, "--out", "out", "--starts", 1, cwd=tmp_path)
+    quick("uniaxial", EXAMPLE / "project.toml", "--out", "out", "--starts", 1, cwd=tmp_path)
     result = result_in(tmp_path / "out")
     assert result["e_uniaxial_N"] < 50.1
     assert all(t["rms_N"] < t["scatter_N"] for t in result["directions"].values())
@@ -333,7 +301,7 @@ def test_raw_points_fit_within_the_scatter_of_the_specimens(shared_data, tmp_pat
     points = ('files = ["points.csv"]', 'files = ["valmex7318_load_gauge.csv"]')
     project = small(tmp_path, *POINTS, points, ("increments = 10", "increments = 20"))
     data = shared_data / "uniaxial"
-    bubblefit("uniaxial", project, "--data", data, "--out", "out", "--starts", 1, cwd=tmp_path)
+    quick("uniaxial", project, "--data", data, "--out", "out", "--starts", 1, cwd=tmp_path)
     tests = result_in(tmp_path / "out")["directions"]
     for direction, known in scatter.items():
         assert tests[direction]["scatter_N"] == pytest.approx(known, rel=2e-3)
@@ -344,7 +312,7 @@ def test_raw_points_fit_within_the_scatter_of_the_specimens(shared_data, tmp_pat
     assert 'title="orders.png"' in (tmp_path / "out" / "report.html").read_text()
 
 
-def least_warp_error(data: Path) -> float:
+def least_warp_error(data):
     """Least RMS error of load = b t exp(-nu12 eps) integral of a cubic E1, closed form."""
     points = pd.read_csv(data / "valmex7318_load_gauge.csv", comment="#")
     points = points[points["series"] == "warp"]
@@ -357,10 +325,7 @@ def least_warp_error(data: Path) -> float:
     return float(np.sqrt(np.mean((best - load) ** 2)))
 
 
-# simulate uniaxial
-
-
-def card(folder: Path, name: str, law: HypoelasticLaw) -> Path:
+def card(folder, name, law):
     path = folder / f"{name}.toml"
     write_card(MaterialCard(law, 0.81, name, "a test"), path)
     return path
@@ -390,12 +355,9 @@ def test_simulate_two_cards(study, tmp_path, golden):
         "loads.png", "bias-1.png", "bias-2.png"
     }  # fmt: skip
     one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
-    done = quick(*arguments, "--overwrite", "--json", cwd=tmp_path)
-    assert json.loads(done.stdout)["cards"] == result["cards"]
 
 
 def test_simulate_within_the_range_of_the_card(study, tmp_path):
-    """A card of small strains: its curves end early, and no sum of errors is made of them."""
     folder, _ = study
     law = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2])
     options = ("--card", card(tmp_path, "short", law), "--within-range", "--out", "sim")
@@ -436,22 +398,16 @@ def test_simulate_a_card_that_fails_on_a_strip(study, tmp_path):
     assert len(result_in(tmp_path / "sim")["cards"]) == 2, twice.stdout
 
 
-def test_simulate_without_data(study, tmp_path):
-    """Lengths in the project are enough."""
-    project = small(tmp_path, *POINTS)
+def test_simulate_without_data(tmp_path):
     law = card(tmp_path, "some", HypoelasticLaw.linear(500.0, 200.0, 20.0))
-    done = quick("simulate", "uniaxial", project, "--card", law, "--out", "sim", cwd=tmp_path)
-    assert "N at the end" in done.stdout
+    run = ("uniaxial", small(tmp_path, *POINTS), "--card", law, "--out", "sim")
+    quick("simulate", *run, cwd=tmp_path)
     (found,) = result_in(tmp_path / "sim")["cards"].values()
     assert found["e_uniaxial_N"] is None
     assert all(t["rms_N"] is None and t["end_load_N"] > 0 for t in found["directions"].values())
 
 
-# CalculiX
-
-
 def test_strips_fitted_by_calculix(ccx, tmp_path):
-    """Warp and fill of a known law, led by the membrane; a bias strip would take minutes."""
     write_points(tmp_path / "points.csv")
     lines = (tmp_path / "points.csv").read_text().splitlines(keepends=True)
     (tmp_path / "points.csv").write_text("".join(x for x in lines if not x.startswith("bias")))
@@ -459,7 +415,7 @@ def test_strips_fitted_by_calculix(ccx, tmp_path):
     bias = f"[strips.bias]\ngauge_length = {start}\nfinal_length = {end}\n"
     project = small(tmp_path, *POINTS, RANGE, WIDER, (bias, ""))
     options = ("--solver", "calculix", "--element", "S4", "--out", "out", "--starts", 1)
-    bubblefit("uniaxial", project, *options, cwd=tmp_path)
+    quick("uniaxial", project, *options, cwd=tmp_path)
     result = result_in(tmp_path / "out")
     assert result["solver"] == "calculix" and 1 <= result["external_runs"] <= 10
     assert all(t["rms_N"] < 0.01 * t["end_load_N"] for t in result["directions"].values()), result

@@ -1,92 +1,71 @@
 """What was mistyped, help and its examples, completion, --verbose."""
 
-from __future__ import annotations
-
 import os
 import shlex
-import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
 import pytest
-from bubblefit.cli.main import COMMANDS, main
-from bubblefit.cli.terminal import HEAD, every_command, examples_in
-from click.testing import CliRunner, Result
+from bubblefit.cli.main import main
+from bubblefit.cli.terminal import HEAD, LOGGER, every_command, examples_in
+from click.testing import CliRunner
 
 from .. import needs
 from ..commands import in_process
-from ..projects import small
+from ..places import ROOT
+from ..projects import with_form
 
 
-def run(*arguments: str) -> Result:
+def run(*arguments):
     return CliRunner().invoke(main, arguments)
 
 
 @pytest.mark.parametrize(
     ("typed", "said"),
     [
-        ("bubbel", "bubbel: no such command; did you mean 'bubble'? (bubblefit --help lists every"
-         " command)"),
-        ("zzz", "zzz: no such command (bubblefit --help lists every command)"),
-        ("study mash", "mash: no such command; did you mean 'mesh'? (bubblefit study --help lists"
-         " every command)"),
-        ("dic spheer", "spheer: no such command; did you mean 'sphere'? (bubblefit dic --help lists"
-         " every command)"),
+        ("bubbel", "bubbel: no such command; did you mean 'bubble'? (bubblefit --help "),
+        ("zzz", "zzz: no such command (bubblefit --help "),
+        ("study mash", "mash: no such command; did you mean 'mesh'? (bubblefit study --help "),
+        ("dic spheer", "spheer: no such command; did you mean 'sphere'? (bubblefit dic --help "),
         ("fit a.toml --strats 3", "--strats: no such option of bubblefit fit; did you mean"
-         " '--starts'? (bubblefit fit --help tells what it takes)"),
-        ("--verbos", "--verbos: no such option of bubblefit; did you mean '--verbose'?"
-         " (bubblefit --help tells what it takes)"),
-        ("fit a.toml --starts 0", "--starts: 0 is not in the range x>=1 (bubblefit fit --help tells"
-         " what it takes)"),
+         " '--starts'? (bubblefit fit --help "),
+        ("--verbos", "--verbos: no such option of bubblefit; did you mean '--verbose'?"),
+        ("fit a.toml --starts 0", "--starts: 0 is not in the range x>=1 (bubblefit fit --help "),
         ("fit a.toml --starts", "--starts: requires an argument"),
-        ("fit", "PROJECT: is missing (bubblefit fit --help tells what it takes)"),
-        ("simulate bubble a.toml", "--card: is missing (bubblefit simulate bubble --help tells what"
-         " it takes)"),
-        ("fit a.toml b.toml", "got unexpected extra argument (b.toml) (bubblefit fit --help tells"
-         " what it takes)"),
-        ("simulate bend --diameter wide", "--diameter: 'wide' is not a valid float"
-         " (bubblefit simulate bend --help tells what it takes)"),
+        ("fit", "PROJECT: is missing (bubblefit fit --help "),
+        ("simulate bubble a.toml", "--card: is missing (bubblefit simulate bubble --help "),
+        ("fit a.toml b.toml", "got unexpected extra argument (b.toml) (bubblefit fit --help "),
+        ("simulate bend --diameter wide", "--diameter: 'wide' is not a valid float"),
+        ("fit none.toml", "none.toml: "),
     ],
 )  # fmt: skip
-def test_what_was_mistyped_is_one_line_as_any_bad_input(typed: str, said: str) -> None:
+def test_what_was_mistyped_is_one_line_as_any_bad_input(typed, said):
     done = run(*typed.split())
     assert (done.exit_code, done.stdout) == (2, "")
-    assert done.stderr == f"bubblefit: {said}\n"
-
-
-def test_a_bad_project_is_said_in_the_same_form(tmp_path: Path) -> None:
-    done = run("fit", str(tmp_path / "none.toml"))
-    assert done.exit_code == 2 and done.stderr.startswith(f"bubblefit: {tmp_path}/none.toml: ")
-    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith(f"bubblefit: {said}") and done.stderr.count("\n") == 1
 
 
 EVERY = {"": main, **{" ".join(path): command for path, command in every_command(main)}}
 ALIASES = {"simulate strips": "simulate uniaxial"}
 
 
-def test_every_command_is_walked() -> None:
-    assert {*COMMANDS, "study mesh", "simulate bend", "dic sphere"} <= EVERY.keys()
-
-
 @pytest.mark.parametrize("name", EVERY)
-def test_the_help_of_every_command_has_examples_that_can_be_typed(name: str) -> None:
+def test_the_help_of_every_command_has_examples_that_can_be_typed(name):
     """Each is of this command, and click can parse it: options, choices, numbers, arguments."""
     shown = run(*name.split(), "--help").stdout
     lines = examples_in(EVERY[name].epilog)
     assert lines and HEAD in shown
-    own = ALIASES.get(name, name)
     for line in lines:
         assert f"    {line}\n" in shown, "click has wrapped it"
-        assert line.startswith(f"bubblefit {own}".rstrip()), line
+        assert line.startswith(f"bubblefit {ALIASES.get(name, name)}".rstrip()), line
         parse(line)
 
 
-def parse(line: str) -> None:
+def parse(line):
     """Raises click's own error where the line cannot be."""
-    command: click.Command = main
+    command = main
     ctx, words = None, shlex.split(line)[1:]
     while True:
         if words[-1:] == ["--help"]:
@@ -100,51 +79,36 @@ def parse(line: str) -> None:
         command = found
 
 
-@pytest.mark.parametrize(
-    "line", ["bubblefit fit a --starts x", "bubblefit nothing", "bubblefit fit"]
-)
-def test_an_example_that_is_wrong_is_found(line: str) -> None:
-    with pytest.raises((click.ClickException, AssertionError)):
-        parse(line)
+def test_an_example_that_is_wrong_is_found():
+    for line in ("bubblefit fit a --starts x", "bubblefit nothing", "bubblefit fit"):
+        with pytest.raises((click.ClickException, AssertionError)):
+            parse(line)
 
 
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [("bubblefit bi", "biaxial"), ("bubblefit export a.toml --format gs", "gsa")],
-)
-def test_bash_completes(line: str, offered: str) -> None:
+def test_bash_completes():
     """By the very line that the documents say."""
-    bash = shutil.which("bash")
-    if bash is None:
-        needs.missing("there is no bash")
+    bash = needs.program("bash", package="bash")
     documented = 'eval "$(_BUBBLEFIT_COMPLETE=bash_source bubblefit)"'
-    assert documented in (Path(__file__).parents[2] / "docs/how-to/terminal.md").read_text()
-    words = line.split()
+    assert documented in (ROOT / "docs/how-to/terminal.md").read_text()
     script = f"""{documented}
-COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}
+COMP_WORDS=(bubblefit export a.toml --format gs); COMP_CWORD=4
+_bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
+COMP_WORDS=(bubblefit bi); COMP_CWORD=1
 _bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
 """
     own = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         [bash, "-c", script], capture_output=True, text=True, env={**os.environ, "PATH": own}
     )
-    assert done.stdout.split() == [offered], done.stderr
+    assert done.stdout.split() == ["gsa", "biaxial"], done.stderr
 
 
-@pytest.fixture
-def told(tmp_path: Path) -> Iterator[Path]:
-    """A project, and the loggers as they were afterwards."""
-    from bubblefit.cli.terminal import LOGGER, Stderr
-
-    before = LOGGER.level, list(LOGGER.handlers)
-    yield small(tmp_path)
-    LOGGER.setLevel(before[0])
-    LOGGER.handlers[:] = [h for h in before[1] if not isinstance(h, Stderr)]
-
-
-def test_verbose_tells_every_analysis_start_and_time(told: Path, tmp_path: Path) -> None:
+def test_verbose_tells_every_analysis_start_and_time(tmp_path, monkeypatch):
     """After the command's name as before it; on stderr, so that stdout stays for results."""
-    arguments = ("fit", told, "--out", "out", "--starts", 1, "--jobs", 1, "--verbose")
+    monkeypatch.setattr(LOGGER, "level", LOGGER.level)
+    monkeypatch.setattr(LOGGER, "handlers", list(LOGGER.handlers))
+    project = with_form(tmp_path, 'form = "constant"')
+    arguments = ("fit", project, "--out", "out", "--starts", 1, "--jobs", 1, "--verbose")
     done = in_process(*arguments, cwd=tmp_path)
     rows = (tmp_path / "out/history.csv").read_text().splitlines()[1:]
     for number, row in enumerate(rows, 1):
@@ -152,14 +116,9 @@ def test_verbose_tells_every_analysis_start_and_time(told: Path, tmp_path: Path)
         said = f"objective {float(value):.6g}, ok" if value else "failed, no equilibrium at "
         assert f" start 0, analysis {number} by membrane: {said}" in done.stderr
     assert " start 0 ended: " in done.stderr and f"; {len(rows)} analyses in " in done.stderr
-    for part in (
-        "tests and their data made ready",
-        "all starts",
-        "card, tables and figures in out",
-    ):
-        assert f" {part}: " in done.stderr
+    for part in ("tests and their data", "all starts", "card, tables and figures in out"):
+        assert f" {part}" in done.stderr
     assert "start 0, analysis" not in done.stdout
     # All notes, where there would be one and a count.
-    assert done.stdout.count("note: ") == 2 and "further note" not in done.stdout
-    quiet = in_process("doctor", cwd=tmp_path)
-    assert " analysis " not in quiet.stderr
+    assert done.stdout.count("note: ") >= 2 and "further note" not in done.stdout
+    assert " analysis " not in in_process("doctor", cwd=tmp_path).stderr

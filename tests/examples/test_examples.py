@@ -1,0 +1,182 @@
+"""Examples as they are written: pipelines in a clean folder, files for queues, the notebook.
+
+Left out: `pip install` (it would fetch bubblefit), and what needs a container engine or makes users
+(FROM, RUN, VOLUME, USER, WORKDIR).
+"""
+
+import json
+import os
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+import yaml
+from bubblefit.cli.fits import fit_command
+from nbclient import NotebookClient
+
+from .. import needs
+from ..places import EXAMPLES
+from ..programs import program
+
+BATCH = EXAMPLES / "batch"
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory):
+    """No terminal's, no home; `bubblefit` on the PATH is this one."""
+    folder = tmp_path_factory.mktemp("bin")
+    code = "from bubblefit.cli.main import main; main(prog_name='bubblefit')"
+    program(folder / "bubblefit", f'#!/bin/sh\nexec "{sys.executable}" -c "{code}" "$@"\n')
+    kept = {k: v for k, v in os.environ.items() if k in ("PYTHONPATH", "TMPDIR")}
+    cache = os.environ.get("BUBBLEFIT_CACHE") or str(Path.home() / ".cache" / "bubblefit")
+    path = f"{folder}:{Path(sys.executable).parent}:/usr/bin:/bin"
+    home = {"HOME": "/proc/none", "LC_ALL": "C", "BUBBLEFIT_CACHE": cache}
+    return {**kept, **home, "PATH": path}
+
+
+def options_of(words):
+    """What `bubblefit fit` makes of the words; click refuses what it does not know."""
+    assert words[0] == "fit"
+    return fit_command.make_context("fit", words[1:]).params
+
+
+CLUSTER = EXAMPLES / "cluster"
+
+
+def test_jobs_of_a_queue_are_workers_that_hold_a_licence():
+    jobqueue = needs.library("dask_jobqueue")
+    example = runpy.run_path(str(CLUSTER / "queue_fit.py"))
+    more = {
+        "job_extra_directives": example["MORE"],
+        "scheduler_options": {"dashboard_address": ":0"},
+    }
+    for name, mark in {"SLURMCluster": "#SBATCH", "PBSCluster": "#PBS"}.items():
+        with getattr(jobqueue, name)(**example["JOB"], **more) as cluster:
+            script = cluster.job_script()
+            assert cluster.scheduler_address in script
+        assert f"{mark} -L marc:1\n" in script and "--nthreads 1 " in script
+        assert "12:00:00" in script
+
+
+@pytest.mark.parametrize("going_on", [False, True])
+def test_an_array_of_jobs_is_a_seed_each(tmp_path, going_on):
+    program(tmp_path / "bubblefit", '#!/bin/sh\nprintf "%s\\n" "$@"\n')
+    out = tmp_path / "an out"
+    if going_on:
+        (out / "seed-7").mkdir(parents=True)
+        (out / "seed-7" / "run.json").touch()
+    environment = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_ARRAY_TASK_ID": "7"}
+    script = [CLUSTER / "slurm.sh", "my project.toml", out]
+    said = subprocess.run(script, env=environment, check=True, capture_output=True, text=True)
+    options = options_of(said.stdout.splitlines())
+    assert options["project"] == Path("my project.toml")
+    assert (options["seed"], options["starts"], options["jobs"]) == (7, 5, 1)
+    assert (options["out"], options["resume"]) == (out / "seed-7", going_on)
+    assert "#SBATCH --licenses=marc:1\n" in (CLUSTER / "slurm.sh").read_text()
+
+
+def test_a_workflow_runs_what_the_command_takes():
+    text = (CLUSTER / "Snakefile").read_text()
+    shell = text[text.index("    shell:") :]
+    words = "".join(re.findall(r'"(.*)"', shell))
+    filled = words.replace("{input:q}", "project.toml").replace("{wildcards.seed}", "3")
+    options = options_of(shlex.split(filled)[1:])
+    assert (options["seed"], options["jobs"], options["out"]) == (3, 1, Path("out/seed-3"))
+    assert options["overwrite"] and "marc=1" in text
+
+
+NOTEBOOK = EXAMPLES / "notebook" / "first-fit.ipynb"
+
+
+@pytest.mark.slow
+def test_the_notebook_runs():
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    before = {path.name for path in NOTEBOOK.parent.iterdir()}
+    where = {"metadata": {"path": str(NOTEBOOK.parent)}}
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where).execute()
+    said = "".join(
+        str(output.get("text") or output.get("data", {}).get("text/plain"))
+        for cell in notebook.cells
+        for output in cell.get("outputs", ())
+    )
+    assert "start 1: converged" in said and "'300 kPa': 39.8" in said
+    assert {path.name for path in NOTEBOOK.parent.iterdir()} == before
+    for name in ("read_project", "fit", "read_card", "simulate"):
+        assert f"bf.{name}(" in NOTEBOOK.read_text()
+
+
+def steps_of_github():
+    job = yaml.safe_load((BATCH / "github.yml").read_text())["jobs"]["fit"]
+    return job, [step["run"] for step in job["steps"] if "run" in step]
+
+
+def test_github_runs_its_steps(tmp_path, environment):
+    """Each step by a shell as CI does, and it has to end well; the cache is that of the tests."""
+    job, (install, *steps) = steps_of_github()
+    assert install == "python -m pip install bubblefit" and len(steps) == 3
+    assert job["env"].keys() == {"BUBBLEFIT_CACHE"}
+    shutil.copy(BATCH / "project.toml", tmp_path)
+    for step in steps:
+        done = subprocess.run(
+            ["/bin/sh", "-e", "-c", step], cwd=tmp_path, env=environment,
+            stdin=subprocess.DEVNULL, capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, (step, done.stderr)
+    assert json.loads((tmp_path / "check.json").read_text())
+    assert json.loads((tmp_path / "result.json").read_text())["objective"] < 1e-3
+    events = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
+    assert events[0]["event"] == "begin" and events[-1]["exit_code"] == 0
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert "E1" in (tmp_path / "moduli.csv").read_text()
+    (upload,) = [step for step in job["steps"] if "upload" in step.get("uses", "")]
+    for name in upload["with"]["path"].split():
+        assert (tmp_path / name).exists()
+
+
+def test_gitlab_says_the_same():
+    job = yaml.safe_load((BATCH / "gitlab-ci.yml").read_text())["fit"]
+    ours = [*job["before_script"], *job["script"]]
+    plain = [[" ".join(s.replace("\\\n", " ").split()) for s in one]
+             for one in (ours, steps_of_github()[1])]  # fmt: skip
+    assert plain[0] == plain[1]
+    assert job["variables"].keys() == {"BUBBLEFIT_CACHE"}
+    assert job["artifacts"]["paths"] == ["out", "result.json", "events.jsonl", "moduli.csv"]
+
+
+def test_the_image_starts_the_command(environment):
+    text = (BATCH / "Containerfile").read_text()
+    words = dict(re.findall(r"^(ENTRYPOINT|CMD|USER|ENV|FROM) (.*)$", text, flags=re.M))
+    assert words["USER"] == "fabric" and words["FROM"].endswith("-slim")
+    given = dict(part.split("=") for part in words["ENV"].split())
+    assert given.pop("BUBBLEFIT_CACHE") == "/cache"
+    entry, usual = json.loads(words["ENTRYPOINT"]), json.loads(words["CMD"])
+    done = subprocess.run([*entry, *usual], env={**environment, **given}, capture_output=True)
+    assert done.returncode == 0 and b"Usage: bubblefit" in done.stdout
+    # The command that its head says, less the engine's own part.
+    head = " ".join(line[1:] for line in text.splitlines() if line.startswith("#"))
+    assert options_of(re.search(r"bubblefit \\ +(fit .*?1e-3)", head)[1].split())["out"]
+
+
+def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
+    folder, out = tmp_path / "nur lesen ü", tmp_path / "aus ß"
+    folder.mkdir()
+    shutil.copy(BATCH / "project.toml", folder / "Prüfung 1.toml")
+    for path in (*folder.iterdir(), folder):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    # Root heeds what may be written only without this capability.
+    drop = ["setpriv", "--bounding-set=-dac_override"] if os.geteuid() == 0 else []
+    arguments = ["fit", folder / "Prüfung 1.toml", "--starts", "1", "--jobs", "1", "--out", out]
+    done = subprocess.run(
+        [*drop, sys.executable, "-m", "bubblefit", *arguments, "--json"], cwd=tmp_path,
+        env=environment, stdin=subprocess.DEVNULL, capture_output=True,
+    )  # fmt: skip
+    folder.chmod(0o755)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["objective"] < 1e-3 and not done.stderr
+    assert (out / "material.toml").is_file() and len(list(folder.iterdir())) == 1
