@@ -15,36 +15,31 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..errors import lines as note_lines
+from ..experiments.biaxial.data import plain_ratio
+from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
+from ..experiments.biaxial.report import write_tables
+from ..experiments.biaxial.test import BiaxialTest
+from ..experiments.kinds import Output
 from ..experiments.strips.gauge import (
     GaugeTable,
     PairedLoads,
     loads_at_frames,
     virtual_strain_gauge,
 )
-from ..files import replacing
+from ..files import __version__, replacing, write_notes
+from ..materials.designers import Options
 from ..project.project import read_project
 from ..readers.fields import Sphere, fit_sphere, points_of
-from ..readers.frames import QUANTITIES, FrameOptions, frame_files, read_frames
+from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.vega import save
 from ..runs.fit import check
-from .options import (
-    DATA,
-    PROJECT,
-    TESTS,
-    TRUST,
-    check_out,
-    columns_named,
-    data_folders,
-    folder_beside,
-    frame_options,
-    out_option,
-)
+from ..runs.folder import Store
+from . import options as given
+from .options import check_out, columns_named, frame_options
 from .terminal import FILE, command, group, show, written_to
-
-DOUBTFUL = 2  # exit code, as for any bad input
 
 
 @command(
@@ -52,20 +47,13 @@ DOUBTFUL = 2  # exit code, as for any bad input
     "bubblefit check project.toml",
     "bubblefit check project.toml --test bubble --trust preload",
 )
-@PROJECT
-@TESTS
-@out_option("out/NAME-check")
-@DATA
-@TRUST
+@given.PROJECT
+@given.TESTS
+@given.out_option("out/NAME-check")
+@given.DATA
+@given.TRUST
 @click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
-def check_command(
-    project: Path,
-    tests: tuple[str, ...],
-    out: Path | None,
-    data: tuple[str, ...],
-    trust: tuple[str, ...],
-    as_json: bool,
-) -> None:
+def check_command(**options: Any) -> None:
     """Check the data of PROJECT.toml, as every fit does before it begins.
 
     Finds common faults of measured data: wrong units, flipped or swapped axes, coordinates of
@@ -73,21 +61,23 @@ def check_command(
     turned, tilted or off the centre, preload, rows after failure. Writes pictures and tables into
     the output folder. Exit code 2 where a fit would not begin.
     """
-    found = check(read_project(project, data_folders(data)), tests or None, trust)
-    folder = out or folder_beside(project, "check")
+    read = read_project(options["project"], given.data_folders(options["data"]))
+    found = check(read, options["tests"] or None, options["trust"])
+    folder = given.folder_of(options, "check")
     found.report(folder)
-    show(found.result, [*found.lines(), written_to(folder)], as_json)
+    show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
     if not found.sound:
-        sys.exit(DOUBTFUL)
+        sys.exit(InputError.exit_code)
 
-
-# A virtual strain gauge
 
 #: Options about the loads, by the name of the argument.
 OF_LOADS = tuple(
     "direction specimen load_column load_unit load_format decimal frame_times frame_time_column"
     " frame_interval time_column time_offset".split()
 )
+POSITIVE = click.FloatRange(min=0, min_open=True)
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
+AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
 #: Arguments that are options of the same name.
 ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit"])
 
@@ -107,12 +97,9 @@ ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", 
 )
 @click.option("--out", type=FILE, required=True, help="The table to write (CSV).")
 @frame_options
-@click.option(
-    "--max-gap",
-    type=click.FloatRange(min=0, min_open=True),
-    default=1.35,
-    help="Longest edge between points, of the usual one [1.35]; 2.5 for scattered points.",
-)
+@click.option("--max-gap", type=POSITIVE, default=1.35,
+              help="Longest edge between points, of the usual one [1.35]; 2.5 for scattered"
+              " points.")  # fmt: skip
 @click.option("--loads", type=FILE, help="The test machine's export.")
 @click.option("--direction", metavar="NAME", help="Of the loads: warp, fill or bias.")
 @click.option("--specimen", metavar="NAME", help="Of the loads [name of --out].")
@@ -122,18 +109,14 @@ ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", 
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the loads and times.")
 @click.option("--frame-times", type=FILE, help="Table of the frames' times: pairs loads by time.")
 @click.option("--frame-time-column", metavar="NAME", help="Where it is not found by itself.")
-@click.option(
-    "--frame-interval",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="SECONDS",
-    help="Between frames, the first at 0: pairs loads by time.",
-)
+@click.option("--frame-interval", type=POSITIVE, metavar="SECONDS",
+              help="Between frames, the first at 0: pairs loads by time.")  # fmt: skip
 @click.option(
     "--time-offset", type=float, metavar="SECONDS", help="Machine's clock less the frames' [0]."
 )
 @click.option("--time-column", metavar="NAME", help="Of the loads, where not found by itself.")
-@click.option("--overwrite", is_flag=True, help="Replace the file of --out.")
-@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON on stdout.")
+@OVERWRITE
+@AS_JSON
 def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
     """Follow a virtual strain gauge through DIC FRAMES (CSV, in order; or a quoted pattern).
 
@@ -145,11 +128,7 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         loads = _loads(options, out.stem)
         files, note = frame_files(frames, "FRAMES")
         check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
-        asked = FrameOptions(
-            QUANTITIES, columns_named(options["columns"]), options["flag_column"],
-            length_scale=LENGTH_UNITS[options["length_unit"]], planar=True,
-        )  # fmt: skip
-        read = read_frames(files, asked, options["format"])
+        read = _frames(files, options, QUANTITIES, planar=True)
         lower, upper = options["lower"], options["upper"]
         record = virtual_strain_gauge(read, lower, upper, options["max_gap"])
         names = [frame.path.name if frame.path else "" for frame in read]
@@ -164,10 +143,18 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
             table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
-    more = [note for note in table.notes if note not in said]
-    show(
-        result, [*_gauge_lines(result), *note_lines(more), f"written to {out}"], options["as_json"]
-    )
+    more = note_lines([note for note in table.notes if note not in said])
+    show(result, [*_gauge_lines(result), *more, f"written to {out}"], options["as_json"])
+
+
+def _frames(
+    files: Sequence[Path], options: Mapping[str, Any], quantities: tuple[str, ...], planar: bool
+) -> Sequence[Frame]:
+    """Read frames as `frame_options` says."""
+    scale = LENGTH_UNITS[options["length_unit"]]
+    columns, flags = columns_named(options["columns"]), options["flag_column"]
+    asked = FrameOptions(quantities, columns, flags, length_scale=scale, planar=planar)
+    return read_frames(files, asked, options["format"])
 
 
 def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
@@ -210,7 +197,8 @@ def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
         f" log strain {end['log_strain']:.4g}",
     ]
     if result["lost"]:
-        lines.append(f"correlation lost: {_few(result['lost'])}")
+        more = f" and {len(result['lost']) - 8} more" if len(result["lost"]) > 8 else ""
+        lines.append(f"correlation lost: {', '.join(result['lost'][:8])}{more}")
     if "points" in result:
         lines.append(f"{result['points']} points, loads up to {result['largest_load_N']:.5g} N")
         lines.append(
@@ -219,13 +207,6 @@ def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
         )
     return lines
 
-
-def _few(names: Sequence[str], most: int = 8) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
-
-
-# Spheres: the error of the camera itself
 
 #: Quantities that a frame must hold; its displacements, where it has any, are added.
 PLACES = ("x", "y", "z")
@@ -242,15 +223,11 @@ def dic_command() -> None:
     "bubblefit dic sphere ball1.csv ball2.csv --out sphere.csv",
 )
 @click.argument("frames", nargs=-1, required=True)
-@click.option(
-    "--radius",
-    type=click.FloatRange(min=0, min_open=True),
-    help="Of the ball, mm; the deviation from it is printed.",
-)
+@click.option("--radius", type=POSITIVE, help="Of the ball, mm; the deviation from it is printed.")
 @frame_options
 @click.option("--out", type=FILE, help="Table to write (CSV), and beside it a picture.")
-@click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
-@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON on stdout.")
+@OVERWRITE
+@AS_JSON
 def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **options: Any) -> None:
     """Fit a sphere to the points of each of the FRAMES (any format of DIC, or a quoted pattern).
 
@@ -264,16 +241,8 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
             raise OutputError(f"{out}: the table is a CSV; the picture is written beside it")
         for target in (out, out.with_suffix(".png")):
             check_out(target, files, options["overwrite"])
-    try:
-        asked = FrameOptions(
-            PLACES, columns_named(options["columns"]), options["flag_column"],
-            length_scale=LENGTH_UNITS[options["length_unit"]],
-        )  # fmt: skip
-        read = read_frames(files, asked, options["format"])
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise InputError(None, f"--{error.field.replace('_', '-')}", error.problem) from None
+    with _naming_options():
+        read = _frames(files, options, PLACES, planar=False)
     names = [frame.path.name if frame.path else "" for frame in read]
     if len(read) > len(files):
         names = [f"{name}, frame {k + 1}" for k, name in enumerate(names)]
@@ -290,22 +259,24 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     for said in [*words, *([] if note is None else [str(note)])]:
         click.echo(f"note: {said}", err=True)
     if out is not None:
-        _write(out, rows, names, found)
+        with replacing(out) as path:
+            write_table(path, list(rows[0]), [list(row.values()) for row in rows])
+        drawn = [
+            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
+            for name, one in zip(names, found, strict=True)
+        ]
+        save(out.with_suffix(".png"), sphere_charts(drawn))
         result["out"] = [str(out), str(out.with_suffix(".png"))]
     show(result, _sphere_lines(result), as_json)
 
 
 def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "frame": name,
-        "points": int(one.kept.sum()),
-        "left_out": one.left_out,
-        "radius_mm": one.radius,
-        "radius_error_mm": one.radius_error,
-        **{f"{axis}_mm": float(v) for axis, v in zip("xyz", one.centre, strict=True)},
-        **{f"{axis}_error_mm": float(v) for axis, v in zip("xyz", one.centre_error, strict=True)},
-        "rms_mm": one.rms,
-    }
+    pairs = list(zip("xyz", one.centre.tolist(), one.centre_error.tolist(), strict=True))
+    row: dict[str, Any] = {"frame": name, "points": int(one.kept.sum()), "left_out": one.left_out}
+    row |= {"radius_mm": one.radius, "radius_error_mm": one.radius_error}
+    row |= {f"{axis}_mm": value for axis, value, _ in pairs}
+    row |= {f"{axis}_error_mm": error for axis, _, error in pairs}
+    row["rms_mm"] = one.rms
     if radius is not None:
         row["deviation_percent"] = 100 * (one.radius / radius - 1)
     return row
@@ -333,16 +304,53 @@ def _sphere_lines(result: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _write(
-    out: Path, rows: Sequence[dict[str, Any]], names: Sequence[str], found: Sequence[Sphere]
-) -> None:
-    with replacing(out) as path:
-        write_table(path, list(rows[0]), [list(row.values()) for row in rows])
-    drawn = [
-        (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
-        for name, one in zip(names, found, strict=True)
-    ]
-    save(out.with_suffix(".png"), sphere_charts(drawn))
-
-
 dic_command.add_command(dic_sphere)
+
+
+#: --paths of five ratios: whether the strains of unloaded yarns are used.
+UNLOADED = {"8": False, "10": True}
+
+
+@command(
+    "biaxial",
+    "bubblefit biaxial project.toml",
+    "bubblefit biaxial project.toml --paths 10 --free",
+    "bubblefit biaxial project.toml --ratio 1:1 --ratio 2:1 --out out/two-ratios",
+)
+@given.PROJECT
+@given.TESTS
+@click.option("--paths", type=click.Choice(list(UNLOADED)), default="8", show_default=True,
+              help="Of five ratios: 10 with the strains of unloaded yarns, 8 without.")  # fmt: skip
+@click.option("--reciprocal/--free", default=True, show_default=True,
+              help="Require nu_warp / E_fill = nu_fill / E_warp, or not.")  # fmt: skip
+@click.option("--minimise", type=click.Choice(["strain", "load"]), default="strain",
+              show_default=True, help="The squares that are minimised.")  # fmt: skip
+@click.option("--ratio", "ratios", multiple=True, metavar="W:F", help="Ratios; several.  [all]")
+@given.out_option("out/NAME-biaxial")
+@given.DATA
+@given.OVERWRITE
+@given.AS_JSON
+def biaxial_command(**options: Any) -> None:
+    """Evaluate linear constants per width (E, nu) of the biaxial tests of PROJECT.toml.
+
+    Replaces each yarn's strain by a line over the larger load, then takes least squares. The
+    results of all other choices of options are written beside. `bubblefit fit` fits a law of any
+    form to the same tests, and `bubblefit export` turns it into such constants.
+    """
+    read = read_project(options["project"], given.data_folders(options["data"]))
+    chosen = read.chosen(list(options["tests"]) or "biaxial", fitted=True)
+    ratios = tuple(map(plain_ratio, options["ratios"]))
+    unloaded = UNLOADED[options["paths"]]
+    asked = Options(unloaded, options["reciprocal"], options["minimise"], ratios)
+    evaluations = [evaluate_test(test, asked) for test in chosen if isinstance(test, BiaxialTest)]
+    folder = given.result_folder(options, "biaxial")
+    folder.mkdir(parents=True, exist_ok=True)
+    for one in evaluations:
+        write_tables(one, folder, Output.of(folder, one.test, len(evaluations) > 1).prefix)
+    notes = [note for one in evaluations for note in one.notes]
+    write_notes(folder, notes)
+    tests = {one.test: numbers_of(one) for one in evaluations}
+    result = {"command": "biaxial", "title": read.title, "version": __version__, "tests": tests}
+    Store(folder).finish(result)
+    said = [line for one in evaluations for line in lines_of(one)]
+    show(result, [*said, *note_lines(notes), written_to(folder)], options["as_json"])

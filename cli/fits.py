@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,8 @@ from ..errors import NOTES, InputError, Note, foremost
 from ..errors import lines as note_lines
 from ..inference.methods import method_names
 from . import options as given
-from .options import command_line, data_folders, read_with_solver
 from .progress import StudyProgress
-from .terminal import FILE, WORSE, Decorator, command, resumable, show, verbose, written_to
+from .terminal import FILE, WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
     from ..project.project import Project
@@ -26,32 +25,30 @@ if TYPE_CHECKING:
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
 
 
-def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add PROJECT and the options of every fit; the command receives them by name."""
-    decorators: list[Decorator] = [
-        given.PROJECT,
-        given.TESTS,
-        given.out_option(),
-        given.DATA,
-        click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
-        click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
-        click.option(
-            "--starts-from", type=click.Choice(["random", "sobol", "proposed"]),
-            help="Where starts begin: drawn, spread evenly, or by an earlier fit.",
-        ),
-        click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
-        given.JOBS,
-        given.SCHEDULER,
-        click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
-        given.solver_choice,
-        given.fail_above_option("Exit 1 when more than E is left of the objective."),
-        given.TRUST,
-        given.resume_option("Continue an interrupted fit."),
-        given.OVERWRITE,
-        given.AS_JSON,
-        given.QUIET,
-    ]  # fmt: skip
-    return given.with_checks(function, decorators)
+#: PROJECT and the options of every fit; the command receives them by name.
+fit_options = given.with_checks(
+    given.PROJECT,
+    given.TESTS,
+    given.out_option(),
+    given.DATA,
+    click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
+    click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
+    click.option(
+        "--starts-from", type=click.Choice(["random", "sobol", "proposed"]),
+        help="Where starts begin: drawn, spread evenly, or by an earlier fit.",
+    ),
+    click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
+    given.JOBS,
+    given.SCHEDULER,
+    click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
+    given.solver_choice,
+    given.fail_above_option("Exit 1 when more than E is left of the objective."),
+    given.TRUST,
+    given.resume_option("Continue an interrupted fit."),
+    given.OVERWRITE,
+    given.AS_JSON,
+    given.QUIET,
+)  # fmt: skip
 
 
 @command(
@@ -101,8 +98,7 @@ def uniaxial_command(**options: Any) -> None:
 
 def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
     """Return the project with starts, optimiser and workers as the command line has them."""
-    names = ("seed", "method", "jobs", "starts_from")
-    chosen = {name: options[name] for name in names}
+    chosen = {name: options[name] for name in ("seed", "method", "jobs", "starts_from")}
     earlier: Path | None = options["earlier"]
     chosen["earlier"] = None if earlier is None else str(earlier.absolute())
     return project.with_fit(**chosen).with_scheduler(options["scheduler"])
@@ -115,31 +111,22 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
     from ..runs.starts import timed
 
     path: Path = options["project"]
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    project = settings_given(project, options)
+    project = settings_given(given.read_with_solver(options), options)
     folder: Path = options["out"] or usual_folder(path)
-    quiet = options["quiet"] or options["as_json"]
     starts = options["starts"] or project.fit.starts
-    with resumable(folder), StudyProgress(starts, quiet) as progress:
+    for name in options["tests"]:
+        if kind is not None and name in project.tests and project.tests[name].kind != kind:
+            problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
+            raise InputError(path, "--test", problem)
+    with resumable(folder), StudyProgress(starts, given.quiet(options)) as progress:
         result = fit(
-            project, _tests(options["tests"], kind, project.tests, path), starts=options["starts"],
-            trust=options["trust"], out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+            project, options["tests"] or kind, starts=options["starts"], trust=options["trust"],
+            out=folder, resume=options["resume"], overwrite=options["overwrite"],
+            progress=progress.saw, command_line=given.command_line(),
         )  # fmt: skip
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
     _end(result, folder, options["fail_above"], options["as_json"])
-
-
-def _tests(
-    names: Sequence[str], kind: str | None, tests: Any, path: Path
-) -> Sequence[str] | str | None:
-    """Return the tests that a command fits: those named, else those of its kind, else all."""
-    for name in names:
-        if kind is not None and name in tests and tests[name].kind != kind:
-            problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
-            raise InputError(path, "--test", problem)
-    return names or kind
 
 
 def _end(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
@@ -156,7 +143,11 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     return [
         *modulus_lines(fit),
         *misfit_lines(fit),
-        *test_lines(fit),
+        *(
+            f"{name}: {line}" if len(fit.findings) > 1 else line
+            for name, findings in fit.findings.items()
+            for line in findings.lines
+        ),
         *sure_lines(fit),
         *start_lines(fit),
         *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
@@ -200,16 +191,6 @@ def misfit_lines(fit: Fit) -> list[str]:
         beside = times if m.noise > 0 else "no noise to compare with"
         lines.append(f"misfit of {name}: {m.rms:.3g} {m.unit} RMS, {beside}")
     return lines
-
-
-def test_lines(fit: Fit) -> list[str]:
-    """Return the findings of each test."""
-    several = len(fit.findings) > 1
-    return [
-        f"{name}: {line}" if several else line
-        for name, findings in fit.findings.items()
-        for line in findings.lines
-    ]
 
 
 def sure_lines(fit: Fit) -> list[str]:

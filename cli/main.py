@@ -23,7 +23,7 @@ COMMANDS = {
     "fit": ("fits", "Fit a material to all tests of a fabric together."),
     "bubble": ("fits", "Fit a material to bubble inflation tests only."),
     "uniaxial": ("fits", "Fit a material to warp, fill and bias strip tests only."),
-    "biaxial": ("cards", "Evaluate designers' linear constants from biaxial tests."),
+    "biaxial": ("data", "Evaluate designers' linear constants from biaxial tests."),
     "check": ("data", "Check the data before a fit."),
     "bend": ("predict", "Inflate and bend cylinders with material cards."),
     "validate": ("studies", "Cross-validate a fit: predict each test from the others."),
@@ -39,7 +39,7 @@ COMMANDS = {
     "gauge": ("data", "Follow a virtual strain gauge through the DIC frames of a strip test."),
     "dic": ("data", "Test the camera: fit a sphere to the points of its frames."),
     "study": ("studies", "Vary the mesh, the increments or nu12 in an analysis."),
-    "export": ("cards", "Write a material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
+    "export": ("tools", "Write a material card for Marc, CalculiX, Abaqus, LS-DYNA or a table."),
     "init": ("start", "Write a commented project: an example, or one for your own tests."),
     "docs": ("start", "Read the documents of this version."),
     "schema": ("start", "Print the JSON Schema of the project file, for editors."),
@@ -53,11 +53,7 @@ class LazyGroup(Suggesting):
     """Import a command only when it is called, and print usage errors in one line."""
 
     def make_context(
-        self,
-        info_name: str | None,
-        args: list[str],
-        parent: click.Context | None = None,
-        **extra: Any,
+        self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
         given = ["bubblefit", *args]  # parsing eats them
         with in_one_line():

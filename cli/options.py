@@ -66,26 +66,27 @@ def out_option(usual: str = "out/NAME") -> Decorator:
     return click.option("--out", type=FILE, help=f"Output folder [{usual}].")
 
 
-def with_options(command: Command, decorators: Sequence[Decorator]) -> Command:
-    """Return a command with options; its help lists them in this order."""
-    for decorate in reversed(decorators):
-        command = decorate(command)
-    return command
+def with_options(*decorators: Decorator) -> Decorator:
+    """Return a decorator that adds options; the help lists them in this order."""
+    return lambda command: functools.reduce(lambda one, add: add(one), decorators[::-1], command)
 
 
-def with_checks(command: Command, decorators: Sequence[Decorator]) -> Command:
-    """Return a command with options, where --resume, --overwrite and --fail-above are checked."""
+def with_checks(*decorators: Decorator) -> Decorator:
+    """Return `with_options` where --resume, --overwrite and --fail-above are checked."""
 
-    @functools.wraps(command)
-    def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
-        above = kwargs.get("fail_above")
-        if resume and overwrite:
-            raise InputError(None, "--resume, --overwrite", "give one of them, not both")
-        if above is not None and not above >= 0:
-            raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
-        return command(*args, resume=resume, overwrite=overwrite, **kwargs)
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def checked(*args: Any, resume: bool, overwrite: bool, **kwargs: Any) -> Any:
+            above = kwargs.get("fail_above")
+            if resume and overwrite:
+                raise InputError(None, "--resume, --overwrite", "give one of them, not both")
+            if above is not None and not above >= 0:
+                raise InputError(None, "--fail-above", f"expected 0 or more, got {above:g}")
+            return command(*args, resume=resume, overwrite=overwrite, **kwargs)
 
-    return with_options(checked, decorators)
+        return with_options(*decorators)(checked)
+
+    return decorate
 
 
 def solver_choice(command: Command) -> Command:
@@ -100,7 +101,7 @@ def solver_choice(command: Command) -> Command:
         given |= {one.name: kwargs.pop(one.name) for one in known}
         return command(*args, solver_given=given, **kwargs)
 
-    decorators: list[Decorator] = [
+    add = with_options(
         click.option("--solver", metavar="NAME", help="Solver that runs the model."),
         *(
             click.option(
@@ -116,8 +117,8 @@ def solver_choice(command: Command) -> Command:
             "--no-cache", "cache", flag_value=False, default=True,
             help="Run the solver even where the run is in the cache (see `bubblefit cache`).",
         ),
-    ]  # fmt: skip
-    return with_options(wrapped, decorators)
+    )  # fmt: skip
+    return add(wrapped)
 
 
 def command_line() -> list[str]:
@@ -128,9 +129,7 @@ def command_line() -> list[str]:
 def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
     """Return the folder of measured data for all tests, or a folder by test ("NAME=DIR").
 
-    Raises
-    ------
-    InputError : some of both, or a test named twice.
+    Raises InputError for some of both, or a test named twice.
     """
     named = [name.partition("=") for name in given if "=" in name and not os.path.exists(name)]
     if named and len(named) < len(given):
@@ -143,43 +142,42 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
     return folders or (Path(given[0]) if given else None)
 
 
-def folder_beside(project: Path, suffix: str) -> Path:
-    """Return the usual output folder of a command that does not fit: out/NAME-`suffix`."""
+def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
+    """Return the output folder of a command that does not fit: --out, or out/NAME-`suffix`."""
     from ..project.schema import usual_folder
 
-    own = usual_folder(project)
-    return own.with_name(f"{own.name}-{suffix}")
+    own = usual_folder(options["project"])
+    return options["out"] or own.with_name(f"{own.name}-{suffix}")
 
 
-def result_folder(
-    project: Path, suffix: str, out: Path | None, overwrite: bool, resume: bool = False
-) -> Path:
-    """Return the output folder of one analysis or study: `out`, or out/NAME-`suffix`."""
-    folder = out or folder_beside(project, suffix)
-    if (folder / "result.json").exists() and not (overwrite or resume):
+def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
+    """Return `folder_of`, where no result may be without --overwrite or --resume."""
+    folder = folder_of(options, suffix)
+    if (folder / "result.json").exists() and not (options["overwrite"] or options.get("resume")):
         raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
     return folder
 
 
-def read_with_solver(
-    path: Path,
-    given: Mapping[str, Any],
-    data: Path | Mapping[str, Path] | None = None,
-    need_data: bool = True,
-) -> Project:
-    """Read a project; the solver and its options of the command line replace those of the file."""
-    from ..project.project import read_project
-
-    return with_solver(read_project(path, data, need_data), given)
-
-
-def read_to_refit(path: Path, options: Mapping[str, Any]) -> Project:
-    """Read a project for a study that fits again, with solver, jobs and scheduler as given.
+def read_with_solver(options: Mapping[str, Any], need_data: bool = True) -> Project:
+    """Read the project of a command; its solver options replace those of the file.
 
     options : of the command, by name.
     """
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    return project.with_fit(jobs=options["jobs"]).with_scheduler(options["scheduler"])
+    from ..project.project import read_project
+
+    project = read_project(options["project"], data_folders(options["data"]), need_data)
+    return with_solver(project, options["solver_given"])
+
+
+def read_to_refit(options: Mapping[str, Any]) -> Project:
+    """Read a project for a study that fits again, with solver, jobs and scheduler as given."""
+    project = read_with_solver(options).with_fit(jobs=options["jobs"])
+    return project.with_scheduler(options["scheduler"])
+
+
+def quiet(options: Mapping[str, Any]) -> bool:
+    """Return True where no progress is shown."""
+    return bool(options["quiet"] or options["as_json"])
 
 
 def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
@@ -215,19 +213,14 @@ def numbers(text: str, option: str) -> list[float]:
         raise InputError(None, option, problem) from None
 
 
-# Files of DIC frames
-
-
-def frame_options(command: Command) -> Command:
-    """Add the options for reading frames: --format, --columns, --flag-column, --length-unit."""
-    units = click.Choice(list(LENGTH_UNITS))
-    decorators: list[Decorator] = [
-        click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
-        click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
-        click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
-        click.option("--length-unit", type=units, default="mm", help="Of the files [mm]."),
-    ]
-    return with_options(command, decorators)
+#: Options for reading frames.
+frame_options = with_options(
+    click.option("--format", metavar="NAME", help="Of the frames; found by their content."),
+    click.option("--columns", metavar="x=..,..", help="Names in the files, where not found."),
+    click.option("--flag-column", metavar="NAME", help="Rows where it is not 0 are lost."),
+    click.option("--length-unit", type=click.Choice(list(LENGTH_UNITS)), default="mm",
+                 help="Of the files [mm]."),
+)  # fmt: skip
 
 
 def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None:
@@ -241,25 +234,19 @@ def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None
 def columns_named(given: str | None) -> dict[str, str] | None:
     """Return the columns of some of x, y, z, dx, dy, dz, given as in "x=X,dz=W".
 
-    Raises
-    ------
-    InputError : another form, an unknown quantity, one column for two quantities.
+    Raises InputError for another form, an unknown quantity, one column for two quantities.
     """
-    if given is None:
-        return None
     names: dict[str, str] = {}
-    for part in given.split(","):
+    for part in [] if given is None else given.split(","):
         quantity, equals, name = (piece.strip() for piece in part.partition("="))
+        problem = ""
         if not (equals and name):
             problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
-            raise InputError(None, "columns", problem)
-        if quantity not in QUANTITIES:
+        elif quantity not in QUANTITIES:
             problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
+        elif name in (other := {n: q for q, n in names.items() if q != quantity}):
+            problem = f"column {name!r} is named for {other[name]} and for {quantity}"
+        if problem:
             raise InputError(None, "columns", problem)
         names[quantity] = name
-    for quantity, name in names.items():
-        first = next(other for other in names if names[other] == name)
-        if first != quantity:
-            problem = f"column {name!r} is named for {first} and for {quantity}"
-            raise InputError(None, "columns", problem)
-    return names
+    return names or None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,9 @@ from ..runs.predictions import Predictions, measured_tests, predict
 from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from . import options as given
-from .options import command_line, data_folders, folder_beside, result_folder, with_solver
+from .options import command_line, data_folders, with_solver
 from .progress import RunsProgress, SeriesProgress
-from .terminal import FILE, WORSE, Decorator, command, group, resumable, show, written_to
+from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
 #: Stands for the project's file of `simulate bend`, in the current folder.
@@ -35,24 +35,22 @@ SHAPE = (
 )  # fmt: skip
 
 
-def prediction_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of every series of predictions; the command receives them by name."""
-    decorators: list[Decorator] = [
-        given.out_option(),
-        click.option(
-            "--samples", type=click.IntRange(min=0), metavar="N",
-            help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
-        ),
-        given.JOBS,
-        given.SCHEDULER,
-        given.solver_choice,
-        given.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
-        given.resume_option("Keep the runs that the output folder holds."),
-        given.OVERWRITE,
-        given.AS_JSON,
-        given.QUIET,
-    ]  # fmt: skip
-    return given.with_checks(function, decorators)
+#: Options of every series of predictions; the command receives them by name.
+prediction_options = given.with_checks(
+    given.out_option(),
+    click.option(
+        "--samples", type=click.IntRange(min=0), metavar="N",
+        help="Spread by N laws drawn from the card's certainty; 0: none.  [few directions]",
+    ),
+    given.JOBS,
+    given.SCHEDULER,
+    given.solver_choice,
+    given.fail_above_option("Exit 1 when an RMS error exceeds E of the largest measured load."),
+    given.resume_option("Keep the runs that the output folder holds."),
+    given.OVERWRITE,
+    given.AS_JSON,
+    given.QUIET,
+)  # fmt: skip
 
 
 def run_predictions(
@@ -67,8 +65,7 @@ def run_predictions(
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
-    quiet = options["quiet"] or options["as_json"]
-    with resumable(folder), RunsProgress(quiet) as progress:
+    with resumable(folder), RunsProgress(given.quiet(options)) as progress:
         predictions = predict(
             project, tests, cards, samples=options["samples"], jobs=options["jobs"],
             scheduler=options["scheduler"], out=folder, resume=options["resume"],
@@ -80,31 +77,23 @@ def run_predictions(
 
 def _end(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
     """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
-    lines = [*predictions.lines(), written_to(folder)]
-    show(predictions.result, lines, as_json)
-    failed = predictions.failed()
+    show(predictions.result, [*predictions.lines(), written_to(folder)], as_json)
+    each, failed = predictions.each, predictions.failed()
     if failed:
-        run = predictions.each[failed[0]]
-        words = f"{len(failed)} of {len(predictions.each)} runs failed ({run.title}: "
-        words += f"{run.record.failure}); --resume tries again"
-        click.echo(f"bubblefit: {words}", err=True)
+        run = each[failed[0]]
+        words = f"{len(failed)} of {len(each)} runs failed ({run.title}: {run.record.failure})"
+        click.echo(f"bubblefit: {words}; --resume tries again", err=True)
     if fail_above is not None:
-        _compare(predictions, fail_above)
+        words, worst, silent = "", predictions.worst, predictions.silent()
+        if worst is not None and worst > fail_above:
+            words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
+        elif silent:
+            words = f"{each[silent[0]].title} gave nothing to compare"
+        if words:
+            click.echo(f"bubblefit: {words} (--fail-above)", err=True)
+            sys.exit(WORSE)
     if failed:
         sys.exit(SolverFailure.exit_code)
-
-
-def _compare(predictions: Predictions, fail_above: float) -> None:
-    """Exit 1 when a run is further from its measurement than `fail_above`, or has no error."""
-    words, worst, silent = "", predictions.worst, predictions.silent()
-    if worst is not None and worst > fail_above:
-        words = f"an RMS error of {worst:.4g} of the largest load is above {fail_above:g}"
-    elif silent:
-        run = predictions.each[silent[0]]
-        words = f"{run.title} gave nothing to compare"
-    if words:
-        click.echo(f"bubblefit: {words} (--fail-above)", err=True)
-        sys.exit(WORSE)
 
 
 @command(
@@ -123,13 +112,7 @@ def _compare(predictions: Predictions, fail_above: float) -> None:
     help="A card by its name, or a card's file; several [all, else the one just fitted].",
 )  # fmt: skip
 @prediction_options
-def bend_command(
-    project: Path,
-    data: tuple[str, ...],
-    tests: tuple[str, ...],
-    cards: tuple[str, ...],
-    **options: Any,
-) -> None:
+def bend_command(**options: Any) -> None:
     """Inflate and bend every cylinder of PROJECT.toml with every material card.
 
     Without a card in the project or by --card, the card that `bubblefit fit` wrote is taken.
@@ -137,13 +120,15 @@ def bend_command(
     report.html into the output folder. A run that fails is named and left out, everything else is
     written, the exit code is 4, and --resume tries it again.
     """
-    settings = read_project(project, data_folders(data))
+    settings = read_project(options["project"], data_folders(options["data"]))
     folder = options["out"]
     if folder is None:
         # Beside the folder of the project's fits, where it has any.
         alone = all(test.kind == CYLINDER for test in settings.tests.values())
-        folder = usual_folder(project) if alone else folder_beside(project, "bend")
-    run_predictions(settings, folder, options, tests or [CYLINDER], cards)
+        usual = usual_folder(options["project"])
+        folder = usual if alone else given.folder_of(options, "bend")
+    tests = options["tests"] or [CYLINDER]
+    run_predictions(settings, folder, options, tests, options["cards"])
 
 
 @group(
@@ -155,38 +140,33 @@ def simulate_command() -> None:
     """Run forward analyses with material cards, one or several side by side."""
 
 
-def card_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add PROJECT, cards and the options of every simulation."""
-    decorators: list[Decorator] = [
-        given.PROJECT,
-        click.option(
-            "--card", "cards", multiple=True, required=True,
-            help="A material card's file, or a card of the project; several side by side.",
-        ),
-        given.TESTS,
-        given.out_option("out/NAME-simulated"),
-        given.DATA,
-        given.solver_choice,
-        click.option(
-            "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
-        ),
-        given.resume_option(),
-        given.OVERWRITE,
-        given.AS_JSON,
-    ]  # fmt: skip
-    return given.with_checks(function, decorators)
+#: PROJECT, cards and the options of every simulation.
+card_options = given.with_checks(
+    given.PROJECT,
+    click.option(
+        "--card", "cards", multiple=True, required=True,
+        help="A material card's file, or a card of the project; several side by side.",
+    ),
+    given.TESTS,
+    given.out_option("out/NAME-simulated"),
+    given.DATA,
+    given.solver_choice,
+    click.option(
+        "--within-range", is_flag=True, help="End each curve where the card's valid range ends."
+    ),
+    given.resume_option(),
+    given.OVERWRITE,
+    given.AS_JSON,
+)  # fmt: skip
 
 
 def run_simulation(command: str, options: dict[str, Any], kind: str | None = None) -> None:
     """Read the project, run its tests (of a kind, or those named) with the cards, print."""
-    path: Path = options["project"]
-    data = data_folders(options["data"])
-    project = given.read_with_solver(path, options["solver_given"], data, need_data=False)
+    project = given.read_with_solver(options, need_data=False)
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
-    resume = options["resume"]
-    folder = result_folder(path, "simulated", options["out"], options["overwrite"], resume)
-    kept = KeptAnalyses(folder, resume)
+    folder = given.result_folder(options, "simulated")
+    kept = KeptAnalyses(folder, options["resume"])
     with resumable(folder), SeriesProgress(options["as_json"]) as progress:
         done = simulate_cards(
             project, tests, cards, folder, options["within_range"], progress.saw, command, kept
@@ -268,33 +248,25 @@ def simulate_uniaxial(**options: Any) -> None:
     help="Measured loads, columns deflection and load with their units; several.",
 )  # fmt: skip
 @prediction_options
-def simulate_bend(
-    diameter: float,
-    pressure: float,
-    cards: tuple[Path, ...],
-    measured: tuple[Path, ...],
-    **options: Any,
-) -> None:
+def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
     """Inflate a cylinder and bend it with the materials of one or several cards.
 
     Writes what `bubblefit bend` writes; a project file (`bubblefit init --example bend`) takes
     several cylinders and sensors in volts.
     """
-    collar, places = options.pop("collar"), options.pop("places")
-    shape = {name: options.pop(name) for name in SHAPE}
-    section: dict[str, Any] = {key: value for key, value in shape.items() if value is not None}
-    section |= {"diameter": diameter, "pressure": pressure}
-    section["name"] = f"{diameter:g} mm, {pressure:g} kPa"
-    if collar is not None:
-        section["collar"] = {"inner_diameter": collar[0], "length": collar[1]}
-    if places is not None:
-        section["places"] = given.numbers(places, "--places")
-    for path in measured:
+    name = f"{diameter:g} mm, {pressure:g} kPa"
+    section: dict[str, Any] = {"name": name, "diameter": diameter, "pressure": pressure}
+    section |= {key: options[key] for key in SHAPE if options[key] is not None}
+    if options["collar"] is not None:
+        section["collar"] = dict(zip(("inner_diameter", "length"), options["collar"], strict=True))
+    if options["places"] is not None:
+        section["places"] = given.numbers(options["places"], "--places")
+    for path in options["measured"]:
         if not path.is_file():
             raise InputError(path, "--measured", "no such file")
-    if measured:
-        section["measured"] = {"files": [str(path) for path in measured]}
-    named = given.named_cards(cards)
+    if options["measured"]:
+        section["measured"] = {"files": [str(path) for path in options["measured"]]}
+    named = given.named_cards(options["cards"])
     project = _project(section, named)
     folder = options["out"] or Path("out") / f"bend-{diameter:g}mm-{pressure:g}kPa"
     run_predictions(project, folder, options, None, named)

@@ -41,6 +41,7 @@ class LiveLine:
 
     def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
         self.bar: Progress | None = None
+        self.said = time.monotonic()
         self.quiet, self._hearing = quiet, ExitStack()
         self._states: dict[str, str] = {}
         self._stated: dict[str, float] = {}
@@ -88,6 +89,12 @@ class LiveLine:
         elif not said.of:
             self.bar.console.print(said.words, markup=False, highlight=False, soft_wrap=True)
 
+    def plain(self, words: str) -> None:
+        """Print a line where there is no bar, once a minute."""
+        if not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
+            self.said = time.monotonic()
+            print(words, file=sys.stderr, flush=True)
+
     @property
     def states(self) -> str:
         """Return the states with their counts, as the end of a note; "" where there is none."""
@@ -99,7 +106,6 @@ class SeriesProgress(LiveLine):
 
     def __init__(self, quiet: bool) -> None:
         super().__init__(quiet)
-        self.said = time.monotonic()
         if self.bar is not None:
             self.task = self.bar.add_task("", total=None)
 
@@ -107,14 +113,12 @@ class SeriesProgress(LiveLine):
         """Show how far the current analysis is; without a terminal once a minute."""
         words = f"analysis {step.analysis} of {step.analyses}, {step.part}{self.states}"
         EVENTS.progress("increments", step.done, step.increments or None, words)
-        if self.bar is None and not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
-            self.said = time.monotonic()
-            of = f" of {step.increments}" if step.increments else ""
-            print(f"{words}: increment {step.done:g}{of}", file=sys.stderr, flush=True)
+        total = step.increments or None
         if self.bar is not None:
-            self.bar.update(
-                self.task, description=words, completed=step.done, total=step.increments or None
-            )
+            self.bar.update(self.task, description=words, completed=step.done, total=total)
+        else:
+            of = f" of {total}" if total else ""
+            self.plain(f"{words}: increment {step.done:g}{of}")
 
 
 class CountProgress(LiveLine):
@@ -123,20 +127,18 @@ class CountProgress(LiveLine):
     def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
         super().__init__(quiet, TextColumn("{task.fields[note]}"))
         self.what, self.total, self.done, self.already = what, total, done, done
-        self.begun = self.said = time.monotonic()
+        self.begun = time.monotonic()
         if self.bar is not None:
             self.task = self.bar.add_task(what, total=total, completed=done, note="")
 
     def show(self) -> None:
         """Update the bar, or elsewhere print a plain line a minute; write events as they come."""
-        EVENTS.progress(self.what, self.done, self.total, self.note() + self.states)
+        note = self.note() + self.states
+        EVENTS.progress(self.what, self.done, self.total, note)
         if self.bar is not None:
-            self.bar.update(self.task, completed=self.done, total=self.total,
-                            note=self.note() + self.states)  # fmt: skip
-        elif not self.quiet and time.monotonic() - self.said >= PLAIN_EVERY_S:
-            self.said = time.monotonic()
-            words = f"{self.done} of {self.total} {self.what}, {self.note()}{self.states}"
-            print(words, file=sys.stderr, flush=True)
+            self.bar.update(self.task, completed=self.done, total=self.total, note=note)
+        else:
+            self.plain(f"{self.done} of {self.total} {self.what}, {note}")
 
     def note(self) -> str:
         """Return the words beside the count."""
@@ -169,21 +171,31 @@ class NamedProgress(CountProgress):
 
 
 class StudyProgress(CountProgress):
-    """Show starts done, best objective, and the time left."""
+    """Show starts done, best objective, and the time left.
 
-    def __init__(self, total: int, quiet: bool) -> None:
+    said : the line that begins each of several fits in turn, with {} for its name.
+    """
+
+    def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
         super().__init__("starts", total, 0, quiet)
-        self.starts = total
+        self.starts, self.said_of_fit = total, said
         self.best: float | None = None
         self.analyses = 0
         #: The start that last had an analysis, and what that left of the objective.
         self.under_way: tuple[int, float | None] | None = None
 
     def saw(self, record: object) -> None:
-        """Record a stage that begins, an analysis or the end of a start; None: time passes."""
+        """Record the name of a fit that begins, a stage, an analysis or the end of a start.
+
+        None: time passes.
+        """
         from ..runs.starts import EvaluationRecord, Stage, StartRecord
 
-        if isinstance(record, Stage):
+        if isinstance(record, str):
+            self.begin(Stage("starts", self.starts))
+            if not self.quiet:
+                print(self.said_of_fit.format(record), file=sys.stderr, flush=True)
+        elif isinstance(record, Stage):
             self.begin(record)
         elif isinstance(record, EvaluationRecord):
             self.analyses += 1
@@ -209,31 +221,8 @@ class StudyProgress(CountProgress):
         if self.under_way is not None:
             start, value = self.under_way
             parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
-        begun = parts or ["no analysis yet"]
-        return ", ".join(
-            [*begun, f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}", self.left()]
-        )
-
-
-class FitsProgress(StudyProgress):
-    """Show several fits in turn: a line with the name of each, then its starts.
-
-    said : the line, with {} for the name.
-    """
-
-    def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
-        super().__init__(total, quiet)
-        self.said_of_fit = said
-
-    def saw(self, record: object) -> None:
-        """Record a fit that begins (its name), or a record as `StudyProgress`."""
-        if isinstance(record, str):
-            from ..runs.starts import Stage
-
-            self.begin(Stage("starts", self.starts))
-            if not self.quiet:
-                print(self.said_of_fit.format(record), file=sys.stderr, flush=True)
-        super().saw(record)
+        count = f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}"
+        return ", ".join([*(parts or ["no analysis yet"]), count, self.left()])
 
 
 class RunsProgress(CountProgress):
@@ -248,12 +237,11 @@ class RunsProgress(CountProgress):
         if event is not None:
             self.done, self.total = event.done, event.total
             self.already += event.again
-        if event is not None and event.run is not None:
-            run, record = event.run, event.run.record
-            how = "ended early" if record.early else "finished"
-            how = f"failed ({record.failure})" if record.failure else how
-            words = f"{run.title}: {how} in {record.seconds:.0f} s"
-            self.last = f"last: {words}; "
+            if event.run is not None:
+                record = event.run.record
+                how = "ended early" if record.early else "finished"
+                how = f"failed ({record.failure})" if record.failure else how
+                self.last = f"last: {event.run.title}: {how} in {record.seconds:.0f} s; "
         self.show()
 
     def note(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
@@ -18,7 +17,7 @@ from ..files import write_text
 from ..project.new_project import writable_kinds, write_project
 from ..project.schema import schema_text
 from .options import numbers
-from .terminal import FILE, command
+from .terminal import FILE, command, did_you_mean
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -48,17 +47,11 @@ COUNT = click.IntRange(0, 99)
     "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
 )
 @click.argument("folder", type=FILE)
-@click.option(
-    "--example",
-    type=click.Choice(list(KINDS)),
-    help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
-    " test; bending; bubble and strips together. [known]",
-)
-@click.option(
-    "--own",
-    is_flag=True,
-    help="A project for your own tests, by the options below or, on a terminal, by questions.",
-)
+@click.option("--example", type=click.Choice(list(KINDS)),
+              help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
+              " test; bending; bubble and strips together. [known]")  # fmt: skip
+@click.option("--own", is_flag=True, help="A project for your own tests, by the options below or,"
+              " on a terminal, by questions.")  # fmt: skip
 @click.option("--bubble", type=COUNT, metavar="N", help="Bubble inflation tests.")
 @click.option("--strips", type=COUNT, metavar="N", help="Sets of warp, fill and bias strips.")
 @click.option("--biaxial", type=COUNT, metavar="N", help="Biaxial tests of a cruciform.")
@@ -173,9 +166,6 @@ def schema_command(out: Path | None) -> None:
     click.echo(f"written to {out}")
 
 
-# Documents
-
-
 def pages() -> dict[str, Path]:
     """Return every page by its name below docs/ without .md ("how-to/marc"), or "changelog"."""
     found = {}
@@ -190,13 +180,8 @@ def pages() -> dict[str, Path]:
 def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]]:
     """Return the name of the page that is meant, and others of the same name.
 
-    Parameters
-    ----------
-    topic : "marc", "how-to/marc" or "docs/how-to/marc.md". known : as `pages` gives them.
-
-    Raises
-    ------
-    InputError : there is none.
+    topic : "marc", "how-to/marc" or "docs/how-to/marc.md". known : as `pages` gives them. Raises
+    InputError where there is none.
     """
     wanted = topic.removeprefix("docs/").removesuffix(".md")
     if wanted in known:
@@ -205,17 +190,14 @@ def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]
     if named:
         return named[0], named[1:]
     names = [*known, *(name.rpartition("/")[2] for name in known)]
-    near = difflib.get_close_matches(wanted.lower(), names, n=1, cutoff=0.5)
-    meant = f"; did you mean {near[0]!r}?" if near else ""
+    meant = did_you_mean(wanted.lower(), names)
     raise InputError(None, topic, f"no such page{meant} (`bubblefit docs` lists every page)")
 
 
 def title_of(page: Path) -> str:
     """Return the first heading of a page."""
-    for line in page.read_text(encoding="utf-8").splitlines():
-        if line.startswith("# "):
-            return line.removeprefix("# ")
-    return page.stem
+    lines = page.read_text(encoding="utf-8").splitlines()
+    return next((line[2:] for line in lines if line.startswith("# ")), page.stem)
 
 
 @command(
@@ -235,7 +217,9 @@ def docs_command(topic: str | None, path: bool) -> None:
     """
     known = pages()
     if topic is None:
-        click.echo("\n".join(_listed(known)))
+        wide = max(map(len, known)) + 2
+        for name, page in known.items():
+            click.echo(f"{name:<{wide}}{title_of(page)}")
         return
     name, others = find_document(topic, known)
     if others:
@@ -243,19 +227,8 @@ def docs_command(topic: str | None, path: bool) -> None:
     if path:
         click.echo(str(known[name]))
     elif sys.stdout.isatty():
-        _show(known[name])
+        console = Console()
+        with console.pager(styles=True):
+            console.print(Markdown(known[name].read_text(encoding="utf-8")))
     else:
         click.echo(known[name].read_text(encoding="utf-8"), nl=False)
-
-
-def _listed(known: Mapping[str, Path]) -> list[str]:
-    """Return one line a page: its name and title."""
-    wide = max(map(len, known)) + 2
-    return [f"{name:<{wide}}{title_of(path)}" for name, path in known.items()]
-
-
-def _show(page: Path) -> None:
-    """Show a page, laid out, in the terminal's pager."""
-    console = Console()
-    with console.pager(styles=True):
-        console.print(Markdown(page.read_text(encoding="utf-8")))

@@ -8,13 +8,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import click
 
 from ..errors import InputError, Note
 from ..errors import lines as note_lines
-from ..project.project import Project, chosen_cards
+from ..project.project import chosen_cards
 from ..runs import compare as laws
 from ..runs import validation, weights
 from ..runs.bootstrap import bootstrap
@@ -22,22 +22,11 @@ from ..runs.folder import KeptAnalyses
 from ..runs.plan import plan
 from ..runs.poisson import NU12, vary_nu12
 from ..runs.profile import profile
-from ..runs.refinement import refine
+from ..runs.refinement import Refined, refine
 from . import options as given
 from .fits import fit_options, settings_given
-from .options import (
-    command_line,
-    data_folders,
-    folder_beside,
-    numbers,
-    read_to_refit,
-    read_with_solver,
-    result_folder,
-)
-from .progress import FitsProgress, NamedProgress, SeriesProgress
+from .progress import NamedProgress, SeriesProgress, StudyProgress
 from .terminal import Decorator, command, group, resumable, show, written_to
-
-What = Literal["elements", "increments"]
 
 
 def _finish(
@@ -47,10 +36,6 @@ def _finish(
     study.write(folder)
     lines = [*study.lines(), *note_lines(notes), written_to(folder)]
     show(study.result, lines, options["as_json"])
-
-
-def _quiet(options: Mapping[str, Any]) -> bool:
-    return bool(options["quiet"] or options["as_json"])
 
 
 # Studies of one fit: derivatives at its optimum, or further fits from there
@@ -63,14 +48,11 @@ def study_options(
 
     refits : the study fits again, by --jobs and --scheduler. resumes : it has --resume.
     """
-    decorators: list[Decorator] = [given.PROJECT, *own]
-    decorators += [given.TESTS, given.out_option(f"out/NAME-{name}"), given.DATA]
-    decorators += [given.solver_choice]
-    decorators += [given.JOBS, given.SCHEDULER] if refits else []
-    if resumes:
-        decorators.append(given.resume_option("Continue the study in the output folder."))
-    decorators += [given.OVERWRITE, given.AS_JSON, given.QUIET]
-    return lambda function: given.with_options(function, decorators)
+    usual = given.TESTS, given.out_option(f"out/NAME-{name}"), given.DATA, given.solver_choice
+    again = (given.JOBS, given.SCHEDULER) if refits else ()
+    resume = (given.resume_option("Continue the study in the output folder."),) if resumes else ()
+    end = given.OVERWRITE, given.AS_JSON, given.QUIET
+    return given.with_options(given.PROJECT, *own, *usual, *again, *resume, *end)
 
 
 @command(
@@ -90,33 +72,32 @@ def study_options(
     ),
     given.CARD_OF_FIT,
 )  # fmt: skip
-def profile_command(
-    moduli: tuple[str, ...], strain: str | None, card: str | None, **options: Any
-) -> None:
+def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any) -> None:
     """Compute profile-likelihood intervals (95 %) of moduli.
 
     Holds a modulus of the fit of PROJECT.toml away from its optimum, fits everything else again,
     and continues until the data contradict or a bound is reached. Writes profile.csv, profile.png,
     report.html and result.json.
     """
-    path: Path = options["project"]
-    project = read_to_refit(path, options)
+    project = given.read_to_refit(options)
     asked = _strains_by_modulus(moduli, strain)
-    folder = result_folder(path, "profile", options["out"], options["overwrite"])
-    with NamedProgress("sides", _quiet(options)) as progress:
-        found = profile(project, asked, card, options["tests"] or None, progress=progress.saw)
+    folder = given.result_folder(options, "profile")
+    with NamedProgress("sides", given.quiet(options)) as progress:
+        found = profile(
+            project, asked, options["card"], options["tests"] or None, progress=progress.saw
+        )
     _finish(found, folder, options)
 
 
 def _strains_by_modulus(moduli: Sequence[str], strain: str | None) -> dict[str, list[float]] | None:
     """Return strains by modulus; a modulus that is named twice has those of both."""
-    common = [] if strain is None else numbers(strain, "--strain")
+    common = [] if strain is None else given.numbers(strain, "--strain")
     if common and not moduli:
         raise InputError(None, "--strain", "goes with --modulus NAME")
     asked: dict[str, list[float]] = {}
     for text in moduli:
         name, equals, strains = text.partition("=")
-        own = numbers(strains, "--modulus") if equals else common
+        own = given.numbers(strains, "--modulus") if equals else common
         asked.setdefault(name, []).extend(own)
     return asked or None
 
@@ -141,22 +122,20 @@ def _strains_by_modulus(moduli: Sequence[str], strain: str | None) -> dict[str, 
     given.CARD_OF_FIT,
     resumes=True,
 )  # fmt: skip
-def bootstrap_command(
-    over: str, samples: int, seed: int | None, card: str | None, **options: Any
-) -> None:
+def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     """Compute percentile bands of the moduli by a bootstrap of the data.
 
     Draws frames, specimens or tests of PROJECT.toml with replacement and fits each draw from the
     optimum of the fit. Writes percentile bands of the moduli beside those of the fit:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
-    path: Path = options["project"]
-    project = read_to_refit(path, options)
-    folder: Path = options["out"] or folder_beside(path, "bootstrap")
-    with resumable(folder), NamedProgress("samples", _quiet(options)) as progress:
+    project = given.read_to_refit(options)
+    folder = given.folder_of(options, "bootstrap")
+    with resumable(folder), NamedProgress("samples", given.quiet(options)) as progress:
         done = bootstrap(
-            project, over, samples, card, options["tests"] or None, seed=seed, out=folder,
-            resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
+            project, over, samples, options["card"], options["tests"] or None,
+            seed=options["seed"], out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw,
         )  # fmt: skip
     _finish(done, folder, options)
 
@@ -190,37 +169,31 @@ def bootstrap_command(
     ),
     refits=False,
 )  # fmt: skip
-def plan_command(
-    card: str | None, strain: str | None, rank: str, noises: tuple[str, ...], **options: Any
-) -> None:
+def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) -> None:
     """Rank tests that could be made next by the predicted uncertainty of the moduli.
 
     Predicts one standard deviation of E1, E2 and G12 for each candidate beside the tests of
     PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
     """
-    path: Path = options["project"]
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
-    folder = result_folder(path, "plan", options["out"], options["overwrite"])
-    with NamedProgress("tests", _quiet(options)) as progress:
+    project = given.read_with_solver(options)
+    folder = given.result_folder(options, "plan")
+    with NamedProgress("tests", given.quiet(options)) as progress:
         made = plan(
-            project, card, options["tests"] or None,
-            strain=None if strain is None else numbers(strain, "--strain"),
-            rank=rank, specimens=options["specimens"], noise=dict(map(_noise, noises)),
+            project, options["card"], options["tests"] or None,
+            strain=None if strain is None else given.numbers(strain, "--strain"),
+            rank=options["rank"], specimens=options["specimens"], noise=dict(map(_noise, noises)),
             progress=progress.saw,
         )  # fmt: skip
     _finish(made, folder, options)
 
 
-def _noise(given: str) -> tuple[str, float]:
-    kind, _, value = given.partition("=")
+def _noise(text: str) -> tuple[str, float]:
+    kind, _, value = text.partition("=")
     try:
         return kind, float(value)
     except ValueError:
-        problem = f"expected KIND=VALUE, such as strips=20, got {given!r}"
+        problem = f"expected KIND=VALUE, such as strips=20, got {text!r}"
         raise InputError(None, "--noise", problem) from None
-
-
-# Studies that fit from random starts
 
 
 @command(
@@ -246,15 +219,15 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
     whether more coefficients pay. Writes comparison.csv, figures, report.html and result.json, and
     a folder for each form, into the output folder.
     """
-    path: Path = options["project"]
-    folder: Path = options["out"] or folder_beside(path, "compared")
-    project = read_with_solver(path, options["solver_given"], data_folders(options["data"]))
+    folder = given.folder_of(options, "compared")
+    project = given.read_with_solver(options)
     starts = options["starts"] or laws.STARTS
-    with FitsProgress(starts, _quiet(options), "{} moduli") as progress:
+    with StudyProgress(starts, given.quiet(options), "{} moduli") as progress:
         comparison = laws.compare_laws(
             settings_given(project, options), options["tests"] or None, forms, folds=folds,
             starts=starts, fold_starts=fold_starts, out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+            overwrite=options["overwrite"], progress=progress.saw,
+            command_line=given.command_line(),
         )  # fmt: skip
     _finish(comparison, folder, options, comparison.notes)
 
@@ -267,11 +240,7 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
     "bubblefit validate project.toml --card out/project/material.toml",
 )
 @click.option(
-    "--form",
-    "forms",
-    multiple=True,
-    metavar="NAME",
-    help="Of the moduli; several.  [the project's]",
+    "--form", "forms", multiple=True, metavar="NAME", help="Of the moduli; several [the project's]."
 )
 @click.option(
     "--card", "cards", multiple=True, metavar="CARD", help="Judge it instead of a fit; several."
@@ -285,13 +254,7 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
     help="Instead: moduli and errors over the weight of a kind of test (strips), or of one test.",
 )  # fmt: skip
 @fit_options
-def validate_command(
-    forms: tuple[str, ...],
-    cards: tuple[str, ...],
-    leave: str | None,
-    counted: str | None,
-    **options: Any,
-) -> None:
+def validate_command(leave: str | None, counted: str | None, **options: Any) -> None:
     """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
 
     With --leave single frames of bubbles, specimens or directions of strips, or ratios of biaxial
@@ -300,24 +263,27 @@ def validate_command(
     over the weight of a kind of test: weights.csv, weights.png, result.json.
     """
     path: Path = options["project"]
+    forms, cards = options["forms"], options["cards"]
     _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
         _one_of(path, {"--form": forms, "--weights": counted})
     name = "validated" if counted is None else "weights"
-    folder: Path = options["out"] or folder_beside(path, name)
-    project, tests = _project(options), options["tests"] or None
+    folder = given.folder_of(options, name)
+    tests, project = options["tests"] or None, given.read_with_solver(options)
+    trusted = [*project.fit.trust, *options["trust"]]
+    project = settings_given(project, options).with_fit(trust=trusted)
     if cards:
-        folder = result_folder(path, name, options["out"], options["overwrite"])
+        folder = given.result_folder({**options, "resume": False}, name)
         judged = validation.judge_cards(project, chosen_cards(project, cards), tests)
         _finish(judged, folder, options, judged.notes)
         return
     starts = options["starts"] or (validation if counted is None else weights).STARTS
     study: Any
-    with resumable(folder), FitsProgress(starts, _quiet(options)) as progress:
+    with resumable(folder), StudyProgress(starts, given.quiet(options)) as progress:
         common: dict[str, Any] = {
             "starts": starts, "out": folder, "resume": options["resume"],
             "overwrite": options["overwrite"], "progress": progress.saw,
-            "command_line": command_line(),
+            "command_line": given.command_line(),
         }  # fmt: skip
         if counted is not None:
             study = weights.weight_study(project, counted, tests, **common)
@@ -327,21 +293,11 @@ def validate_command(
     _finish(study, folder, options, study.notes)
 
 
-def _project(options: Mapping[str, Any]) -> Project:
-    data = data_folders(options["data"])
-    project = read_with_solver(options["project"], options["solver_given"], data)
-    trusted = [*project.fit.trust, *options["trust"]]
-    return settings_given(project, options).with_fit(trust=trusted)
-
-
-def _one_of(path: Path, given: Mapping[str, object]) -> None:
+def _one_of(path: Path, asked: Mapping[str, object]) -> None:
     """Check that at most one of the options is given."""
-    several = [name for name, value in given.items() if value]
+    several = [name for name, value in asked.items() if value]
     if len(several) > 1:
         raise InputError(path, ", ".join(several), "give one of them")
-
-
-# Studies of an analysis with a card
 
 
 @group(
@@ -353,39 +309,33 @@ def study_command() -> None:
     """Vary the mesh, the increments or nu12 in the analyses of a project."""
 
 
-def card_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add PROJECT, --card and the options of every study of a card."""
-    decorators: list[Decorator] = [
-        given.PROJECT,
-        click.option(
-            "--card", required=True,
-            help="The material card's file, or the name of a card of the project.",
-        ),
-        click.option(
-            "--test", "--case", "tests", multiple=True,
-            help="A test by its name, or a kind of tests; several [all].",
-        ),
-        given.out_option("out/NAME-STUDY"),
-        given.DATA,
-        given.solver_choice,
-        given.resume_option(),
-        given.OVERWRITE,
-        given.AS_JSON,
-    ]  # fmt: skip
-    return given.with_checks(function, decorators)
+#: PROJECT, --card and the options of every study of a card.
+card_options = given.with_checks(
+    given.PROJECT,
+    click.option(
+        "--card", required=True,
+        help="The material card's file, or the name of a card of the project.",
+    ),
+    click.option(
+        "--test", "--case", "tests", multiple=True,
+        help="A test by its name, or a kind of tests; several [all].",
+    ),
+    given.out_option("out/NAME-STUDY"),
+    given.DATA,
+    given.solver_choice,
+    given.resume_option(),
+    given.OVERWRITE,
+    given.AS_JSON,
+)  # fmt: skip
 
 
 def run_study(name: str, study: Callable[..., Any], options: dict[str, Any]) -> None:
     """Read the project, run the study of a card, write its folder and print its lines."""
-    path: Path = options["project"]
-    data, resume = data_folders(options["data"]), options["resume"]
-    project = read_with_solver(path, options["solver_given"], data, need_data=False)
-    folder = result_folder(path, name, options["out"], options["overwrite"], resume)
-    kept = KeptAnalyses(folder, resume)
+    project = given.read_with_solver(options, need_data=False)
+    folder = given.result_folder(options, name)
+    kept, tests = KeptAnalyses(folder, options["resume"]), options["tests"]
     with resumable(folder), SeriesProgress(options["as_json"]) as progress:
-        done = study(
-            project, options["card"], tests=options["tests"], progress=progress.saw, kept=kept
-        )
+        done = study(project, options["card"], tests=tests, progress=progress.saw, kept=kept)
     _finish(done, folder, options)
 
 
@@ -411,15 +361,16 @@ def run_study(name: str, study: Callable[..., Any], options: dict[str, Any]) -> 
     "--coarser", type=click.IntRange(min=0),
     help="Levels coarser than the project's own [1 of elements, 0 of increments].",
 )  # fmt: skip
-def study_mesh(what: What, levels: int, factor: int, coarser: int | None, **options: Any) -> None:
+def study_mesh(what: Refined, **options: Any) -> None:
     """Run PROJECT.toml with a card on finer and finer meshes (or increments).
 
     Reports the quantities of interest and the cost of each level, the observed order of
     convergence and Richardson's limit. A level whose analysis fails is named and left out; when
     fewer than two end well the exit code is 4.
     """
-    study = functools.partial(refine, what=what, levels=levels, factor=factor, coarser=coarser)
-    run_study(what if what == "increments" else "mesh", study, options)
+    asked = {name: options[name] for name in ("levels", "factor", "coarser")}
+    name = what if what == "increments" else "mesh"
+    run_study(name, functools.partial(refine, what=what, **asked), options)
 
 
 @command(

@@ -29,8 +29,6 @@ PAGE = "report.html"
 #: Where click keeps the words that were typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
 
-# Commands and their examples
-
 HEAD = "Examples:"
 
 
@@ -59,8 +57,6 @@ def examples_in(epilog: str | None) -> list[str]:
     _, head, typed = (epilog or "").partition(f"{HEAD}\n")
     return [line.strip() for line in typed.splitlines() if line.strip()] if head else []
 
-
-# How a command ends
 
 INTERRUPTED = 130
 WORSE = 1  # exit code of --fail-above
@@ -109,17 +105,14 @@ def resumable(folder: Path) -> Iterator[None]:
 def written_to(folder: Path) -> str:
     """Return the line that names the page to open where there is one, else the folder."""
     page = folder / PAGE
-    if page.exists():
-        return f"page: {page} (tables and figures beside it)"
-    return f"written to {folder}"
+    there = f"page: {page} (tables and figures beside it)"
+    return there if page.exists() else f"written to {folder}"
 
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
     """Print the lines, or with --json the content of result.json."""
     click.echo(json_text(result) if as_json else "\n".join(lines) + "\n", nl=False)
 
-
-# Usage errors
 
 #: Shows the whole help instead of a line, in the versions of click that have it.
 HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
@@ -151,31 +144,24 @@ def in_one_line() -> Iterator[None]:
 def line_of(error: click.UsageError) -> str:
     """Return which option or argument is wrong, in what, and which help to read."""
     command = "" if error.ctx is None else error.ctx.command_path
-    where, problem = _parts(error, command or "bubblefit")
+    where, problem = "", error.message[:1].lower() + error.message[1:]
+    if isinstance(error, click.NoSuchOption):
+        meant = did_you_mean(error.option_name, error.possibilities or ())
+        where, problem = error.option_name, f"no such option of {command or 'bubblefit'}{meant}"
+    elif isinstance(error, click.BadParameter):
+        missing = isinstance(error, click.MissingParameter)
+        where, problem = _name(error.param), "is missing" if missing else error.message
+    elif (named := NAMED.match(error.message)) is not None:
+        where, problem = named[1], named[2]
     look = f" ({command} --help tells what it takes)" if command else ""
     return f"{where and f'{where}: '}{' '.join(problem.rstrip('.').split())}{look}"
 
 
-def _parts(error: click.UsageError, command: str) -> tuple[str, str]:
-    if isinstance(error, click.NoSuchOption):
-        meant = did_you_mean(error.option_name, error.possibilities or ())
-        return error.option_name, f"no such option of {command}{meant}"
-    if isinstance(error, click.MissingParameter):
-        return _name(error.param), "is missing"
-    if isinstance(error, click.BadParameter):
-        return _name(error.param), error.message
-    if (named := NAMED.match(error.message)) is not None:
-        return named[1], named[2]
-    return "", error.message[:1].lower() + error.message[1:]
-
-
 def _name(param: click.Parameter | None) -> str:
     """Return the long name of an option, or an argument in capitals, as the help has it."""
-    if param is None:
-        return ""
     if isinstance(param, click.Option):
         return max((*param.opts, *param.secondary_opts), key=len)
-    return (param.metavar or param.name or "").upper()
+    return "" if param is None else (param.metavar or param.name or "").upper()
 
 
 def did_you_mean(typed: str, known: Sequence[str]) -> str:
@@ -278,8 +264,6 @@ def _begin(ctx: click.Context, _: click.Parameter, path: Path | None) -> None:
     except OutputError as error:
         raise click.BadParameter(str(error)) from None
 
-
-# Log records on stderr
 
 LOGGER = logging.getLogger("bubblefit")
 WARNING = logging.Formatter("warning: %(message)s")

@@ -8,22 +8,25 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, OutputError, rows
+from ..files import replacing
+from ..materials.card import read_card
+from ..materials.exports.base import Export, Option, options_of
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
 from ..runs.verification import SUBJECTS, Number, numbers
 from ..solvers.base import Diagnosis
-from ..solvers.registry import command_line, diagnose, solver_names
+from ..solvers.registry import FORMATS, command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
-from .options import AS_JSON
+from .options import AS_JSON, with_options
 from .terminal import FILE, WORSE, command, show
 
 BYTES = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
@@ -41,14 +44,7 @@ SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
 @click.option("--older", metavar="AGE", help="Drop what was not used for so long: 12h, 30d, 8w.")
 @click.option("--limit", metavar="SIZE", help="From now on drop runs beyond SIZE: 500MB, 5GB.")
 @AS_JSON
-def cache_command(
-    folder: Path | None,
-    clear: bool,
-    size: str | None,
-    older: str | None,
-    limit: str | None,
-    as_json: bool,
-) -> None:
+def cache_command(folder: Path | None, limit: str | None, **options: Any) -> None:
     """Show or prune the cache of runs of CalculiX, Marc and solvers of plug-ins.
 
     A run that ended well is not repeated, in any project, where law, model, solver, settings,
@@ -64,6 +60,7 @@ def cache_command(
         cache.set_limit(_bytes("--limit", limit))
         left = {entry.path for entry in cache.entries()}
         gone += [entry for entry in before if entry.path not in left]
+    clear, size, older = options["clear"], options["size"], options["older"]
     if clear or size is not None or older is not None:
         least = 0 if clear else None if size is None else _bytes("--prune", size)
         gone += cache.prune(least, None if older is None else _seconds(older))
@@ -78,18 +75,14 @@ def cache_command(
         "used_first": entries[0].used if entries else None,
         "used_last": entries[-1].used if entries else None,
     }
-    show(state, _cache_lines(state), as_json)
-
-
-def _cache_lines(state: dict[str, Any]) -> list[str]:
-    runs, size, limit = state["runs"], _words(state["bytes"]), _words(state["limit"])
-    lines = [f"{state['folder']}: {runs} runs, {size} of at most {limit}"]
-    if runs:
-        first, last = (_ago(state[name]) for name in ("used_first", "used_last"))
+    used, most = _words(state["bytes"]), _words(cache.limit)
+    lines = [f"{cache.folder}: {len(entries)} runs, {used} of at most {most}"]
+    if entries:
+        first, last = _ago(entries[0].used), _ago(entries[-1].used)
         lines.append(f"last used between {first} and {last} ago")
-    if state["dropped"]:
-        lines.append(f"dropped: {state['dropped']} runs, {_words(state['dropped_bytes'])}")
-    return lines
+    if gone:
+        lines.append(f"dropped: {len(gone)} runs, {_words(state['dropped_bytes'])}")
+    show(state, lines, options["as_json"])
 
 
 def _words(size: int) -> str:
@@ -120,17 +113,17 @@ def _seconds(text: str) -> float:
     return float(found[1]) * SECONDS[found[2]]
 
 
-# Solvers
-
 UNUSABLE = 4  # exit code
 
 
-def _programs(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add an option for each solver that has a program, to test that program."""
-    for one in reversed(command_line()):
-        if one.look:
-            command = click.option(f"--{one.name}", metavar=one.metavar, help=one.look)(command)
-    return command
+#: An option for each solver that has a program, to test that program.
+_programs = with_options(
+    *(
+        click.option(f"--{one.name}", metavar=one.metavar, help=one.look)
+        for one in command_line()
+        if one.look
+    )
+)
 
 
 @command("doctor", "bubblefit doctor", "bubblefit doctor --ccx /opt/ccx/bin/ccx --json")
@@ -152,7 +145,7 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
     if solver is not None:
         good = good and any(one.usable for one in found if one.name == solver)
     if as_json:
-        solvers = [{**asdict(one), "path": _text(one.path)} for one in found]
+        solvers = [{**asdict(one), "path": one.path and str(one.path)} for one in found]
         click.echo(json.dumps({"ok": good, "solvers": solvers}, indent=1))
     else:
         for one in found:
@@ -173,10 +166,6 @@ def _solver_line(one: Diagnosis) -> str:
     if one.difference is not None:
         words.append(f"bars within {100 * one.difference:.4f} % of Marc")
     return "  ".join(word for word in words if word)
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)
 
 
 @command(
@@ -255,7 +244,9 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
         rows = [{"subject": subject, **one.row} for subject, one in found]
         click.echo(json.dumps({"ok": not missed, "numbers": rows}, indent=1))
     else:
-        click.echo(_summary(len(found), missed))
+        names = "; ".join(one.what for one in missed)
+        said = f"{len(missed)} of {len(found)} missed: {names}"
+        click.echo(said if missed else f"all {len(found)} numbers are met")
     if missed:
         sys.exit(WORSE)
 
@@ -269,7 +260,76 @@ def _number_line(one: Number) -> str:
     )
 
 
-def _summary(count: int, missed: Sequence[Number]) -> str:
-    if not missed:
-        return f"all {count} numbers are met"
-    return f"{len(missed)} of {count} missed: {'; '.join(one.what for one in missed)}"
+def _values(known: Option) -> click.ParamType:
+    if known.choices:
+        return click.Choice(known.choices)
+    least = known.least if known.above is None else known.above
+    if known.kind is int:
+        return click.IntRange(None if least is None else int(least))
+    return click.FloatRange(least, known.most, min_open=known.above is not None)
+
+
+#: The options of all formats.
+format_options = with_options(
+    *(
+        click.option(f"--{name}", type=_values(known), help=known.help)
+        for name, known in options_of(FORMATS.values()).items()
+    )
+)
+
+
+@command(
+    "export",
+    "bubblefit export out/fabric/material.toml --format marc",
+    "bubblefit export material.toml --format calculix --out for-ccx --force",
+)
+@click.argument("card", type=FILE)
+@click.option("--format", "name", type=click.Choice(list(FORMATS)), required=True)
+@click.option(
+    "--out", type=FILE, help="File or folder to write to [CARD-FORMAT.* here]; others go beside it."
+)
+@click.option("--force", is_flag=True, help="Write over files that are there.")
+@format_options
+@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+def export_command(
+    card: Path, name: str, out: Path | None, force: bool, as_json: bool, **options: Any
+) -> None:
+    """Write the material of CARD (a material.toml) for another program.
+
+    Each file begins with the parts of the law that the target keeps, those it loses, and those to
+    be confirmed there; the same is printed. See `bubblefit docs exports`.
+    """
+    given = {option: value for option, value in options.items() if value is not None}
+    FORMATS[name].check(given)
+    material = read_card(card)
+    try:
+        export = FORMATS[name].export(material, **given)
+    except InputError as error:
+        raise InputError(card, error.field, error.problem) from None
+    paths = _targets(export, out, f"{card.stem}-{name}")
+    for path in paths:
+        if path.exists() and path.samefile(card):
+            raise InputError(None, "--out", f"{path} is the card itself; name another file")
+        if path.exists() and not force:
+            raise OutputError(f"{path}: is already there; use --force or another --out")
+    for path, text in zip(paths, export.files.values(), strict=True):
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    files = [str(path) for path in paths]
+    said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
+    said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
+    lines = [*export.says.lines(), f"written to {', '.join(files)}"]
+    show({"files": files, "format": name, **said}, lines, as_json)
+
+
+def _targets(export: Export, out: Path | None, default: str) -> list[Path]:
+    """Return a path for each file; the first has the name that was given."""
+    first, *others = export.files
+    target = Path(default + first) if out is None else out
+    if target.is_dir():
+        target = target / (default + first)
+    paths = [target, *(target.with_suffix(suffix) for suffix in others)]
+    if len(set(paths)) < len(paths):
+        problem = f"{', '.join(others)} is what another file ends in; use {first}"
+        raise InputError(None, "--out", f"{target}: {problem}")
+    return paths

@@ -49,18 +49,12 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 @dataclass(frozen=True, eq=False)
 class Certainty:
     """The uncertainty of each modulus up to the strains reached, and notes on it.
-
-    noise : by comparison, in the unit of its data (mm, N). alike : by comparison, number of
-    neighbouring values that err as one. strain, sigma : (n,) by modulus, 1 sigma by noise,
-    relative. undetermined : notes on moduli that the data do not determine or that lie on a bound.
-    mesh : (n,) by modulus, relative change on ever finer meshes; None where unknown. posterior : of
-    all unknowns, from the noise alone. fine : of those of ever finer meshes, with the error that
-    may be left; None as `mesh`. rows : (m,) noise of each residual if as many independent ones were
-    measured. band : (2, n) MPa by modulus, ends of its 95 % band, noise and mesh together.
-    taken_out : the reported law is that of ever finer meshes. discrepancy : by comparison,
-    residuals too smooth for noise, or alike in all specimens. second, order : second-order terms
-    and their verdict; None where it is of first order, or where little more than noise is left.
-    """
+    By comparison: `noise`, in the unit of its data (mm, N), and `alike`, neighbouring values that
+    err as one. By modulus: `strain`; `sigma`, relative, by noise; `mesh`, relative change on ever
+    finer meshes, None where unknown; `band` (2, n) MPa, 95 %, noise and mesh together. posterior :
+    from the noise alone. fine : of ever finer meshes, with the error that may be left. rows : (m,)
+    noise of each residual if as many independent ones were measured. taken_out : the reported law
+    is that of ever finer meshes. second, order : None where the certainty is of first order."""
 
     noise: dict[str, float]
     strain: dict[str, Array]
@@ -86,9 +80,7 @@ class Certainty:
     @property
     def total(self) -> dict[str, Array]:
         """Return (n,) by modulus, noise and mesh error together, as if the latter were a sigma.
-
-        Where the error of the mesh is taken out, only the share counts that may be left of it.
-        """
+        Where the error of the mesh is taken out, only the share counts that may be left of it."""
         if self.mesh is None:
             return dict(self.sigma)
         share = LEFT if self.taken_out else 1.0
@@ -100,9 +92,7 @@ class Certainty:
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
         """Return `count` random laws that data and mesh allow, within the bounds of the fit.
-
-        Raises ValueError where there is no posterior (a certainty made by hand).
-        """
+        Raises ValueError where there is no posterior (a certainty made by hand)."""
         known = self.fine or self.posterior
         if known is None:
             raise ValueError("this certainty has no posterior to draw laws from")
@@ -118,7 +108,6 @@ def certainty(
     second: Second | None = None,
 ) -> Certainty:
     """Propagate the noise of every comparison linearly to the moduli.
-
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
     (see `Noise.of`), else that of the best fit. second : terms of second order (see `Linear.of`).
     """
@@ -163,11 +152,9 @@ def uncertainty_from(
     noise: Array,
 ) -> dict[str, Array]:
     """Return the 1-sigma relative uncertainty of each modulus from some comparisons, by number.
-
-    This is the best estimate that those allow (weights do not count), with hardly any knowledge
-    before: each modulus at its control strains to 1000 % of itself, each nuisance to its prior or
-    ten times the width of its bounds. noise : (m,) of each residual, as `Certainty.rows`.
-    """
+    It is the best estimate that those allow (weights do not count), with each modulus known before
+    to 1000 % of itself, each nuisance to its prior or ten times the width of its bounds. noise :
+    (m,)."""
     assert best.jacobian is not None
     rows = np.concatenate([np.r_[problem.rows(k)] for k in numbers])
     j = best.jacobian[rows] / noise[rows, None]
@@ -186,20 +173,17 @@ def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
         if (moduli - least <= ON_BOUND * max(least, 1.0)).any():
             words = f"{name} touches its positivity margin: the data ask for less stiffness"
             notes.append(Note(MARGIN, words))
-        if p.bounds.largest is not None:
-            most = p.bounds.largest[name]
-            if (most - moduli <= ON_BOUND * most).any():
-                words = f"{name} touches its upper bound: the data ask for more stiffness"
-                notes.append(Note(BOUND, words))
+        most = np.inf if p.bounds.largest is None else p.bounds.largest[name]
+        if (most - moduli <= ON_BOUND * most).any() and most < np.inf:
+            words = f"{name} touches its upper bound: the data ask for more stiffness"
+            notes.append(Note(BOUND, words))
     if p.bounds.largest is None:
         notes += _on_bounds(p.labels, best.coefficients, *p.box)
     return notes + _on_bounds(p.nuisance.names, best.unknowns[p.size :], *p.nuisance.bounds)
 
 
 def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
-    width = upper - lower
-    low = values - lower <= ON_BOUND * width
-    high = upper - values <= ON_BOUND * width
+    low, high = (away <= ON_BOUND * (upper - lower) for away in (values - lower, upper - values))
     return [
         Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
         for i in np.flatnonzero(low | high).tolist()
@@ -217,11 +201,9 @@ CORRELATED = 0.5
 @dataclass(frozen=True)
 class Verdict:
     """The uncertainty of one unknown beside the moduli, in `unit`.
-
     name : with its comparison where there are several. prior : None without one. correlation : with
     each modulus in the middle of its strains. shared : one for all tests. why : reason why the data
-    may say nothing of it.
-    """
+    may say nothing of it."""
 
     name: str
     unit: str
@@ -253,20 +235,15 @@ class Verdict:
     def words(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
         value = f"{self.value:.4g}{unit}" + (f", on its {self.on} bound" if self.on else "")
-        if not self.determined:
-            known = (
-                f"it may be {self.lower:.4g} to {self.upper:.4g}{unit}"
-                if self.prior is None
-                else f"known to {self.prior:.2g}{unit} before"
-            )
-            why = f"; {self.why}" if self.why else ""
-            return f"{value}: the data say nothing of it ({known}){why}"
-        return f"{value}, 1 sigma {self.sigma:.2g}{unit}{self._together}"
-
-    @property
-    def _together(self) -> str:
-        name, value = max(self.correlation.items(), key=lambda item: abs(item[1]))
-        return "" if abs(value) < CORRELATED else f", correlation {value:.2f} with {name}"
+        if self.determined:
+            name, rho = max(self.correlation.items(), key=lambda item: abs(item[1]))
+            beside = "" if abs(rho) < CORRELATED else f", correlation {rho:.2f} with {name}"
+            return f"{value}, 1 sigma {self.sigma:.2g}{unit}{beside}"
+        known = f"it may be {self.lower:.4g} to {self.upper:.4g}{unit}"
+        if self.prior is not None:
+            known = f"known to {self.prior:.2g}{unit} before"
+        why = f"; {self.why}" if self.why else ""
+        return f"{value}: the data say nothing of it ({known}){why}"
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -286,9 +263,7 @@ class Verdict:
 
 def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
     """Return a verdict for each unknown beside the moduli.
-
-    ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known.
-    """
+    ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known."""
     unknowns, covariance = posterior.unknowns, posterior.covariance
     size, free = unknowns.size, list(unknowns.free)
     slopes = {}
@@ -300,17 +275,14 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
     spread = {m: float(np.sqrt(slope @ of_law @ slope)) for m, slope in slopes.items()}
     found = []
     pairs = zip(unknowns.nuisance_names, unknowns.nuisance.all, strict=True)
-    for place, (name, one) in enumerate(pairs, start=size):
-        sigma = float(np.sqrt(covariance[place, place]))
+    for k, (name, one) in enumerate(pairs, start=size):
+        sigma, value = float(np.sqrt(covariance[k, k])), float(posterior.best[k])
         correlation = {
-            modulus: float(slope @ covariance[:size, place]) / max(sigma * spread[modulus], 1e-300)
+            modulus: float(slope @ covariance[:size, k]) / max(sigma * spread[modulus], 1e-300)
             for modulus, slope in slopes.items()
         }
-        value = float(posterior.best[place])
-        found.append(
-            Verdict(name, one.unit, value, sigma, one.lower, one.upper, one.prior, correlation,
-                    one.shared, one.why)
-        )  # fmt: skip
+        known = one.lower, one.upper, one.prior, correlation, one.shared, one.why
+        found.append(Verdict(name, one.unit, value, sigma, *known))
     return tuple(found)
 
 

@@ -21,15 +21,11 @@ Numbers = NDArray[np.intp]
 @dataclass(frozen=True)
 class Nuisance:
     """An unknown beside the moduli, of one comparison (an offset, a pressure) or shared by all.
-
-    name : as its objective knows it ("offset_z"), or of a parameter of model or law. lower, upper,
-    prior, start : in `unit`; prior is one standard deviation around `start`, None without one.
-    weight : residual of a value one prior away. model_parameter : the one of the model's
-    `parameters` that takes the difference from `start`; None where only the objective or the law
-    knows it. scale : the model's units in one `unit` (1e-3 from kPa to MPa). law_parameter : number
-    of the law beside beta: "nu12". shared : one for all comparisons that have it, by its name. why
-    : words for data that say nothing of it.
-    """
+    name : as its objective knows it, or of a parameter of model or law. lower, upper, prior, start
+    : in `unit`; prior is one standard deviation around `start`. weight : residual of a value one
+    prior away. model_parameter : the one of the model's `parameters` that takes the difference from
+    `start`. scale : the model's units in one `unit`. law_parameter : number of the law beside beta:
+    "nu12". why : words for data that say nothing of it."""
 
     name: str
     lower: float
@@ -48,9 +44,7 @@ class Nuisance:
 @dataclass(frozen=True, eq=False)
 class NuisanceOf:
     """The nuisance of all comparisons of a fit: shared unknowns, then comparison by comparison.
-
-    comparisons : by name, in their order; those without nuisance are named too.
-    """
+    comparisons : by name, in their order; those without nuisance are named too."""
 
     comparisons: Mapping[str, tuple[Nuisance, ...]] = field(default_factory=dict)
 
@@ -109,7 +103,6 @@ class NuisanceOf:
 
     def of_law(self, all_values: Array) -> dict[str, float]:
         """Return the unknown numbers of the law by name from the values of all.
-
         They are clipped to their bounds, which a step keeps but for rounding: a law may end there.
         """
         return {
@@ -130,13 +123,10 @@ NoiseIs = Literal["given", "specimens' scatter", "assumed"]
 
 class Objective(Protocol):
     """Residual blocks of one comparison.
-
-    sizes : length of each block, together m. scale : (m,) `unit`s in one unit of each residual.
-    least_noise : in `unit`s. data : all that was measured. Optional: `noise_is` (a `NoiseIs`, else
-    "assumed"); `places`, (n, 2) mm on a sheet or (n, 1) along a curve, of each block's values,
-    where neighbours may err as one; `alike`, the known number of values that do; `specimens`, (m,)
-    the specimen's number of each value, or None.
-    """
+    sizes : of the blocks, together m. scale : (m,) `unit`s in one unit of residual. data : all that
+    was measured. Optional: `noise_is` (else "assumed"); `places`, (n, 2) mm on a sheet or (n, 1)
+    along a curve, of each block, where neighbours may err as one; `alike`, how many do;
+    `specimens`, (m,) numbers, or None."""
 
     @property
     def sizes(self) -> tuple[int, ...]: ...
@@ -172,14 +162,10 @@ class Objective(Protocol):
 
 @dataclass(eq=False)
 class Comparison:
-    """A model that should show what was measured.
-
-    name : of its test ("bubble 1", "strips 1: warp"), unique in a fit. solver : its own, so that it
-    keeps what it prepares for the model. stage : those of lower stages lead into a fit of several
-    (see `approach`). contracts : the sheet contracts freely under tension, so that the law has to
-    be positive definite there. must_be_stable : an unstable equilibrium is refused, since no test
-    under load shows it.
-    """
+    """A model that should show what was measured, by a solver of its own.
+    name : of its test ("bubble 1", "strips 1: warp"). stage : those of lower stages lead into a fit
+    of several (see `approach`). contracts : the sheet contracts freely under tension, so that the
+    law has to be positive definite. must_be_stable : an unstable equilibrium is refused."""
 
     name: str
     model: Any
@@ -203,11 +189,9 @@ class Comparison:
         self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
     ) -> History:
         """Run without derivatives.
-
         free : entries of the law's beta that vary between runs. nuisance : values by name, in their
         units. warm : start each increment from the last differentiated solution and its slope.
-        Raises SolverFailure.
-        """
+        Raises SolverFailure."""
         values = self._model_values(nuisance)
         model = self._model(values)
         if isinstance(self.solver, DifferentiatingSolver):
@@ -219,10 +203,8 @@ class Comparison:
         self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
     ) -> tuple[History, Array]:
         """Run with derivatives and keep the path for a warm start; arguments as for `run`.
-
         Returns the history and the slope of the residual (m, free + nuisance) by the entries of
-        beta, then by the nuisance of this comparison in their units.
-        """
+        beta, then by the nuisance of this comparison in their units."""
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
         values = self._model_values(nuisance)

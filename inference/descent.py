@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from ..materials.forms.base import Array
 from .problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
 
-Flags = NDArray[np.bool_]
-
 FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
 NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
@@ -29,16 +27,14 @@ def descend(
     tolerance: float,
     max_analyses: int,
     norms: bool = False,
-    only: Flags | None = None,
+    only: NDArray[np.bool_] | None = None,
     damping: float = FIRST_DAMPING,
     negligible: float = NEGLIGIBLE,
 ) -> tuple[Evaluation, str]:
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
-
-    point : with its Jacobian. norms : minimise e itself, the sum of the blocks' norms, instead of
-    their squares. only : (unknowns,) which may change. damping : of the first step. negligible :
-    predicted relative decrease of the sum of squares that is not worth an analysis. Returns the
-    best point, and CONVERGED, LEVEL or ANALYSES_USED_UP.
+    norms : minimise e itself, the sum of the blocks' norms, instead of their squares. only :
+    (unknowns,) which may change. negligible : predicted relative decrease of the sum of squares
+    that is not worth an analysis. Returns the best point, and CONVERGED, LEVEL or ANALYSES_USED_UP.
     """
     end = CONVERGED if norms else LEVEL
     growth, idle = 2.0, 0
@@ -63,9 +59,8 @@ def descend(
         for _ in range(MOST_TRIALS):
             if problem.analyses >= max_analyses:
                 return point, ANALYSES_USED_UP
-            step = bounded_step(
-                curvature + damping * np.diag(scale), gradient, a, c, point.unknowns
-            )
+            damped = curvature + damping * np.diag(scale)
+            step = bounded_step(damped, gradient, a, c, point.unknowns)
             if step is None:
                 damping *= 10.0
                 continue
@@ -96,10 +91,8 @@ def descend(
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
     """Return an inequality that keeps the next step half as far from the largest drop in shear.
-
     A membrane loses its stability in shear: a refused step shows where that modulus was too low,
-    and the fit can slide along that border. None when it did not drop.
-    """
+    and the fit can slide along that border. None when it did not drop."""
     rows = problem.unknowns.stability_rows
     before, after = rows @ stable, rows @ unstable
     drop = (before - after) / before
@@ -110,10 +103,8 @@ def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, fl
 
 
 def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:
-    """Return (m,) square roots of the weights of the squared residuals.
-
-    1/norm of each block majorises e: its weighted sum of squares decreases only if e does.
-    """
+    """Return (m,) square roots of the weights of the squared residuals. 1/norm of each block
+    majorises e: its weighted sum of squares decreases only if e does."""
     if not norms:
         return np.ones_like(point.residual)
     sizes = problem.blocks.norms(point.residual)
@@ -130,9 +121,7 @@ def bounded_step(
     plane: tuple[Array, float] | None = None,
 ) -> Array | None:
     """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer.
-
-    plane : (row, value), to which the step leads: row (y + s) = value.
-    """
+    plane : (row, value), to which the step leads: row (y + s) = value."""
     unit = 1.0 / np.sqrt(np.diag(hessian))
     scaled = hessian * unit[:, None] * unit[None, :]
     room = np.minimum(c - a @ y, 0.0) - 1e-12

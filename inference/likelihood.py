@@ -48,10 +48,8 @@ def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
 @dataclass(frozen=True)
 class Side:
     """A profile to one side of the best.
-
     values : MPa, from the best on; ratios : -2 log L there. why : BOUND, FAILED or FAR where the
-    threshold is not passed, else "".
-    """
+    threshold is not passed, else ""."""
 
     values: tuple[float, ...]
     ratios: tuple[float, ...]
@@ -88,7 +86,6 @@ def profile_side(
     tell: Callable[[], None] = lambda: None,
 ) -> Side:
     """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
-
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
     sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
     """
@@ -139,9 +136,7 @@ def fitted_at(
     problem: FitProblem, point: Evaluation, row: Array, target: float
 ) -> Evaluation | None:
     """Fit with row @ unknowns held at the target, from a neighbour's optimum.
-
-    None where the analyses do not end well, in a stable equilibrium.
-    """
+    None where the analyses do not end well, in a stable equilibrium."""
     a, c = problem.unknowns.inequalities
     limit = problem.analyses + MOST_ANALYSES
     y, (curvature, gradient) = point.unknowns, _squares(point)

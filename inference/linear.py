@@ -36,12 +36,9 @@ SMALLEST = 1e-6
 @dataclass(frozen=True, eq=False)
 class Second:
     """Second-order terms of the sum of the blocks' norms beside the squares of its slopes.
-
     added : (unknowns, unknowns) in the sizes of a `Linear`, to half of the curvature of the
     weighted sum of squares. left : (m,) the residual of each block over its norm, zero where the
-    block's weight is its noise's: along it a norm is not curved, and noise along it does not turn
-    its slope.
-    """
+    block's weight is its noise's; along it a norm is not curved."""
 
     added: Array
     left: Array
@@ -57,13 +54,10 @@ class Second:
 @dataclass(frozen=True, eq=False)
 class Linear:
     """A fit near its optimum as least squares, every block weighted by the inverse of its norm.
-
-    sizes : (unknowns,) in which they are counted. weights : (m,) roots of the weights of the
-    squares. sharp, flat : (unknowns, some) directions that the data determine, and those they do
-    not. curvature : (sharp,) of half the weighted sum of squares, by the first derivatives.
-    estimator : (unknowns, m) from weighted residuals to minus the move of the unknowns. moved :
-    (unknowns, m) the same for the noise of each residual.
-    """
+    sizes : (unknowns,) in which they are counted. weights : (m,) roots of those of the squares.
+    sharp, flat : directions that the data determine, and those they do not. curvature : (sharp,) of
+    half the weighted sum of squares. estimator : (unknowns, m) from weighted residuals to minus the
+    move of the unknowns; moved : the same for the noise of each residual."""
 
     sizes: Array
     weights: Array
@@ -97,11 +91,9 @@ class Linear:
 
     def spread_over_curvature(self, row: Array) -> float:
         """Return the variance of row @ unknowns over that of weighted squares of noise one.
-
         By so much a weighted sum of squares grows too fast along it for a likelihood ratio (J. T.
         Kent, Robust properties of likelihood ratio tests, Biometrika 69, 1982). NaN where the data
-        say nothing of it.
-        """
+        say nothing of it."""
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
         curved = float(along**2 @ (1.0 / self.curvature))
@@ -143,11 +135,9 @@ def posteriors_of(
     second: Second | None = None,
 ) -> tuple[Posterior, Posterior | None]:
     """Return the posterior from the noise, and that of ever finer models (None without `limit`).
-
     The latter's covariance includes the model error that may be left. A block that is fitted better
-    than its noise allows has the norm of the noise. A direction of which the data say nothing is as
-    uncertain as a modulus of which nothing is known. second : as for `Linear.of`.
-    """
+    than its noise allows has the norm of the noise; a direction without data is as uncertain as
+    `PRIOR`."""
     linear = Linear.of(problem, best, noise, second)
     weights, sizes, moved = linear.weights, linear.sizes, linear.moved
     scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
@@ -204,11 +194,9 @@ TOO_LITTLE = "too little changes"
 @dataclass(frozen=True)
 class Order:
     """The order of the uncertainty, and its reason.
-
     used : second order. why : "" where used, else NOT_DEFINITE or TOO_LITTLE. change : by modulus,
     largest relative change of its sigma by the second order; empty where it has none. directions,
-    analyses : numbers of them.
-    """
+    analyses : numbers of them."""
 
     used: bool
     why: str
@@ -255,12 +243,9 @@ def large(problem: FitProblem, residual: Array) -> bool:
 
 def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
     """Return second-order terms from differences of the slopes along the least certain directions.
-
-    Where much is left of the residual, its slopes change from place to place (by differences over
-    half of a standard deviation; directions that the data determine well have curvature enough),
-    and the norm of a block is not curved along the block's own residual. A direction along which no
-    analysis ends well, to neither side, counts as if its slopes did not change.
-    """
+    Slopes change from place to place (by differences over half of a standard deviation), and the
+    norm of a block is not curved along its own residual. A direction along which no analysis ends
+    well, to neither side, counts as if its slopes did not change."""
     assert best.jacobian is not None
     before, linear = problem.analyses, Linear.of(problem, best, noise)
     along = linear.sharp[:, np.argsort(linear.curvature)[:MOST]]
@@ -321,12 +306,10 @@ LEAST_WIDTH = 1e-3
 
 def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance] = ()) -> Array:
     """Return (n, n), the information of values on the n unknowns of the law, nuisance removed.
-
-    Information is J'J, J the slope of the values over their noise: it adds up from test to test,
-    and its inverse is the covariance of the best estimate (Fisher). slopes : (m, n + nuisance) of
-    the values by the law's unknowns, then by the nuisance. sigma : noise, (m,) or one for all.
-    nuisance : with a prior each, or known to ten times the width of its bounds.
-    """
+    It is J'J, J the slope of the values over their noise: it adds up from test to test, and its
+    inverse is the covariance of the best estimate (Fisher). slopes : (m, n + nuisance). sigma :
+    (m,) or one for all. nuisance : with a prior each, or known to ten times the width of its
+    bounds."""
     count = slopes.shape[1] - len(nuisance)
     before = [n.prior or PRIOR * max(n.upper - n.lower, LEAST_WIDTH) for n in nuisance]
     known = np.zeros((len(nuisance), slopes.shape[1]))
@@ -343,9 +326,7 @@ def information_of(
     comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
 ) -> tuple[Array, History]:
     """Return the information (n, n) of a comparison run with a law, nuisance at zero, and the run.
-
-    Raises SolverFailure where it does not end well, or its solver gives no derivatives.
-    """
+    Raises SolverFailure where it does not end well, or its solver gives no derivatives."""
     at_zero = {n.name: 0.0 for n in comparison.nuisance}
     history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
     slope = slope * comparison.objective.scale[:, None]
@@ -366,10 +347,8 @@ class LawQuery:
 
     def sigma(self, known: Array) -> dict[str, Array]:
         """Return the 1-sigma relative uncertainty (n,) of each modulus from information.
-
         Before any test each unknown of the law is known to 1000 % of itself, so that a modulus of
-        which the tests say nothing comes out as unknown.
-        """
+        which the tests say nothing comes out as unknown."""
         count = len(known)
         sizes = PRIOR * sizes_of(self.unknowns, self.y)[:count]
         scaled = known * sizes[:, None] * sizes + np.eye(count)
@@ -386,9 +365,7 @@ def residual_of(
     problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
 ) -> Array:
     """Return (m,) the residual of other models at the best unknowns, in the problem's rows.
-
-    Raises SolverFailure where a model does not run, or its residual is of other rows.
-    """
+    Raises SolverFailure where a model does not run, or its residual is of other rows."""
     unknowns, parts = problem.unknowns, []
     for comparison in comparisons:
         nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
@@ -404,10 +381,8 @@ def residual_of(
 @dataclass(frozen=True, eq=False)
 class Limit:
     """The limit of ever finer models.
-
     step : (unknowns,) from the best unknowns to theirs. residual : (m,) that they would leave.
-    error : (m,) of the residual at the best unknowns.
-    """
+    error : (m,) of the residual at the best unknowns."""
 
     step: Array
     residual: Array
@@ -416,12 +391,9 @@ class Limit:
 
 def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
     """Return the optimum of the limit of finer models to first order; None if the QP has no answer.
-
-    The residual of a model of second order is off by c h^2; one refinement by k gives c h^2 (1 -
-    1/k^2), so all of it. best : with its Jacobian. finer : (m,) residual of models finer by
-    `factor`, at the same unknowns. Blocks are weighted as in the sum of their norms; what these
-    weights would change without any error is no part of the step.
-    """
+    A model of second order is off by c h^2; one refinement by k gives c h^2 (1 - 1/k^2), so all of
+    it. finer : (m,) residual of models finer by `factor`, at the same unknowns. What the weights of
+    the blocks would change without any error is no part of the step."""
     assert best.jacobian is not None
     error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
     blocks = problem.blocks

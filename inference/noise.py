@@ -1,20 +1,16 @@
 """The noise of the data, and tests whether the residual of a fit can be noise.
 
-A facet of a camera is wider than the step between its points, and model errors are smooth:
-neighbouring residuals are alike. Where derivatives vary slowly, the variance of a fit grows by 1 +
-sum of rho(d) over the neighbours of a point, rho the correlation at the distance d, as long as rho
-is more than chance.
+Neighbouring residuals are alike: a facet of a camera is wider than the step between its points, and
+model errors are smooth. Where derivatives vary slowly, the variance of a fit grows by 1 + sum of
+rho(d) over the neighbours, rho the correlation at the distance d.
 
-Over distances that are long beside a facet noise has as much power in one shape as in another, in
-the smoothest polynomials over the sheet as in those of the next degrees; a law or model of the
-wrong form leaves more in the former. Their ratio, each per shape, has the distribution F of Fisher
-and Snedecor if nothing but noise is left, whatever its size and facet.
+Over distances that are long beside a facet noise has as much power in the smoothest polynomials
+over the sheet as in those of the next degrees; a law or model of the wrong form leaves more in the
+former. Their ratio has the distribution F of Fisher and Snedecor if nothing but noise is left.
 
-Specimens err along their whole curve, so that smooth is no sign there. But they scatter about the
-truth: what is alike in all is the model's. From each curve one takes what no change of the unknowns
-can explain, in a few smooth shapes; over the specimens the mean of these amplitudes is tested
-against their own scatter (Hotelling's T squared).
-"""
+Specimens err along their whole curve, but scatter about the truth: what is alike in all is the
+model's. The mean amplitude of a few smooth shapes that no change of the unknowns can explain is
+tested against their scatter (Hotelling's T squared)."""
 
 from __future__ import annotations
 
@@ -60,10 +56,8 @@ def alike(
     residuals: Sequence[Array], places: Sequence[Array], reach: float = REACH, rings: int = RINGS
 ) -> float:
     """Return the number of values that err as one, 1 where they are independent.
-
     residuals : blocks (n,), each of one quantity in one frame; they count alike. places : (n, 2) mm
-    or (n, 1) of each. reach : of the largest extent, where neighbours end. rings : of distances.
-    """
+    or (n, 1) of each. reach : of the largest extent, where neighbours end. rings : of distances."""
     from scipy.spatial.distance import cdist
 
     products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
@@ -125,11 +119,9 @@ def misfits(problem: FitProblem, residual: Array) -> dict[str, Misfit]:
 @dataclass(frozen=True, eq=False)
 class Noise:
     """The noise that a fit is assessed with.
-
-    level : by comparison, in the unit of its data (mm, N). alike : by comparison, number of
-    neighbours that err as one. rows : (m,) the standard deviation that as many independent values
-    would have. least : (m,) the least noise of each comparison's data, all values independent.
-    """
+    level : by comparison, in the unit of its data (mm, N). alike : by comparison, neighbours that
+    err as one. rows : (m,) the standard deviation that as many independent values would have. least
+    : (m,) the least noise of each comparison's data, all values independent."""
 
     level: dict[str, float]
     alike: dict[str, float]
@@ -139,12 +131,9 @@ class Noise:
     @classmethod
     def of(cls, problem: FitProblem, residual: Array) -> Noise:
         """Return the noise from a residual (m,), at least the objective's least noise.
-
-        A misfit of zero (computed data) does not mean that a measurement would determine
-        everything. Neighbours that err as one count as one; a misfit below the noise does not show
-        them, and is taken for white unless the objective knows better (`alike`, of the specimens of
-        a load curve).
-        """
+        Neighbours that err as one count as one; a misfit below the noise does not show them, and is
+        taken for white unless the objective knows better (`alike`, of the specimens of a load
+        curve)."""
         scale = problem.scale
         level, together = {}, {}
         rows, least = np.empty_like(scale), np.empty_like(scale)
@@ -164,36 +153,24 @@ class Noise:
 
 #: Degree of the polynomials that are smooth over the whole sheet, and of the next ones.
 SMOOTH, NEXT = 4, 8
-
-
 #: Of so many fits in which nothing but noise is left, one is said to leave more.
 FALSE_ALARMS = 0.01
-
-
-#: Values of a block for every shape that is looked at, at least.
-LEAST_VALUES = 2
-
-
+#: Values of a block for every shape that is looked at, at least; blocks that are asked how many
+#: values err as one.
+LEAST_VALUES, FEW = 2, 3
 #: A facet is not small beside the next shapes. If A of n values err as one, noise that is alike
 #: over a Gaussian has exp(2.6 to 3.5 sqrt(A / n)) times their power in the smooth ones (computed on
 #: a square, n / A from 40 to 400; white noise has as much).
 STEEPER = 3.5
 
 
-#: Blocks that are asked how many values err as one.
-FEW = 3
-
-
 @dataclass(frozen=True)
 class Discrepancy:
     """The part of a comparison's residual that is smooth over its whole sheet.
-
     ratio : power in a smooth shape over that in one of the next. largest : of those that noise
     alone exceeds in one of a hundred fits. rms : of the part beyond the noise's share, in `unit`s.
-    least : uncertainty of a mean of all values by the noise; less does not matter (rounding is
-    smooth, too). specimens : of strips, their number; then `ratio` is that of Hotelling's test and
-    `rms` that of what all have in common.
-    """
+    least : uncertainty of a mean by the noise; less does not matter. specimens : of strips; then
+    `ratio` is of Hotelling's test and `rms` of what all have in common."""
 
     ratio: float
     largest: float
@@ -212,9 +189,7 @@ def discrepancies(
     problem: FitProblem, residual: Array, doubt: Array | None = None
 ) -> dict[str, Discrepancy]:
     """Return the discrepancy of every comparison with places on a sheet, from the residual (m,).
-
-    doubt : (m,) part of the residual that the mesh may cause.
-    """
+    doubt : (m,) part of the residual that the mesh may cause."""
     found = {}
     doubt = np.zeros_like(residual) if doubt is None else doubt
     for k, comparison in enumerate(problem.comparisons):
@@ -242,10 +217,8 @@ def discrepancy(
     unit: str,
 ) -> Discrepancy | None:
     """Return the discrepancy of blocks (n,) at places (n, 2) mm; None where values are too few.
-
     Blocks count alike. A block's doubt is taken off its power in the smooth shapes. `unknowns` of
-    the fit have taken as many smooth shapes out of the residual.
-    """
+    the fit have taken as many smooth shapes out of the residual."""
     usable = [
         (block, doubt, at)
         for block, doubt, at in zip(blocks, doubts, places, strict=True)
@@ -304,36 +277,29 @@ def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
 
 
 def _words(one: Discrepancy) -> str:
+    left = f"{one.rms:.2g} {one.unit} of what the fit leaves is "
+    chance = f"chance gives {one.largest:.3g} in one of a hundred"
+    wrong = "the form of the law or the model is wrong"
+    off = "and the moduli are off by more than their bands say"
     if one.specimens:
         return (
-            f"{one.rms:.2g} {one.unit} of what the fit leaves is alike in all {one.specimens} "
-            f"specimens (Hotelling's F is {one.ratio:.3g}; chance gives {one.largest:.3g} in one "
-            "of a hundred): the form of the law or the model is wrong (moduli that depend on more "
-            "than their own strain, gauge lengths, a preload), and the moduli are off by more "
-            "than their bands say"
+            f"{left}alike in all {one.specimens} specimens (Hotelling's F is {one.ratio:.3g}; "
+            f"{chance}): {wrong} (moduli that depend on more than their own strain, gauge lengths, "
+            f"a preload), {off}"
         )
     return (
-        f"{one.rms:.2g} {one.unit} of what the fit leaves is smooth over the whole sheet "
-        f"({one.ratio:.3g} times the power that noise has in such shapes; chance gives "
-        f"{one.largest:.3g} in one of a hundred): the form of the law or the model is wrong "
-        "(thickness option, axes, pressures, a sheet taken for flat), and the moduli are off "
-        "by more than their bands say"
+        f"{left}smooth over the whole sheet ({one.ratio:.3g} times the power that noise has in "
+        f"such shapes; {chance}): {wrong} (thickness option, axes, pressures, a sheet taken for "
+        f"flat), {off}"
     )
 
 
 #: Shapes that are tested, at most, and degrees of polynomials among which they are found.
 SHAPES, DEGREES = 2, 8
-
-
 #: Of the whole curve, that a specimen must cover to count.
 COVERED = 0.8
-
-
 #: Of the largest singular value: below, a slope says nothing of its own; of a shape, likewise.
-NOTHING = 1e-6
-
-
-LEFT = 1e-3
+NOTHING, LEFT = 1e-6, 1e-3
 
 
 def differences_of_all(
@@ -362,12 +328,10 @@ def differences_of_all(
 def alike_in_all(
     residuals: Sequence[Array], places: Sequence[Array], slopes: Sequence[Array], unit: str
 ) -> Discrepancy | None:
-    """Return what specimens have in common beside the model, in the residuals' unit.
-
-    residuals : (n,) of each specimen, model less measured. places : (n,) along its curve. slopes :
-    (n, unknowns) of the residual. `rms` is that of what no change of the unknowns can follow. None
-    with fewer than three specimens that cover most of the curve with enough points.
-    """
+    """Return what specimens have in common beside the model and what no unknown can follow.
+    residuals : (n,) of each specimen, model less measured, in `unit`s. places : (n,) along its
+    curve. slopes : (n, unknowns). None with fewer than three specimens that cover most of the
+    curve."""
     low, high = (end(end(own) for own in places) for end in (min, max))
     if not high > low:
         return None
@@ -407,9 +371,7 @@ def alike_in_all(
 
 def _beside(slopes: Array, along: Array, count: int) -> Array:
     """Return (DEGREES + 1, count) Legendre coefficients of the smoothest shapes beside the slopes.
-
-    A shape that they can follow, with those taken before it, says nothing of the form.
-    """
+    A shape that they can follow, with those taken before it, says nothing of the form."""
     unit = np.linalg.qr(slopes)[0] if slopes.shape[1] else np.zeros((len(along), 0))
     shapes = []
     for row in np.eye(DEGREES + 1):
@@ -432,8 +394,6 @@ def _values(along: Array, shapes: Array) -> Array:
 
 #: Of so many fits in which the noise is as it is given, one is said to be off to a side.
 CHANCE = 0.01
-
-
 #: Of the noise: less is no matter, however many values say it (rounding, a mesh).
 MATTERS = 0.1
 
@@ -441,10 +401,8 @@ MATTERS = 0.1
 @dataclass(frozen=True)
 class NoiseTest:
     """A comparison's residual beside the noise given.
-
     values : how many; independent : as how many independent ones they count; free : of those, less
-    what the unknowns take up.
-    """
+    what the unknowns take up."""
 
     misfit: Misfit
     values: int
@@ -476,6 +434,15 @@ class NoiseTest:
         return None
 
     @property
+    def words(self) -> str:
+        m = self.misfit
+        return (
+            f"the fit leaves {m.rms:.3g} {m.unit} RMS, {m.ratio:.3g} times the noise given "
+            f"({m.noise:.3g} {m.unit}; {self.values} values count as {self.independent:.3g} "
+            "independent ones)"
+        )
+
+    @property
     def numbers(self) -> dict[str, Any]:
         """Return the entry of result.json."""
         return {
@@ -490,10 +457,8 @@ class NoiseTest:
 
 def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
     """Return tests of the comparisons with given noise, by name; residual (m,) of all.
-
     Neighbours that err as one count as one. The unknowns are shared among the comparisons as their
-    independent values are.
-    """
+    independent values are."""
     given: dict[str, tuple[Misfit, int, float]] = {}
     total, every = 0.0, misfits(problem, residual)
     if not any(misfit.noise_is == "given" for misfit in every.values()):
@@ -514,25 +479,15 @@ def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
 def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
     """Return notes where more, or less, is left than the noise given can leave."""
     return [
-        Note(kind, _words_chi_square(test, kind), name)
+        Note(kind, f"{test.words}: {REASONS[kind]}", name)
         for name, test in tests.items()
         if (kind := test.note_kind) is not None
     ]
 
 
-def _words_chi_square(test: NoiseTest, kind: NoteKind) -> str:
-    m = test.misfit
-    left = (
-        f"the fit leaves {m.rms:.3g} {m.unit} RMS, {m.ratio:.3g} times the noise given "
-        f"({m.noise:.3g} {m.unit}; {test.values} values count as {test.independent:.3g} "
-        "independent ones)"
-    )
-    if kind == ABOVE_NOISE:
-        return (
-            f"{left}: the noise is given too small, or model or data are off by more than noise, "
-            "and the uncertainty reckons with what is left as if it were noise"
-        )
-    return (
-        f"{left}: the noise is given too large, and the uncertainty, which reckons with it, is "
-        "larger than the data say"
-    )
+REASONS = {
+    ABOVE_NOISE: "the noise is given too small, or model or data are off by more than "
+    "noise, and the uncertainty reckons with what is left as if it were noise",
+    BELOW_NOISE: "the noise is given too large, and the uncertainty, which reckons with "
+    "it, is larger than the data say",
+}

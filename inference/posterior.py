@@ -48,10 +48,8 @@ def truncated_draws(
     random: np.random.Generator,
 ) -> Array:
     """Return `count` draws (count, n) of a normal distribution, given A y >= c.
-
     mean : (n,), which may lie outside. covariance : (n, n). inequalities : A (k, n), c (k,).
-    allowed : (n,) a point that keeps them, up to rounding.
-    """
+    allowed : (n,) a point that keeps them, up to rounding."""
     a, c = inequalities
     c = np.minimum(c, a @ allowed)
     variance, axes = np.linalg.eigh(covariance)
@@ -137,10 +135,8 @@ def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
 
 def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     """Return a point inside, and a root (n, n) of the shape of what is likely around it.
-
     It minimises |z - centre|^2 / 2 - sum log(rows z - least) by Newton's method; the shape is the
-    inverse of the curvature there: round in a wide place, flat between bounds that are close.
-    """
+    inverse of the curvature there: round in a wide place, flat between bounds that are close."""
     place = _inside(rows, least, centre)
     value, slope, factor = _barrier(rows, least, centre, place)
     for _ in range(NEWTON):
@@ -190,11 +186,9 @@ def _inside(rows: Array, least: Array, centre: Array) -> Array:
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """The unknowns as the noise of the data leaves them.
-
     unknowns : their order, units, bounds and inequalities. best : (n,), keeps the inequalities.
     centre : (n,) without inequalities: where none binds, the best. covariance : (n, n) without
-    them.
-    """
+    them."""
 
     unknowns: Unknowns
     best: Array
@@ -232,9 +226,7 @@ class Posterior:
 
     def moved(self, step: Array, centre: Array, share: float) -> Posterior:
         """Return the posterior about best + step and another centre.
-
-        share : of the step, by which the other best is uncertain (one standard deviation).
-        """
+        share : of the step, by which the other best is uncertain (one standard deviation)."""
         covariance = self.covariance + share**2 * np.outer(step, step)
         return Posterior(self.unknowns, self.best + step, centre, covariance)
 
@@ -258,12 +250,10 @@ LEVEL, DRAWS = 0.95, 1000
 def bands_of(
     posterior: Posterior, law: HypoelasticLaw, strains: dict[str, Array]
 ) -> dict[str, Array]:
-    """Return (2, n) MPa by modulus, the ends of its band at strains (n,).
-
-    From draws that keep the inequalities, so that what lies on a bound is uncertain to one side.
+    """Return (2, n) MPa by modulus, the ends of its band at strains (n,), from draws inside the
+    bounds.
     The law's own modulus is always inside: where the mesh error is not taken out, the band reaches
-    from there to the moduli of finer meshes.
-    """
+    from there to the moduli of finer meshes."""
     unknowns = posterior.unknowns
     drawn = posterior.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
     coefficients = drawn @ unknowns.to_coefficients.T

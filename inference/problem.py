@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,11 +22,9 @@ FROM_CACHE = "ok, from the cache"
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """An analysis that ended well, as the optimiser sees it.
-
     coefficients : (free,) MPa. residual : (m,). value : e of Eq. 3.7 or 4.8. jacobian : (m,
-    unknowns) or None. histories : one a comparison. stable : every equilibrium that has to be
-    (`Comparison.must_be_stable`), as far as the solver looked.
-    """
+    unknowns). histories : one a comparison. stable : every equilibrium that has to be, as far as
+    was looked."""
 
     unknowns: Array
     coefficients: Array
@@ -55,13 +53,9 @@ Watch = Callable[[Array, float | None, str, str], None]
 @dataclass(eq=False)
 class FitProblem:
     """Comparisons, a law and unknowns of one fit; an analysis runs every comparison once.
-
-    After the blocks of the comparisons comes one of the nuisance unknowns that have a prior. law :
-    gives nu12, strain range and thickness option; its beta is replaced, and nu12 where it is
-    unknown. surrogate : the same problem for a solver that differentiates, where this one's does
-    not. Raises InputError without comparisons, for two of one name, or nuisance that is not among
-    the unknowns.
-    """
+    A last block is of the nuisance with a prior. law : gives nu12, strain range and thickness
+    option. surrogate : the problem for a solver that differentiates, where this one's does not.
+    Raises InputError for comparisons of one name, or nuisance that is not among the unknowns."""
 
     comparisons: tuple[Comparison, ...]
     law: HypoelasticLaw
@@ -144,9 +138,7 @@ class FitProblem:
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
         """Run every comparison at unknowns y; None when one did not end well (Eqs 3.8, 4.9).
-
-        warm : start each increment from the last differentiated solution and its slope.
-        """
+        warm : start each increment from the last differentiated solution and its slope."""
         self.analyses += 1
         law = self.unknowns.law(self.law, y)
         free = self.unknowns.free
@@ -160,12 +152,13 @@ class FitProblem:
                     jacobians.append(self._by_unknowns(comparison, slope))
                 else:
                     history = comparison.run(law, free, nuisance, warm)
+                residual = comparison.objective.residual(history, nuisance)
+                if not np.isfinite(residual).all():
+                    raise SolverFailure("the results are not finite")
             except SolverFailure as failure:
-                self._failed(y, comparison, failure.line)
-                return None
-            residual = comparison.objective.residual(history, nuisance)
-            if not np.isfinite(residual).all():
-                self._failed(y, comparison, "the results are not finite")
+                several = f"{comparison.name}: " if len(self.comparisons) > 1 else ""
+                self.failure = several + failure.line
+                self._report(y, None, self.failure)
                 return None
             histories.append(history)
             residuals.append(residual)
@@ -195,11 +188,6 @@ class FitProblem:
         jacobian[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
         jacobian[:, p.nuisance_places(comparison.name)] = slope[:, p.size :]
         return jacobian
-
-    def _failed(self, y: Array, comparison: Comparison, reason: str) -> None:
-        several = f"{comparison.name}: " if len(self.comparisons) > 1 else ""
-        self.failure = several + reason
-        self._report(y, None, self.failure)
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:
@@ -244,10 +232,8 @@ RUNS_USED_UP = "runs used up"
 @dataclass(frozen=True, eq=False)
 class Optimum:
     """The best feasible point of one start.
-
     runs : of the analyses, those by the solver that counts while a surrogate led (0 without one).
-    failure : why that solver failed, where nothing else ended the fit.
-    """
+    failure : why that solver failed, where nothing else ended the fit."""
 
     best: Evaluation
     status: str
@@ -260,5 +246,82 @@ class Optimum:
         return self.best.value
 
     @property
-    def coefficients(self) -> NDArray[np.float64]:
+    def coefficients(self) -> Array:
         return self.best.coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """A part of the data that is drawn as a whole; rows : (m,) bool, its residuals."""
+
+    name: str
+    rows: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Units that are drawn among each other."""
+
+    name: str
+    units: Sequence[Unit]
+
+
+def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
+    """Return the number of draws of each unit of each group: as many as there are units."""
+    return [
+        random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
+        for group in groups
+    ]
+
+
+def factors_of(
+    problem: FitProblem, groups: Sequence[Group], counts: Sequence[Sequence[int]]
+) -> Array:
+    """Return (m,) factors of the residuals for counts of the units; all else counts once."""
+    times = np.ones(len(problem.blocks.of))
+    for group, own in zip(groups, counts, strict=True):
+        for unit, often in zip(group.units, own, strict=True):
+            times[unit.rows] = often
+    factors = np.empty_like(times)
+    for rows in np.split(np.arange(len(times)), problem.blocks.starts[1:]):
+        block = times[rows]
+        same = bool((block == block[0]).all())
+        factors[rows] = block if same else np.sqrt(block / block.mean())
+    return factors
+
+
+def rows_of(problem: FitProblem, points: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Return (m,) which residuals are of points, by comparison.
+    Raises InputError where an objective cannot say (`of_points`)."""
+    found = np.zeros(len(problem.blocks.of), dtype=bool)
+    for k, comparison in enumerate(problem.comparisons):
+        mask = points.get(comparison.name)
+        if mask is None:
+            continue
+        of_points = getattr(comparison.objective, "of_points", None)
+        if of_points is None:
+            said = f"{comparison.name} does not tell which of its values are of which part"
+            raise InputError(None, "--over", said)
+        found[problem.rows(k)] = of_points(mask)
+    return found
+
+
+#: Points that a fold gives to the fit, by comparison.
+Fold = Mapping[str, NDArray[np.bool_]]
+
+
+def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:
+    """Return the points that each of `count` folds gives to the fit, by comparison.
+    A comparison of several specimens loses whole specimens, because the points of one err together;
+    one of a single specimen loses points drawn at random; each point is left out once. specimens :
+    (n,) number of the specimen of each point, by comparison; others lose nothing."""
+    random = np.random.default_rng(seed)
+    place = {}
+    for name, whose in specimens.items():
+        numbers = np.unique(np.asarray(whose))
+        if len(numbers) > 1:
+            of = dict(zip(numbers.tolist(), random.permutation(len(numbers)) % count, strict=True))
+            place[name] = np.array([of[int(w)] for w in whose])
+        else:
+            place[name] = random.permutation(len(whose)) % count
+    return [{name: where != fold for name, where in place.items()} for fold in range(count)]

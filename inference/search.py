@@ -1,6 +1,6 @@
 """Fit from one start, by any method, for any solver."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -9,22 +9,27 @@ import numpy as np
 from ..errors import NoFeasibleStart
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
-from .comparison import Comparison, Objective
+from .comparison import Comparison
 from .descent import descend
 from .methods import FitOptions, Method, method_named
 from .problem import CONVERGED, LEVEL, RUNS_USED_UP, Evaluation, FitProblem, Optimum
 from .unknowns import MOST_DRAWS, LawBounds, Unknowns
 
+NOT_WORTH_A_RUN = 0.1  # relative decrease of e by one run
+SHORTER, MOST_SHORTER = 0.5, 3  # of a step that worsened e; such steps in a row
+MOST_ANALYSES = 50  # of a start, at random points
+#: MPa: the law is given and not looked for; bounds only size the unknowns.
+ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
+#: Analyses in which what is no law (offsets, the sheet's surface) is fitted to the tests.
+MOST, TOLERANCE = 40, 1e-9
+
 
 def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
     """Return unknowns at the optimum of the comparisons that lead in; `start` without any.
-
-    Those of the lowest stage are matched first, then those of the lowest two, and so on. From a
+    Those of the lowest stage are matched first, then those of the lowest two, and so on: from a
     random start nearly every step of a fit of several tests can end without an equilibrium of one
-    that is hard to run: strips along the yarns get to their optimum from anywhere; from there a
-    bias strip does, which mostly has the shear modulus to find; and from there all tests together.
-    Returns `start` also where a comparison fails, or is unstable, at the optimum of the others.
-    """
+    that is hard to run, such as a bias strip. `start` also where a comparison fails at the optimum
+    of the others."""
     stages = sorted({c.stage for c in problem.comparisons})
     if len(stages) < 2:
         return start
@@ -40,24 +45,17 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     return y if point is not None and point.stable else start
 
 
-NOT_WORTH_A_RUN = 0.1  # relative decrease of e by one run
-SHORTER = 0.5
-MOST_SHORTER = 3  # steps in a row
-
-
 def corrected_fit(
     problem: FitProblem, start: Array, method: Method, options: FitOptions
 ) -> Optimum | None:
     """Fit a solver without derivatives, led by a surrogate; None when it fails wherever that leads.
-
     Minimised is surrogate(beta) + [other(beta_k) - surrogate(beta_k)] - data, with the surrogate's
     exact Jacobian; the other solver then runs once at the new beta, and so on until its own
     objective, which alone counts, is level. A step that worsens that is shortened (trust region).
-    method, `max_analyses` : of each fit of the surrogate; `max_runs` : of the solver that counts.
     """
     surrogate = problem.surrogate
     assert surrogate is not None
-    with _corrections_of(surrogate) as objectives:
+    with _corrections_of(surrogate) as restore:
         best: Evaluation | None = None
         status, shorter, failure = RUNS_USED_UP, 0, ""
         y = _lead(surrogate, start, method, options)
@@ -81,7 +79,7 @@ def corrected_fit(
             if beside is None:
                 status = f"{surrogate.solver.name} failed"
                 break
-            _restore(surrogate, objectives)
+            restore()
             surrogate.shift(point.histories, beside.histories)
             y = _lead(surrogate, y, method, options)
     if best is None:
@@ -99,18 +97,18 @@ def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:
 
 
 @contextmanager
-def _corrections_of(surrogate: FitProblem) -> Iterator[list[Objective]]:
-    """Yield the surrogate's own objectives and restore them at the end."""
+def _corrections_of(surrogate: FitProblem) -> Iterator[Callable[[], None]]:
+    """Yield what restores the surrogate's own objectives, and call it at the end."""
     objectives = [comparison.objective for comparison in surrogate.comparisons]
+
+    def restore() -> None:
+        for comparison, objective in zip(surrogate.comparisons, objectives, strict=True):
+            comparison.objective = objective
+
     try:
-        yield objectives
+        yield restore
     finally:
-        _restore(surrogate, objectives)
-
-
-def _restore(surrogate: FitProblem, objectives: Sequence[Objective]) -> None:
-    for comparison, objective in zip(surrogate.comparisons, objectives, strict=True):
-        comparison.objective = objective
+        restore()
 
 
 def _lead(surrogate: FitProblem, y: Array, method: Method, options: FitOptions) -> Array | None:
@@ -125,10 +123,8 @@ def fit_from(
     problem: FitProblem, start: Array, options: FitOptions, near: bool = False
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
-
     near : an optimum is near (that of another mesh), so that no comparisons lead in. Raises
-    InputError for an unknown method.
-    """
+    InputError for an unknown method."""
     method = method_named(options.method)
     if not method.needs_slope:
         return method.minimise(problem, start, options)
@@ -138,15 +134,10 @@ def fit_from(
     return method.minimise(problem, y, options)
 
 
-MOST_ANALYSES = 50
-
-
 def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     """Return the unknowns of start `number` of the study `seed`: the same on any machine.
-
     Candidates of the problem's `starts` are tried until an analysis ends well, in a stable
-    equilibrium. Raises NoFeasibleStart after 200,000 draws or 50 analyses.
-    """
+    equilibrium. Raises NoFeasibleStart after 200,000 draws or 50 analyses."""
     # Where another solver counts, its runs are not spent on draws.
     starts, problem = problem.starts, problem.surrogate or problem
     unknowns = problem.unknowns
@@ -168,14 +159,6 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     )
 
 
-#: MPa: the law is given and not looked for; bounds only size the unknowns.
-ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
-
-#: Analyses in which what is no law (offsets, the sheet's surface) is fitted to the tests.
-MOST = 40
-TOLERANCE = 1e-9
-
-
 def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[FitProblem, Array]:
     """Return comparisons with a given law as a problem, and its unknowns, nuisance at its start."""
     ends = law.strain_range.tolist()
@@ -186,9 +169,7 @@ def problem_at(law: HypoelasticLaw, comparisons: Sequence[Comparison]) -> tuple[
 
 def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> Evaluation | None:
     """Evaluate the law of unknowns y with its best-fitting nuisance; None where an analysis failed.
-
-    The nuisance stays as in y where the problem's solver gives no derivatives.
-    """
+    The nuisance stays as in y where the problem's solver gives no derivatives."""
     if not problem.unknowns.nuisance.all or not problem.differentiates:
         return problem.evaluate(y, with_jacobian, warm=False)
     first = problem.evaluate(y, True)

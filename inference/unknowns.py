@@ -26,11 +26,9 @@ from .comparison import Comparison, NuisanceOf
 @dataclass(frozen=True, eq=False)
 class LawBounds:
     """Bounds of a law's numbers; made by `of_moduli` or `of_entries`.
-
     least, largest : MPa, by modulus, anywhere on the strain range; largest is None where the
     coefficients are bounded. lower, upper : (free,) MPa, of the free coefficients; None where the
-    moduli are bounded.
-    """
+    moduli are bounded."""
 
     least: Mapping[str, float]
     largest: Mapping[str, float] | None = None
@@ -55,9 +53,7 @@ class LawBounds:
         cls, lower: ArrayLike, upper: ArrayLike, margins: Mapping[str, float]
     ) -> LawBounds:
         """Return bounds (free,) MPa of every coefficient; starts are drawn from there.
-
-        margins : MPa, by modulus, the least that it may be anywhere on the strain range.
-        """
+        margins : MPa, by modulus, the least that it may be anywhere on the strain range."""
         low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
         if low.shape != high.shape or not (low <= high).all():
             problem = f"expected lower <= upper, got {low.tolist()} and {high.tolist()}"
@@ -76,10 +72,8 @@ class LawBounds:
 
     def box(self, form: Form, from_values: Array) -> tuple[Array, Array]:
         """Return lower and upper (free,) of the free coefficients, MPa.
-
         Where the moduli are bounded this is the smallest box that holds every law whose moduli are
-        between their bounds at the form's control strains.
-        """
+        between their bounds at the form's control strains."""
         if self.lower is not None and self.upper is not None:
             return self.lower, self.upper
         ends = self.control(form)
@@ -93,8 +87,6 @@ class LawBounds:
         return least, np.array([self.largest[name] for name in form.modulus_of])
 
 
-Flags = NDArray[np.bool_]
-
 #: MPa; a bound that is zero or negative says nothing of the size of a modulus.
 SMALLEST = 1e-3
 
@@ -102,12 +94,9 @@ SMALLEST = 1e-3
 @dataclass(frozen=True, eq=False)
 class Unknowns:
     """The unknowns y (count,) of a fit, their bounds, and their relation to the law.
-
-    Moduli at control strains come first, each in units of its modulus' own size, then the nuisance
-    in its units: shared, then comparison by comparison. strain_range : ends (eps1, eps2, gamma12)
-    over which bounds hold. definite_nu12 : Poisson's ratio of a law that has to be positive
-    definite where the fabric contracts, None where it need not.
-    """
+    Moduli at control strains, each in units of its modulus' own size, then the nuisance: shared,
+    then comparison by comparison. strain_range : ends over which bounds hold. definite_nu12 :
+    Poisson's ratio of a law that has to be positive definite, None where it need not."""
 
     form: Form
     strain_range: tuple[float, ...]
@@ -170,7 +159,7 @@ class Unknowns:
         return self.size + self.nuisance.places(comparison)
 
     @cached_property
-    def shear(self) -> Flags:
+    def shear(self) -> NDArray[np.bool_]:
         """Return (count,) which unknowns make the modulus that a loss of stability depends on."""
         extra = self.count - self.size
         return np.array([*(name == SHEAR for name in self.form.modulus_of), *[False] * extra])
@@ -299,10 +288,8 @@ def dimensions(unknowns: Unknowns) -> int:
 
 def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
     """Return free coefficients (count, size) MPa at places (count, dimensions) between 0 and 1.
-
     Even in the box of their bounds; where the moduli are bounded, even in the logarithm of their
-    values at the control strains.
-    """
+    values at the control strains."""
     if unknowns.bounds.largest is None:
         lower, upper = unknowns.box
         return np.asarray(lower + (upper - lower) * share)
@@ -314,10 +301,8 @@ def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
 
 def _between(modulus_of: Sequence[str]) -> Array:
     """Return (size, drawn), from what is drawn to the control values of every modulus.
-
     Values of their own where a modulus has few; more are interpolated, because a curve through many
-    independent ones hardly ever stays inside its bounds between them.
-    """
+    independent ones hardly ever stays inside its bounds between them."""
     blocks = []
     for name in dict.fromkeys(modulus_of):
         count = sum(own == name for own in modulus_of)
@@ -369,9 +354,7 @@ class RandomStarts:
 @dataclass(frozen=True)
 class SobolStarts:
     """Starts spread evenly: start k is allowed point k of the sequence that the seed scrambles.
-
-    Where that cannot be analysed, random points follow.
-    """
+    Where that cannot be analysed, random points follow."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
         from scipy.stats import qmc
@@ -390,11 +373,9 @@ class SobolStarts:
 @dataclass(frozen=True, eq=False)
 class ProposedStarts:
     """Starts where earlier evaluations of the same model were good.
-
     Start k is the one of 64 random candidates of its own with the least predicted objective.
     coefficients : (n, size) MPa of the earlier evaluations. objectives : (n,). Raises InputError
-    without scikit-learn.
-    """
+    without scikit-learn."""
 
     coefficients: Array
     objectives: Array

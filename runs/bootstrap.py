@@ -19,8 +19,15 @@ from ..files import __version__
 from ..inference.descent import descend
 from ..inference.linear import moduli_of, summary
 from ..inference.posterior import LEVEL, bands_of
-from ..inference.problem import ANALYSES_USED_UP, WeightedProblem
-from ..inference.resampling import Group, Unit, draw_counts, factors_of, rows_of
+from ..inference.problem import (
+    ANALYSES_USED_UP,
+    Group,
+    Unit,
+    WeightedProblem,
+    draw_counts,
+    factors_of,
+    rows_of,
+)
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum

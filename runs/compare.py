@@ -14,8 +14,7 @@ import numpy as np
 from ..errors import InputError, NoFeasibleStart, Note, NoteKind, rows
 from ..experiments.kinds import FittableTest, Masks
 from ..files import __version__
-from ..inference.problem import FitProblem
-from ..inference.resampling import folds_of
+from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
 from ..project.project import Project

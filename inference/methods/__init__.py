@@ -19,13 +19,9 @@ if TYPE_CHECKING:  # the names of the optimisers are asked for by commands that 
 @dataclass(frozen=True)
 class FitOptions:
     """Options of the fit from each start.
-
-    method : name of an optimiser. gradient : "exact" or forward "differences", for an optimiser
-    that takes either. constraints : "margin" (linear inequalities) or "boolean" (flags without a
-    slope), likewise. tolerance : of the objective e, below which the fit has converged.
-    max_analyses : of the problem, those counted already included. max_runs : of a solver that a
-    differentiating surrogate leads to the minimum of its objective.
-    """
+    constraints : "margin" (linear inequalities) or "boolean" (flags without a slope). tolerance :
+    of the objective e. max_analyses : of the problem, those counted already included. max_runs : of
+    a solver that a differentiating surrogate leads."""
 
     method: str = "lm"
     gradient: Literal["exact", "differences"] = "exact"
@@ -37,15 +33,11 @@ class FitOptions:
 
 class Method(Protocol):
     """An optimiser, which goes from a start to the minimum of a problem's objective e.
-
     It sees a `FitProblem`: `evaluate` (residual, exact Jacobian, e; None where the analysis
     failed), `blocks`, and of its `unknowns` the linear `inequalities` and the box. It must not go
-    to an analysis that fails or to an equilibrium that is not `stable`.
-
-    needs_slope : needs derivatives. A fit with it is led in by the comparisons that are easy to
-    run, and for a solver without derivatives by a surrogate. boolean : also takes
-    `constraints = "boolean"`. max_analyses : of one start, unless the project gives a number.
-    """
+    to an equilibrium that is not `stable`. needs_slope : needs derivatives, by a surrogate where
+    the solver has none. boolean : also takes boolean constraints. max_analyses : of one start, by
+    default."""
 
     needs_slope: bool
     boolean: bool

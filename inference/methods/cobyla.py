@@ -3,9 +3,9 @@
 import nlopt
 
 from ...materials.forms.base import Array
-from ..nlopt_search import nlopt_minimise
 from ..problem import FitProblem, Optimum
 from . import FitOptions
+from .slsqp import nlopt_minimise
 
 FIRST_STEP = 0.1  # of each bound's width
 

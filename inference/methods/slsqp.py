@@ -1,11 +1,198 @@
-"""Sequential quadratic programming on e itself (NLopt's SLSQP)."""
+"""Sequential quadratic programming on e itself (NLopt's SLSQP), and the search by NLopt.
+
+A NaN makes SLSQP run on to maxeval and COBYLA report success at the start; boolean +-1 constraints
+have no slope; COBYLA can return an infeasible point as a success. So NLopt never sees NaN or
+infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
+"""
+
+from dataclasses import dataclass
+from functools import partial
 
 import nlopt
+import numpy as np
 
 from ...materials.forms.base import Array
-from ..nlopt_search import nlopt_minimise
-from ..problem import FitProblem, Optimum
+from ..problem import ANALYSES_USED_UP, CONVERGED, Evaluation, FitProblem, Optimum
 from . import FitOptions
+
+# An analysis that failed or ended unstable, or a point that may not be analysed, is this many times
+# worse than the start: finite, and worse than anything a line search would accept.
+WORSE = 10.0
+DIFFERENCE = 1e-4  # forward difference, of the width of the bounds
+CONSTRAINT_TOLERANCE, FLAG_TOLERANCE = 1e-9, 1e-8
+RELATIVE_E, RELATIVE_X = 1e-10, 1e-12
+
+
+class NoMoreAnalyses(Exception):
+    """The allowed number of analyses was spent."""
+
+
+class BelowTolerance(Exception):
+    """e fell below the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A point: e, its slope (empty unless asked for), moduli positive, analysis ended well."""
+
+    value: float
+    slope: Array
+    positive: bool
+    analysed: bool
+
+
+class Record:
+    """A map of NLopt's variables to unknowns that evaluates and keeps the best feasible point."""
+
+    def __init__(self, problem: FitProblem, start: Evaluation, options: FitOptions) -> None:
+        self.problem, self.best, self.options = problem, start, options
+        self.bad = WORSE * max(start.value, 1.0)
+        # Differences where the solver has no exact slope to give.
+        self.exact = options.gradient == "exact" and problem.differentiates
+        self.flags = options.constraints == "boolean"
+        p = problem.unknowns
+        # Linear constraints: modulus values, well conditioned. Boolean: coefficients in their
+        # bounds' unit box.
+        self.basis, self.origin = np.eye(p.count), np.zeros(p.count)
+        if self.flags:
+            lower, upper = p.box
+            to_values = np.linalg.inv(p.to_coefficients)
+            self.basis[: p.size, : p.size] = to_values * (upper - lower)
+            self.origin[: p.size] = to_values @ lower
+        self._last: tuple[bytes, Look] | None = None
+
+    def unknowns(self, x: Array) -> Array:
+        """Return the unknowns of NLopt's variables."""
+        return np.asarray(self.origin + self.basis @ x)
+
+    def variables(self, y: Array) -> Array:
+        """Return NLopt's variables of unknowns."""
+        return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
+
+    def at(self, x: Array, with_slope: bool) -> Look:
+        """Evaluate `x`, a repeated point once; ends by NoMoreAnalyses or BelowTolerance."""
+        key = x.tobytes()
+        if self._last is not None and self._last[0] == key:
+            before = self._last[1]
+            if not with_slope or len(before.slope):
+                return before
+        look = self._fresh(x, with_slope)
+        self._last = (key, look)
+        return look
+
+    def _fresh(self, x: Array, with_slope: bool) -> Look:
+        y, none = self.unknowns(x), np.zeros(len(x) if with_slope else 0)
+        a, c = self.problem.unknowns.inequalities
+        finite = bool(np.isfinite(y).all())
+        positive = finite and bool((a @ y >= c - 10 * CONSTRAINT_TOLERANCE).all())
+        # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
+        if not finite or (self.flags and not positive):
+            return Look(self.bad, none, positive, False)
+        point = self._evaluate(y, with_slope and self.exact)
+        # What no test can show is no point to go to, however well it fits.
+        if point is None or not point.stable:
+            return Look(self.bad, none, positive, False)
+        if positive and (point.value < self.best.value or not self.best.stable):
+            self.best = point
+        if self.best.value < self.options.tolerance:
+            raise BelowTolerance
+        return Look(point.value, self._slope(point, x) if with_slope else none, positive, True)
+
+    def _evaluate(self, y: Array, with_jacobian: bool) -> Evaluation | None:
+        if self.problem.analyses >= self.options.max_analyses:
+            raise NoMoreAnalyses
+        return self.problem.evaluate(y, with_jacobian)
+
+    def _slope(self, point: Evaluation, x: Array) -> Array:
+        if point.jacobian is not None:
+            gradient = self.problem.blocks.gradient(point.residual, point.jacobian)
+            return np.asarray(gradient @ self.basis)
+        slope = np.zeros(len(x))
+        for i in range(len(x)):
+            other = x.copy()
+            other[i] += DIFFERENCE
+            beside = self._evaluate(self.unknowns(other), False)
+            # A neighbour that is no point leaves this direction alone rather than poison the step.
+            if beside is not None and beside.stable:
+                slope[i] = (beside.value - point.value) / DIFFERENCE
+        return slope
+
+
+def nlopt_minimise(
+    algorithm: int,
+    problem: FitProblem,
+    start: Array,
+    options: FitOptions,
+    first_step: float | None = None,
+) -> Optimum | None:
+    """Minimise e by NLopt's algorithm `algorithm`; None when the analysis at `start` fails.
+
+    Returns the best feasible, stable point that was seen, whatever NLopt itself says. first_step :
+    of each bound's width; NLopt's own unless given.
+    """
+    problem.warm_starts = False  # e has to be a function of the point alone
+    first = problem.evaluate(start, False)
+    if first is None:
+        return None
+    record = Record(problem, first, options)
+    optimiser = nlopt.opt(algorithm, len(start))
+
+    def objective(x: Array, gradient: Array) -> float:
+        look = record.at(x, gradient.size > 0)
+        if gradient.size:
+            gradient[:] = look.slope
+        return look.value
+
+    optimiser.set_min_objective(objective)
+    x = record.variables(start)
+    if record.flags:
+        size, (low, high) = problem.unknowns.size, problem.unknowns.nuisance.bounds
+        low, high = np.concatenate([np.zeros(size), low]), np.concatenate([np.ones(size), high])
+        x = np.clip(x, low, high)
+        optimiser.set_lower_bounds(low)
+        optimiser.set_upper_bounds(high)
+        _flag(optimiser, record)
+    else:
+        _constrain(optimiser, record)
+    optimiser.set_maxeval(options.max_analyses)
+    optimiser.set_ftol_rel(RELATIVE_E)
+    optimiser.set_xtol_rel(RELATIVE_X)
+    if first_step is not None:
+        optimiser.set_initial_step(first_step)
+    try:
+        optimiser.optimize(x)
+        status = f"nlopt {optimiser.last_optimize_result()}"
+    except BelowTolerance:
+        status = CONVERGED
+    except NoMoreAnalyses:
+        status = ANALYSES_USED_UP
+    except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
+        status = f"nlopt stopped: {type(error).__name__}"
+    return Optimum(record.best, status, problem.analyses)
+
+
+def _constrain(optimiser: nlopt.opt, record: Record) -> None:
+    a, c = record.problem.unknowns.inequalities
+    rows = a @ record.basis
+    limit = c - a @ record.origin
+
+    def linear(result: Array, x: Array, gradient: Array) -> None:
+        result[:] = limit - rows @ x
+        if gradient.size:
+            gradient[:] = -rows
+
+    optimiser.add_inequality_mconstraint(linear, np.full(len(rows), CONSTRAINT_TOLERANCE))
+
+
+def _flag(optimiser: nlopt.opt, record: Record) -> None:
+    """Add two flags without a slope: positive moduli, and an analysis that ends well (Eq. 4.9)."""
+
+    def flag(name: str, x: Array, gradient: Array) -> float:
+        gradient[:] = 0.0
+        return -1.0 if getattr(record.at(x, False), name) else 1.0
+
+    for name in ("positive", "analysed"):
+        optimiser.add_inequality_constraint(partial(flag, name), FLAG_TOLERANCE)
 
 
 class Slsqp:

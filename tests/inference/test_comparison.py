@@ -11,8 +11,7 @@ from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
 from bubblefit.inference.noise import DISCREPANCY, Noise, alike_in_all, notes_of_discrepancies
-from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.resampling import folds_of
+from bubblefit.inference.problem import FitProblem, folds_of
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh

@@ -23,7 +23,7 @@ from bubblefit.inference.likelihood import BOUND, Side
 from bubblefit.inference.linear import Order
 from bubblefit.inference.noise import Discrepancy, Misfit, NoiseTest, notes_of_discrepancies
 from bubblefit.inference.noise import notes_of_noise as notes_of_noise_tests
-from bubblefit.inference.resampling import Group, Unit
+from bubblefit.inference.problem import Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs.bootstrap import Bootstrap

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.fits import lines_of
-from bubblefit.cli.progress import FitsProgress
+from bubblefit.cli.progress import StudyProgress
 from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
@@ -371,7 +371,7 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
 
 
 def test_progress_counts_each_stage_and_forgets_the_other_meshs_objective(fitted):
-    progress = FitsProgress(2, quiet=True)
+    progress = StudyProgress(2, quiet=True)
     coarse, full = "starts on the coarse mesh", "distinct optima on the full mesh"
     for event, *said in (
         (Stage(coarse, 2), coarse, 0, 2, "no analysis yet"),
