@@ -21,7 +21,7 @@ NUMPY = re.compile(r"\bnp\.\w+\(|\barray\(|\[ ?-?\d+\.\d* +-?\d+\.\d*[\]\s]")
 def in_process(*arguments, cwd, code=0):
     """Run the command in this process; assert its exit code; return click's result.
 
-    That a new interpreter says the same: tests/cli/test_module.py.
+    That a new interpreter says the same: tests/cli/test_usage.py.
     """
     with contextlib.chdir(cwd):
         done = CliRunner().invoke(main, [str(a) for a in arguments])

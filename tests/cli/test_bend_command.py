@@ -1,9 +1,7 @@
 """`bubblefit bend` and `simulate bend` as a user runs them."""
 
-import hashlib
 import json
 import os
-import re
 from pathlib import Path
 
 import meshio
@@ -14,7 +12,6 @@ from bubblefit.cli import progress
 from bubblefit.experiments.cylinder import report as cylinder_report
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.project.project import read_project
 from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import registry
@@ -87,67 +84,39 @@ def test_the_files_of_a_study_agree(study, golden):
         rows = curves[(curves["test"] == key[0]) & (curves["card"] == key[1])]
         assert len(rows) == 25 and run["ended"] == "finished" and run["warnings"][0] == "made up"
         d, load = rows["deflection_mm"].to_numpy(), rows["load_N"].to_numpy()
-        assert (d[0], d[-1], load[0]) == (0.0, 240.0, 0.0)
         for place in (40, 100, 240):
             expected = pytest.approx(np.interp(place, d, load))
             assert run["load_N"][f"{place} mm"] == expected
             assert table.loc[key, f"load_at_{place}_mm_N"] == expected
-        rise = rows["gauge_pressure_kPa"].iloc[-1] - rows["gauge_pressure_kPa"].iloc[0]
-        assert run["pressure_rise_kPa"] == pytest.approx(rise)
         slope = np.polyfit(d[:3], load[:3], 1)[0]
         assert table.loc[key, "stiffness_N_per_mm"] == pytest.approx(slope)
-        assert run["knee"]["load_N"] == pytest.approx(table.loc[key, "knee_N"])
         amount = (rows["gauge_pressure_kPa"] + 101.0) * rows["volume_mm3"]
         np.testing.assert_allclose(amount, amount.iloc[0])
-        stem = "-".join([*key[0].replace(",", "").split(), key[1]])
-        assert (out / "beams" / f"{stem}.vtu").exists()
-    assert list(result["tests"]) == list(tests) and result["cards"] == list(cards)
-
-
-def test_errors_against_the_readings(study):
-    out, _ = study
-    table = pd.read_csv(out / "runs.csv")
-    readings = pd.read_csv(out / "measured.csv")
-    assert set(readings["test"]) == {"150 mm, 90 kPa"} and readings["repetitions"].max() == 2
-    curves = pd.read_csv(out / "load_deflection.csv")
-    for card in ("soft", "stiff"):
-        own = curves[(curves["test"] == "150 mm, 90 kPa") & (curves["card"] == card)]
-        row = table[(table["test"] == "150 mm, 90 kPa") & (table["card"] == card)].iloc[0]
+    assert set(pd.read_csv(out / "measured.csv")["test"]) == {tests[0]}
+    for card in cards:  # against the readings
+        own = curves[(curves["test"] == tests[0]) & (curves["card"] == card)]
         masses = np.arange(0.0, 30.1, 5.0)
         load = np.tile(9.80665 * masses, 2)
         way = np.concatenate([9.80665 * masses / 3.5 * s for s in (1.02, 0.98)])
         off = np.interp(way, own["deflection_mm"], own["load_N"]) - load
+        row = table.loc[tests[0], card]
         assert row["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2)))
         assert row["rms_relative"] == pytest.approx(row["rms_N"] / load.max())
-        assert row["compared"] == 14
-    assert table[table["test"] == "high"]["rms_N"].isna().all()
-    result = result_in(out)
+    assert table.loc["high", "rms_N"].isna().all()
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
 
 
-def test_the_folder_says_what_it_came_from(study):
+def test_the_record_the_page_and_the_beams(study):
     out, _ = study
-    assert result_in(out)["provenance"] == "provenance.json"
     record = json.loads((out / "provenance.json").read_text())
     (run,), (file,) = record["runs"], record["data"]
     project = out.parent / "project.toml"
     assert run["command_line"] == ["bubblefit", "bend", str(project), "--out", "out"]
-    assert file["sha256"] == hashlib.sha256((out.parent / "made-up.csv").read_bytes()).hexdigest()
     assert file["rows_used"] == 14
     assert file["rows_dropped"] == {"after the largest deflection": 2}
     assert file["units"]["load"] == "kg" and file["columns"]["load"] == "mass_kg"
-    again, own = read_project(out / "as-run.toml"), read_project(project)
-    for name, test in own.tests.items():
-        assert again.tests[name].settings() == test.settings()
-    for name, card in own.cards.items():
-        np.testing.assert_array_equal(again.cards[name].card.law.beta, card.card.law.beta)
     page = (out / "report.html").read_text()
     assert "The record: data files" in page and file["sha256"][:12] in page
-
-
-def test_the_page_and_the_pictures(study):
-    out, _ = study
-    page = (out / "report.html").read_text()
     for word in ("Against measured loads", "150 mm, 90", "4 of 4 runs", "made up"):
         assert word in page.replace("\u00a0", " "), word
     names = [f"{case}-{kind}.png" for case in ("150-mm-90-kPa", "high")
@@ -156,12 +125,6 @@ def test_the_page_and_the_pictures(study):
         # Loads are charts on the page, and pictures beside it.
         assert (f'title="figures/{name}"' in page) == ("load" not in name)
         assert (out / "figures" / name).read_bytes().startswith(b"\x89PNG")
-    charts = re.findall(r'"title":"([^"]+)","labels":\["deflection of the collar, mm"', page)
-    assert charts == ["150 mm, 90 kPa", "high"]
-
-
-def test_the_beam_for_paraview_is_whole_and_bent(study):
-    out, _ = study
     beam = meshio.read(out / "beams" / "high-stiff.vtu")
     assert beam.points[:, 0].min() == pytest.approx(-beam.points[:, 0].max())
     assert beam.points[:, 2].min() == pytest.approx(-beam.points[:, 2].max())

@@ -3,17 +3,18 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import SolverFailure
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..commands import in_process, result_in
-from ..drawings import check_convergence, data, legend, shown
+from ..commands import in_process, one_line, result_in
+from ..cylinder_cases import STUDIED_PROJECT
+from ..drawings import check_convergence, data, legend, named, shown
 from ..places import EXAMPLES, KNOWN
 from ..projects import project_file
 from ..published_laws import TABLE_4_2
@@ -90,17 +91,6 @@ def test_increments_of_strips(strips):
         assert max(model["rms_N"]["to_next_finer"]) < 1e-6 * model["rms_N"]["largest_load"]
 
 
-def test_a_level_that_fails_is_named_and_left_out(strips):
-    done = study("mesh", "--levels", 3, "--out", "out", cwd=strips)
-    result = result_in(strips / "out")
-    failed = [one for one in result["models"]["bias"]["levels"] if one["values"] is None]
-    assert failed and all("elongation" in level["failed"] for level in failed)
-    assert "failed: " in done
-    table = pd.read_csv(strips / "out/convergence.csv")
-    assert table.quantity.str.startswith("failed: ").sum() == len(failed)
-    assert all(level["values"] for level in result["models"]["warp"]["levels"])
-
-
 def test_nothing_that_ends_well_is_exit_code_4(bubble):
     card = MaterialCard(HypoelasticLaw(1000 * np.array([*TABLE_4_2[:11], -0.1])), 0.81)
     write_card(card, bubble / "bad.toml")
@@ -129,38 +119,6 @@ def test_nu12_of_a_bubble(bubble, drawn, golden):
         np.testing.assert_allclose(curve, [rows.nu12, rows.to_base], rtol=1e-5)
     golden("study-nu12", done, bubble)
     assert result["models"]["bubble"]["failed"] == {}
-
-
-def test_what_a_reader_should_know_is_said(bubble):
-    law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.05, 0.13, 0.13])
-    write_card(MaterialCard(law, 0.81), bubble / "card.toml")
-    for name, *options in (["nu12", "--nu12", 0.3], ["mesh", "--levels", 2]):
-        done = study(name, *options, "--out", name, cwd=bubble)
-        result = result_in(bubble / name)
-        told = [note for note in result["notes"] if note["kind"] == "beyond card range"]
-        assert told == result["notes"] and len(told) == 2
-        for note in told:
-            assert "beyond the card's valid range 0.050" in note["note"]
-            assert f"note: {note['of']}: {note['note']}" in done
-        table = pd.read_csv(bubble / name / "notes.csv")
-        assert table.to_dict("records") == told
-
-
-def test_a_nu12_that_fails_is_named_and_left_out(bubble, monkeypatch):
-    run = MembraneSolver.run
-
-    def picky(self, model, law, *args, **kwargs):
-        if law.nu12 > 0.4:
-            raise SolverFailure("no equilibrium at 186 kPa")
-        return run(self, model, law, *args, **kwargs)
-
-    monkeypatch.setattr(MembraneSolver, "run", picky)
-    done = study("nu12", "--out", "out", cwd=bubble)
-    assert "nu12 = 0.45: no equilibrium at 186 kPa" in done
-    model = result_in(bubble / "out")["models"]["bubble"]
-    assert model["failed"] == {"0.45": "no equilibrium at 186 kPa"}
-    assert model["responses"]["300 kPa"]["to_base"][-1] is None
-    study("nu12", "--out", "out", "--overwrite", "--nu12", 0.45, cwd=bubble, code=4)
 
 
 def test_chosen_values_of_nu12(strips):
@@ -210,3 +168,88 @@ def test_a_study_on_calculix(bubble, ccx):
     for pressure in both[0]:
         ratios = [b[pressure]["to_base"][0] for b in both]
         assert ratios[0] == pytest.approx(ratios[1], abs=2e-3)
+
+
+@pytest.fixture
+def cylinders(tmp_path):
+    path = tmp_path / "project.toml"
+    path.write_text(STUDIED_PROJECT)
+    return path
+
+
+def of_cylinders(name, *arguments, cwd, code=0):
+    return in_process("study", name, "project.toml", *arguments, cwd=cwd, code=code)
+
+
+def test_increments_of_a_cylinder_converge(cylinders, drawn):
+    run = ("mesh", "--card", "known", "--test", "narrow", "--what", "increments", "--levels", 3)
+    done = of_cylinders(*run, "--out", "out", cwd=cylinders.parent)
+    result = result_in(cylinders.parent / "out")
+    assert list(result["models"]) == ["narrow"] and result["card"] == "known"
+    found = result["models"]["narrow"]["quantities"]
+    # The mean of a modulus over an increment leaves next to nothing to the increments.
+    for quantity in found.values():
+        assert abs(quantity["own_error"]) < 2e-6
+    coarse, fine = result["models"]["narrow"]["rms_N"]["to_next_finer"]
+    assert coarse / fine == pytest.approx(4.0, abs=0.2)  # second order
+    # Sideways radius, volume, stiffness, load at 40 mm and RMS: each has its line.
+    table = pd.read_csv(cylinders.parent / "out/convergence.csv")
+    rms = result["models"]["narrow"]["rms_N"]
+    check_convergence(drawn[-1], table, "increments", rms)
+    names = {*found, "RMS along the load curve"}
+    assert {s.name for s in drawn[-1].charts[0].series[:-2]} == names
+    assert "load at 40 mm" in done.stdout
+
+
+def test_levels_without_a_quantity_are_left_out_of_it(cylinders, monkeypatch, drawn):
+    run = MembraneSolver.run
+
+    def tired(self, model, law, *args, **kwargs):
+        history = run(self, model, law, *args, **kwargs)
+        if len(model.increments) > len(model.deflections):
+            return history
+        return replace(
+            history, load=history.load[:4], displacement=history.displacement[:4],
+            remarks=("the run stopped early",),
+        )  # fmt: skip
+
+    monkeypatch.setattr(MembraneSolver, "run", tired)
+    run = ("mesh", "--card", "known", "--case", "narrow", "--what", "increments", "--levels", 2)
+    done = of_cylinders(*run, "--out", "out", cwd=cylinders.parent)
+    found = result_in(cylinders.parent / "out")["models"]["narrow"]
+    assert "load at 40 mm, N" not in found["levels"][0]["values"]
+    assert found["quantities"]["load at 40 mm, N"]["own_error"] is None
+    assert len(found["rms_N"]["to_next_finer"]) == 1
+    table = pd.read_csv(cylinders.parent / "out/convergence.csv")
+    assert (table.quantity == "load at 40 mm, N").sum() == 1
+    # Its name is there, and no point of it.
+    assert set(named(drawn[-1].charts[0])["load at 40 mm, N"].y) == {None}
+    assert "-" in done.stdout
+
+
+def test_nu12_of_all_cylinders(cylinders, drawn):
+    of_cylinders("nu12", "--card", "known", "--nu12", 0.4, "--out", "out", cwd=cylinders.parent)
+    models = result_in(cylinders.parent / "out")["models"]
+    assert list(models) == ["narrow", "wide"]
+    for model in models.values():
+        assert list(model["responses"]) == ["load at 40 mm, N"]
+    for axes, (name, model) in zip(drawn[-1].charts, models.items(), strict=True):
+        response = model["responses"]["load at 40 mm, N"]
+        wanted = [response["nu12"], response["to_base"]]
+        np.testing.assert_allclose(data(axes)[0], wanted, rtol=1e-5)
+        assert shown(axes)[::2] == ("nu12", name)
+    assert drawn[-1].charts[0].y_label == "load / that at nu12 = 0.24"
+
+
+def test_mistakes_end_in_one_line(cylinders):
+    for options, words in (
+        (["--card", "other"], "--card: there is no card (and no file) 'other'"),
+        (["--card", "known", "--test", "slim"], "--test: there is no test 'slim'"),
+        (["--card", "known", "--coarser", 3], "size: expected at most the radius"),
+        (["--card", "known", "--solver", "none"], "fit.solver (or --solver)"),
+    ):
+        one_line(of_cylinders("mesh", *options, cwd=cylinders.parent, code=2), words)
+        assert not (cylinders.parent / "out").exists()
+    cylinders.write_text(KNOWN.read_text())
+    done = of_cylinders("mesh", "--card", "x", "--test", "a", cwd=cylinders.parent, code=2)
+    one_line(done, "there is no")

@@ -1,11 +1,9 @@
 """`bubblefit uniaxial` and `simulate uniaxial` as a user runs them."""
 
-import hashlib
 import json
 import re
 import shutil
 
-import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
@@ -50,43 +48,27 @@ def test_the_files_of_a_study_agree(study, golden):
     errors = [t["rms_N"] for t in result["directions"].values()]
     assert result["e_uniaxial_N"] == pytest.approx(sum(errors))
     assert result["objective"] == pytest.approx(sum(errors), rel=1e-6)
-    assert result["objective"] == min(s["objective"] for s in result["starts"])
     # Every start ends there: start 1 once stopped at the border of a positive definite law.
     assert [s["objective"] for s in result["starts"]] == pytest.approx([result["objective"]] * 3)
-
     loads = pd.read_csv(out / "loads.csv")
     for direction, (start, end) in LENGTHS.items():
         test, rows = result["directions"][direction], loads[loads["direction"] == direction]
         assert (test["gauge_length_mm"], test["final_length_mm"]) == (start, end)
-        assert len(rows) == test["matched"] == 10
         off = rows["model_N"] - rows["polynomial_N"]
         assert np.sqrt((off**2).mean()) == pytest.approx(test["rms_N"], rel=1e-6)
-        assert rows["model_N"].iloc[-1] == pytest.approx(test["end_load_N"])
         assert rows["elongation_mm"].iloc[-1] == pytest.approx(end - start)
-        strain = rows["elongation_mm"] / start
-        np.testing.assert_allclose(rows["engineering_strain"], strain)
-
     card = read_card(out / "material.toml")
     np.testing.assert_allclose(card.law.beta, 1e3 * np.array(result["beta"]["values"]), rtol=1e-9)
-    assert card.thickness == 0.81 and "strips" in card.source
     # Page, card and result.json say the same ends, whatever the corners of the grips reached.
     ends = result["valid_strain"]
     assert card.law.strain_range.tolist() == pytest.approx(list(ends.values()))
     assert result["strain_reached"]["warp"] > 1.5 * ends["warp"]
-
     history = pd.read_csv(out / "history.csv")
     assert len(history) == result["analyses"]
-    first = ["start", "analysis", "solver", "mesh", "objective", "status"]
-    assert list(history.columns[:6]) == first
     assert list(history.columns[6:]) == [f"beta_{i}_GPa" for i in range(12)]
     for start in result["starts"]:
         rows = history[history["start"] == start["start"]]
         assert rows["objective"].min() == pytest.approx(start["objective"], rel=1e-6)
-    best = history.loc[history["objective"].idxmin()]
-    np.testing.assert_allclose(
-        best[history.columns[6:]].astype(float), result["beta"]["values"], rtol=1e-2
-    )
-
     page = (out / "report.html").read_text()
     figures = re.findall(r'title="([^"]+\.png)"', page)
     drawn = {p.name for p in out.glob("*.png")}
@@ -99,8 +81,6 @@ def test_the_files_of_a_study_agree(study, golden):
         assert f"<td>{name}</td><td>{end:.4g}</td>" in page
     said = page[: page.index("How to cite")] + text
     assert not re.search("thesis|Eq\\.|Fig\\.", said)
-    for test in result["directions"].values():
-        assert f"{test['rms_N']:.3g}" in page and f"{test['rms_N']:.3g}" in text
     assert (out / "bias.vtu").exists() and not list(out.glob("*.part"))
 
 
@@ -116,29 +96,20 @@ def test_json_fail_above_and_overwrite(study, tmp_path):
 
 WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
 RANGE = ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.153, 0.232, 0.883]")
-#: What is changed, and how --resume names it.
-OTHER_STUDIES = {
-    "weights": ("fill = 1.0", "fill = 2.0", "strips.weights.fill = 1.0, now 2.0"),
-    "increments": ("increments = 10", "increments = 11", "strips.increments = 10, now 11"),
-    "gauge": (
-        "gauge_length = 22.78",
-        "gauge_length = 22.7",
-        "strips.fill.gauge_length = 22.78, now 22.7",
-    ),
-    "width": ("width = 25.0", "width = 24.0", "strips.width = 25.0, now 24.0"),
-    "objective": (
-        'objective = "N"',
-        'objective = "relative"',
-        'strips.objective = "N", now "relative"',
-    ),
-    "bounds": ("E1 = [0.02, 2.0]", "E1 = [0.03, 2.0]", "law.bounds.E1[0] = 0.02, now 0.03"),
-    "final length": (
-        "final_length = 30.734",
-        "final_length = 31.0",
-        "strips.bias.final_length = 30.734, now 31.0",
-    ),
-    "data": None,
-}
+
+
+def test_another_study_is_not_resumed(of_points, tmp_path):
+    """Of the same project, on other data."""
+    shutil.copytree(of_points / "out", tmp_path / "out")
+    write_points(tmp_path / "points.csv", factor=1.01)
+    run = ("uniaxial", small(tmp_path, *POINTS, RANGE, WIDER), "--out", "out", "--starts", 1)
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    done = quick(*run, "--resume", cwd=tmp_path, code=2)
+    one_line(done, "--overwrite", "run.json: parts", "data file points.csv of 'strips' (sha256 ")
+    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
+    command = ["bubblefit", "uniaxial", str(of_points / "project.toml"), "--out", "out"]
+    (run,) = json.loads((of_points / "out" / "provenance.json").read_text())["runs"]
+    assert run["command_line"] == [*command, "--starts", "1"]
 
 
 @pytest.fixture(scope="module")
@@ -180,46 +151,6 @@ POINTS = (
         + "[strips.weights]",
     ),
 )
-
-
-@pytest.mark.parametrize("what", OTHER_STUDIES)
-def test_another_study_is_not_resumed(of_points, tmp_path, what):
-    shutil.copytree(of_points / "out", tmp_path / "out")
-    shutil.copy(of_points / "points.csv", tmp_path)
-    changes, said = [*POINTS, RANGE, WIDER], "data file points.csv of 'strips' (sha256 "
-    if what == "data":
-        write_points(tmp_path / "points.csv", factor=1.01)
-    else:
-        *change, said = OTHER_STUDIES[what]
-        changes.append(change)
-    arguments = ("uniaxial", small(tmp_path, *changes), "--out", "out", "--starts", 1, "--resume")
-    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
-    done = quick(*arguments, cwd=tmp_path, code=2)
-    one_line(done, "--overwrite", f"run.json: parts: these results are of something else: {said}")
-    assert done.stderr.count(", now ") == 1
-    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
-
-
-def test_the_folder_says_what_it_came_from(of_points, tmp_path):
-    out = of_points / "out"
-    assert result_in(out)["provenance"] == "provenance.json"
-    record = json.loads((out / "provenance.json").read_text())
-    (run,) = record["runs"]
-    command = ["bubblefit", "uniaxial", str(of_points / "project.toml"), "--out", "out"]
-    assert run["command_line"] == [*command, "--starts", "1"]
-    (file,) = record["data"]
-    assert file["sha256"] == hashlib.sha256((of_points / "points.csv").read_bytes()).hexdigest()
-    assert file["rows_used"] == 30 and file["rows_dropped"] == {}
-    page = (out / "report.html").read_text()
-    for words in ("The record", "The record: data files", file["sha256"][:12], run["date"]):
-        assert words in page, words
-    # The project as run goes on with this very fit, from another place and without an option.
-    shutil.copytree(out, tmp_path / "out")
-    again = bf.read_project(tmp_path / "out" / "as-run.toml")
-    fit = bf.fit(again, out=tmp_path / "out", resume=True)
-    runs = json.loads((tmp_path / "out/provenance.json").read_text())["runs"]
-    assert [run["command_line"] for run in runs] == [record["runs"][0]["command_line"], None]
-    assert fit.result["beta"] == result_in(out)["beta"]
 
 
 def test_a_study_of_points_finds_what_made_them(of_points):
@@ -357,54 +288,11 @@ def test_simulate_two_cards(study, tmp_path, golden):
     one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
 
 
-def test_simulate_within_the_range_of_the_card(study, tmp_path):
-    folder, _ = study
-    law = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2])
-    options = ("--card", card(tmp_path, "short", law), "--within-range", "--out", "sim")
-    quick("simulate", "uniaxial", folder / "project.toml", *options, cwd=tmp_path)
-    (found,) = result_in(tmp_path / "sim")["cards"].values()
-    assert found["e_uniaxial_N"] is None
-    for direction, end in (("warp", 0.08), ("fill", 0.1)):
-        shown, start = found["directions"][direction]["shown_to_mm"], LENGTHS[direction][0]
-        step = (LENGTHS[direction][1] - start) / 10
-        assert shown <= start * np.expm1(end) < shown + step
-    assert 0 < found["directions"]["bias"]["shown_to_mm"] < 5
-    notes = result_in(tmp_path / "sim")["notes"]
-    assert any(n["of"].endswith("warp") and n["kind"] == "beyond card range" for n in notes)
-
-
-def test_simulate_a_card_that_fails_on_a_strip(study, tmp_path):
-    folder, _ = study
-    beta = np.zeros(12)
-    beta[[3, 7, 10, 11]] = 20.0, 220.0, -5000.0, 300.0  # E1 negative beyond a strain of 0.06
-    failing = card(tmp_path, "brittle", HypoelasticLaw(beta))
-    good = card(tmp_path, "good", HypoelasticLaw.linear(500.0, 200.0, 20.0))
-    run = ("simulate", "uniaxial", folder / "project.toml", "--out", "sim")
-    done = quick(*run, "--card", failing, "--card", good, cwd=tmp_path)
-    assert "warp failed" in done.stdout and "no equilibrium" in done.stdout
-    brittle, fine = result_in(tmp_path / "sim")["cards"].values()
-    assert "failed" in brittle["directions"]["warp"] and brittle["e_uniaxial_N"] is None
-    assert brittle["directions"]["fill"]["rms_N"] > 0 and fine["e_uniaxial_N"] > 0
-    loads = pd.read_csv(tmp_path / "sim/loads.csv")
-    assert set(loads[loads["card"] == "good"]["direction"]) == set(LENGTHS)
-    assert "warp" not in set(loads[loads["card"] == "brittle"]["direction"])
-
+def test_simulate_a_card_that_fails_or_is_not_there(tmp_path):
+    run = ("simulate", "uniaxial", small(tmp_path), "--out", "sim", "--card")
     hopeless = card(tmp_path, "hopeless", HypoelasticLaw.linear(300.0, 220.0, -5.0))
-    done = quick(*run, "--card", hopeless, "--overwrite", cwd=tmp_path, code=4)
-    one_line(done, "no equilibrium")
-    bad = quick(*run, "--card", "none.toml", "--overwrite", cwd=tmp_path, code=2)
-    one_line(bad, "none.toml")
-    twice = quick(*run, "--card", good, "--card", good, "--overwrite", cwd=tmp_path)
-    assert len(result_in(tmp_path / "sim")["cards"]) == 2, twice.stdout
-
-
-def test_simulate_without_data(tmp_path):
-    law = card(tmp_path, "some", HypoelasticLaw.linear(500.0, 200.0, 20.0))
-    run = ("uniaxial", small(tmp_path, *POINTS), "--card", law, "--out", "sim")
-    quick("simulate", *run, cwd=tmp_path)
-    (found,) = result_in(tmp_path / "sim")["cards"].values()
-    assert found["e_uniaxial_N"] is None
-    assert all(t["rms_N"] is None and t["end_load_N"] > 0 for t in found["directions"].values())
+    one_line(quick(*run, hopeless, cwd=tmp_path, code=4), "no equilibrium")
+    one_line(quick(*run, "none.toml", cwd=tmp_path, code=2), "none.toml")
 
 
 def test_strips_fitted_by_calculix(ccx, tmp_path):
