@@ -208,10 +208,6 @@ def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-#: Quantities that a frame must hold; its displacements, where it has any, are added.
-PLACES = ("x", "y", "z")
-
-
 @group("dic", 'bubblefit dic sphere "ball/*.csv" --radius 50.02')
 def dic_command() -> None:
     """Test the camera of an image correlation itself."""
@@ -242,7 +238,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         for target in (out, out.with_suffix(".png")):
             check_out(target, files, options["overwrite"])
     with _naming_options():
-        read = _frames(files, options, PLACES, planar=False)
+        read = _frames(files, options, ("x", "y", "z"), planar=False)
     names = [frame.path.name if frame.path else "" for frame in read]
     if len(read) > len(files):
         names = [f"{name}, frame {k + 1}" for k, name in enumerate(names)]
@@ -307,10 +303,6 @@ def _sphere_lines(result: dict[str, Any]) -> list[str]:
 dic_command.add_command(dic_sphere)
 
 
-#: --paths of five ratios: whether the strains of unloaded yarns are used.
-UNLOADED = {"8": False, "10": True}
-
-
 @command(
     "biaxial",
     "bubblefit biaxial project.toml",
@@ -319,7 +311,7 @@ UNLOADED = {"8": False, "10": True}
 )
 @given.PROJECT
 @given.TESTS
-@click.option("--paths", type=click.Choice(list(UNLOADED)), default="8", show_default=True,
+@click.option("--paths", type=click.Choice(["8", "10"]), default="8", show_default=True,
               help="Of five ratios: 10 with the strains of unloaded yarns, 8 without.")  # fmt: skip
 @click.option("--reciprocal/--free", default=True, show_default=True,
               help="Require nu_warp / E_fill = nu_fill / E_warp, or not.")  # fmt: skip
@@ -340,7 +332,7 @@ def biaxial_command(**options: Any) -> None:
     read = read_project(options["project"], given.data_folders(options["data"]))
     chosen = read.chosen(list(options["tests"]) or "biaxial", fitted=True)
     ratios = tuple(map(plain_ratio, options["ratios"]))
-    unloaded = UNLOADED[options["paths"]]
+    unloaded = options["paths"] == "10"  # whether their strains are used
     asked = Options(unloaded, options["reciprocal"], options["minimise"], ratios)
     evaluations = [evaluate_test(test, asked) for test in chosen if isinstance(test, BiaxialTest)]
     folder = given.result_folder(options, "biaxial")

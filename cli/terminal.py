@@ -52,12 +52,6 @@ def examples(*lines: str) -> str:
     return f"\b\n{HEAD}\n{typed}"
 
 
-def examples_in(epilog: str | None) -> list[str]:
-    """Return the lines of an epilog that `examples` wrote."""
-    _, head, typed = (epilog or "").partition(f"{HEAD}\n")
-    return [line.strip() for line in typed.splitlines() if line.strip()] if head else []
-
-
 INTERRUPTED = 130
 WORSE = 1  # exit code of --fail-above
 
@@ -185,18 +179,6 @@ class Suggesting(click.Group):
         return super().resolve_command(ctx, args)
 
 
-def every_command(group: click.Group) -> Iterator[tuple[tuple[str, ...], click.Command]]:
-    """Yield every command below a group, groups included, with the words that are typed."""
-    ctx = click.Context(group)
-    for name in group.list_commands(ctx):
-        command = group.get_command(ctx, name)
-        assert command is not None
-        yield (name,), command
-        if isinstance(command, click.Group):
-            for path, below in every_command(command):
-                yield (name, *path), below
-
-
 # --events: one JSON object a line, as it happens
 #
 #   {"event": "begin", "seconds": 0.0, "command": "bubblefit fit", "version": "0.2.0"}
@@ -205,8 +187,7 @@ def every_command(group: click.Group) -> Iterator[tuple[tuple[str, ...], click.C
 #
 # The last line is always an end, unless the process was killed. The file may be a pipe.
 
-#: Seconds between two lines of progress that report the same count.
-EVERY_S = 1.0
+EVERY_S = 1.0  # seconds between two lines of progress that report the same count
 
 
 class Events:
@@ -268,8 +249,7 @@ def _begin(ctx: click.Context, _: click.Parameter, path: Path | None) -> None:
 LOGGER = logging.getLogger("bubblefit")
 WARNING = logging.Formatter("warning: %(message)s")
 TIMED = logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S")
-#: Help of --verbose.
-VERBOSE = "Report each analysis, solver files and times, on stderr."
+VERBOSE = "Report each analysis, solver files and times, on stderr."  # help of --verbose
 
 
 class Stderr(logging.Handler):

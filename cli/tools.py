@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError, rows
+from ..errors import InputError, OutputError, SolverFailure, rows
 from ..files import replacing
 from ..materials.card import read_card
 from ..materials.exports.base import Export, Option, options_of
@@ -113,16 +113,9 @@ def _seconds(text: str) -> float:
     return float(found[1]) * SECONDS[found[2]]
 
 
-UNUSABLE = 4  # exit code
-
-
 #: An option for each solver that has a program, to test that program.
 _programs = with_options(
-    *(
-        click.option(f"--{one.name}", metavar=one.metavar, help=one.look)
-        for one in command_line()
-        if one.look
-    )
+    *(click.option(f"--{o.name}", metavar=o.metavar, help=o.look) for o in command_line() if o.look)
 )
 
 
@@ -155,7 +148,7 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
         if not any(one.name == "calculix" and one.usable for one in found):
             click.echo("Fits work without CalculiX; it is the reference to check them against.")
     if not good:
-        sys.exit(UNUSABLE)
+        sys.exit(SolverFailure.exit_code)
 
 
 def _solver_line(one: Diagnosis) -> str:

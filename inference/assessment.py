@@ -73,8 +73,7 @@ class Certainty:
 
     @property
     def reported(self) -> Posterior | None:
-        """Return the posterior of the reported law: of ever finer meshes where their error is taken
-        out."""
+        """Return the posterior of the reported law: `fine` where the mesh error is taken out."""
         return self.fine if self.taken_out else self.posterior
 
     @property
@@ -91,8 +90,7 @@ class Certainty:
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """Return `count` random laws that data and mesh allow, within the bounds of the fit.
-        Raises ValueError where there is no posterior (a certainty made by hand)."""
+        """Return `count` random laws that data and mesh allow; ValueError without a posterior."""
         known = self.fine or self.posterior
         if known is None:
             raise ValueError("this certainty has no posterior to draw laws from")
@@ -192,10 +190,8 @@ def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) 
 
 #: Of the width of the bounds: as uncertain as a number that may be anywhere between them.
 ANYWHERE = 12**-0.5
-#: Of a prior: the data add next to nothing to it.
-AS_BEFORE = 0.9
-#: Correlations that are worth saying.
-CORRELATED = 0.5
+AS_BEFORE = 0.9  # of a prior: the data add next to nothing to it
+CORRELATED = 0.5  # correlations that are worth saying
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,7 @@ class Nuisance:
 
 @dataclass(frozen=True, eq=False)
 class NuisanceOf:
-    """The nuisance of all comparisons of a fit: shared unknowns, then comparison by comparison.
-    comparisons : by name, in their order; those without nuisance are named too."""
+    """The nuisance of all comparisons, by name: shared unknowns, then comparison by comparison."""
 
     comparisons: Mapping[str, tuple[Nuisance, ...]] = field(default_factory=dict)
 
@@ -102,9 +101,7 @@ class NuisanceOf:
         return dict(zip((n.name for n in own), values, strict=True))
 
     def of_law(self, all_values: Array) -> dict[str, float]:
-        """Return the unknown numbers of the law by name from the values of all.
-        They are clipped to their bounds, which a step keeps but for rounding: a law may end there.
-        """
+        """Return the unknown numbers of the law by name, clipped to their bounds (steps round)."""
         return {
             n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
             for k, n in enumerate(self.shared)
@@ -112,8 +109,7 @@ class NuisanceOf:
         }
 
 
-#: Largest predicted change of displacement, relative, for a warm start.
-NEAR = 0.02
+NEAR = 0.02  # largest predicted change of displacement, relative, for a warm start
 
 
 #: Where the noise of an objective's data is from: the project says it, it is the scatter of the
@@ -203,8 +199,7 @@ class Comparison:
         self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
     ) -> tuple[History, Array]:
         """Run with derivatives and keep the path for a warm start; arguments as for `run`.
-        Returns the history and the slope of the residual (m, free + nuisance) by the entries of
-        beta, then by the nuisance of this comparison in their units."""
+        Returns also the slope of the residual (m, free + nuisance of this comparison)."""
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
         values = self._model_values(nuisance)
@@ -227,8 +222,7 @@ class Comparison:
         }
 
     def _model(self, values: Mapping[str, float]) -> Any:
-        """Return the model with its parameters at `values`; raise SolverFailure where there is
-        none."""
+        """Return the model with its parameters at `values`; SolverFailure where there is none."""
         if not values:
             return self.model
         try:

@@ -1,9 +1,7 @@
 """Levenberg-Marquardt with linear inequalities: each step is a small convex QP.
 
-Damping is scaled by diag(J'J) (Marquardt), modulus values at control strains are the unknowns,
-positivity and bounds the constraints, so every iterate is feasible; and every iterate is a stable
-equilibrium (Eq. 4.9's "analysis ends well"): a soft membrane can fold, and what no test under
-pressure can show must not lead the fit astray.
+Damping is scaled by diag(J'J) (Marquardt), positivity and bounds are constraints, so every iterate
+is feasible, and a stable equilibrium: a soft membrane can fold, as no test under pressure can show.
 """
 
 import numpy as np
@@ -91,8 +89,8 @@ def descend(
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
     """Return an inequality that keeps the next step half as far from the largest drop in shear.
-    A membrane loses its stability in shear: a refused step shows where that modulus was too low,
-    and the fit can slide along that border. None when it did not drop."""
+    A membrane loses its stability in shear, and the fit can slide along that border. None without
+    one."""
     rows = problem.unknowns.stability_rows
     before, after = rows @ stable, rows @ unstable
     drop = (before - after) / before

@@ -1,11 +1,9 @@
 """Profile likelihood of a number that is linear in the unknowns of a fit, as a modulus is.
 
-The number is held at values ever farther from its best, and the others are fitted anew each time.
-The growth of the weighted sum of squares, divided by that over a likelihood of the noise
-(`Linear.spread_over_curvature`), is -2 log of the likelihood ratio: to first order it passes a
-level just where the fit's own posterior does. Beyond that it shows curvature: ends that lie
-unevenly about the best, or that do not exist.
-"""
+The number is held at values ever farther from its best, the others are fitted anew. The growth of
+the weighted sum of squares, divided by `Linear.spread_over_curvature`, is -2 log of the likelihood
+ratio: to first order it passes a level where the fit's own posterior does; beyond that it shows
+curvature, ends that lie unevenly about the best, or that do not exist."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,19 +20,15 @@ from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
-THRESHOLD = float(2 * gammaincinv(0.5, LEVEL))  # chi-square of one degree
-#: Roots of -2 log L from place to place, and places of a side.
-STEP, MOST_PLACES = 0.5, 16
+THRESHOLD = float(2 * gammaincinv(0.5, LEVEL))
+STEP, MOST_PLACES = 0.5, 16  # roots of -2 log L from place to place, and places of a side
 #: From one step to the next; a step that fails is halved so many times.
 MOST_GROWTH, HALVINGS = 3.0, 4
 #: Of -2 log L: what one more step would bring, which is not worth an analysis; analyses of a place.
 SETTLED, MOST_ANALYSES = 0.02, 5
-#: Of the way to the bounds, at most, for the first step.
-FIRST = 0.25
+FIRST = 0.25  # of the way to the bounds, at most, for the first step
 #: How a side ends that does not pass the threshold.
-BOUND = "bound"
-FAILED = "no analysis"
-FAR = "too many steps"
+BOUND, FAILED, FAR = "bound", "no analysis", "too many steps"
 
 
 def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
@@ -47,9 +41,7 @@ def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
 
 @dataclass(frozen=True)
 class Side:
-    """A profile to one side of the best.
-    values : MPa, from the best on; ratios : -2 log L there. why : BOUND, FAILED or FAR where the
-    threshold is not passed, else ""."""
+    """A profile to one side of the best: MPa from there on, and -2 log L; `why` it ends early."""
 
     values: tuple[float, ...]
     ratios: tuple[float, ...]
@@ -58,8 +50,7 @@ class Side:
 
     @property
     def end(self) -> float | None:
-        """Return the value at the threshold, by a monotone curve of the root; None where not
-        passed."""
+        """Return the value at the threshold, by a monotone curve of the root; None without."""
         if self.why:
             return None
         values = np.array(self.values)
@@ -135,8 +126,8 @@ def _next(values: list[float], ratios: list[float]) -> float:
 def fitted_at(
     problem: FitProblem, point: Evaluation, row: Array, target: float
 ) -> Evaluation | None:
-    """Fit with row @ unknowns held at the target, from a neighbour's optimum.
-    None where the analyses do not end well, in a stable equilibrium."""
+    """Fit with row @ unknowns held at the target, from a neighbour's optimum; None where that
+    fails."""
     a, c = problem.unknowns.inequalities
     limit = problem.analyses + MOST_ANALYSES
     y, (curvature, gradient) = point.unknowns, _squares(point)

@@ -23,14 +23,11 @@ from .posterior import Posterior
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
-#: Kinds of notes that are made here.
-SECOND_ORDER = NoteKind("second order")
+SECOND_ORDER = NoteKind("second order")  # kinds of notes that are made here
 
 
-#: Of the largest curvature of the misfit: below, the data say nothing of a direction.
-FLAT = 1e-13
-#: Of the largest norm of a block: smaller ones weigh no more than this one does.
-SMALLEST = 1e-6
+FLAT = 1e-13  # of the largest curvature of the misfit: below, the data say nothing of a direction
+SMALLEST = 1e-6  # of the largest norm of a block: smaller ones weigh no more than this one does
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +87,10 @@ class Linear:
         return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
 
     def spread_over_curvature(self, row: Array) -> float:
-        """Return the variance of row @ unknowns over that of weighted squares of noise one.
-        By so much a weighted sum of squares grows too fast along it for a likelihood ratio (J. T.
-        Kent, Robust properties of likelihood ratio tests, Biometrika 69, 1982). NaN where the data
-        say nothing of it."""
+        """Return the variance of row @ unknowns over that of weighted squares of noise one (or
+        NaN).
+        So much too fast these grow along it for a likelihood ratio (J. T. Kent, Robust properties
+        of likelihood ratio tests, Biometrika 69, 1982)."""
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
         curved = float(along**2 @ (1.0 / self.curvature))
@@ -117,10 +114,8 @@ def sizes_of(unknowns: Unknowns, best: Array) -> Array:
     return np.concatenate([np.maximum(law, 1e-3), np.maximum(upper - lower, 1e-3)])
 
 
-#: Strains at which a modulus is looked at.
-POINTS = 61
-#: Relative uncertainty of a modulus of which nothing is known.
-PRIOR = 10.0
+POINTS = 61  # strains at which a modulus is looked at
+PRIOR = 10.0  # relative uncertainty of a modulus of which nothing is known
 #: Of the step to the limit of finer models, what may be left of it (one standard deviation): with
 #: data without noise, a mesh of 432 quads leaves 6 to 12 % of what it moves the moduli by
 #: (benchmarks/bench_bands.py bias).
@@ -179,14 +174,12 @@ def along(
 
 #: Times the noise of the data that is left of a comparison, from which on it is looked at.
 LARGE = 2.0
-#: Directions that are looked at, an analysis each.
-MOST = 8
+MOST = 8  # directions that are looked at, an analysis each
 #: Of a step, in standard deviations; its least and largest size, relative to the unknowns.
 STEP, LEAST_STEP, LARGEST_STEP = 0.5, 1e-3, 0.05
 #: Curvature that must be left of that of the first derivatives, for the sum to be taken for it.
 LEFT_SECOND_ORDER = 0.05
-#: Change of a modulus' sigma, relative, that is worth telling, and taking.
-WORTH = 0.1
+WORTH = 0.1  # change of a modulus' sigma, relative, that is worth telling, and taking
 NOT_DEFINITE = "not positive definite"
 TOO_LITTLE = "too little changes"
 
@@ -220,13 +213,13 @@ class Order:
         changes = ", ".join(f"{name} {100 * by:+.0f} %" for name, by in self.change.items())
         if self.used:
             return f"second order: 1 sigma against that of the first derivatives: {changes}"
-        if self.why == NOT_DEFINITE:
-            return (
-                "first order, although much is left of the residual: to second order the optimum "
-                "is no minimum along some direction, and 1 sigma may be far too small (a profile "
-                "likelihood tells)"
-            )
-        return f"first order: the second would change 1 sigma by {changes}"
+        if self.why != NOT_DEFINITE:
+            return f"first order: the second would change 1 sigma by {changes}"
+        return (
+            "first order, although much is left of the residual: to second order the optimum is no "
+            "minimum along some direction, and 1 sigma may be far too small (a profile likelihood "
+            "tells)"
+        )
 
     @property
     def notes(self) -> list[Note]:
@@ -300,8 +293,7 @@ def _beside(problem: FitProblem, best: Evaluation, step: Array) -> tuple[Evaluat
     return None, 1.0
 
 
-#: Of the width of the bounds of a nuisance: less is none.
-LEAST_WIDTH = 1e-3
+LEAST_WIDTH = 1e-3  # of the width of the bounds of a nuisance: less is none
 
 
 def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance] = ()) -> Array:
@@ -325,8 +317,7 @@ def information(slopes: Array, sigma: Array | float, nuisance: Sequence[Nuisance
 def information_of(
     comparison: Comparison, law: HypoelasticLaw, unknowns: Unknowns
 ) -> tuple[Array, History]:
-    """Return the information (n, n) of a comparison run with a law, nuisance at zero, and the run.
-    Raises SolverFailure where it does not end well, or its solver gives no derivatives."""
+    """Return the information (n, n) of a comparison run with a law, and the run."""
     at_zero = {n.name: 0.0 for n in comparison.nuisance}
     history, slope = comparison.differentiate(law, unknowns.free, at_zero, warm=False)
     slope = slope * comparison.objective.scale[:, None]
@@ -346,9 +337,8 @@ class LawQuery:
     ends: Array
 
     def sigma(self, known: Array) -> dict[str, Array]:
-        """Return the 1-sigma relative uncertainty (n,) of each modulus from information.
-        Before any test each unknown of the law is known to 1000 % of itself, so that a modulus of
-        which the tests say nothing comes out as unknown."""
+        """Return the 1-sigma relative uncertainty (n,) of each modulus, from information and
+        `PRIOR`."""
         count = len(known)
         sizes = PRIOR * sizes_of(self.unknowns, self.y)[:count]
         scaled = known * sizes[:, None] * sizes + np.eye(count)
@@ -364,8 +354,7 @@ def summary(sigma: Mapping[str, Array]) -> dict[str, float]:
 def residual_of(
     problem: FitProblem, comparisons: Sequence[Comparison], best: Evaluation, law: HypoelasticLaw
 ) -> Array:
-    """Return (m,) the residual of other models at the best unknowns, in the problem's rows.
-    Raises SolverFailure where a model does not run, or its residual is of other rows."""
+    """Return (m,) the residual of other models at the best unknowns; raises SolverFailure."""
     unknowns, parts = problem.unknowns, []
     for comparison in comparisons:
         nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
@@ -381,8 +370,8 @@ def residual_of(
 @dataclass(frozen=True, eq=False)
 class Limit:
     """The limit of ever finer models.
-    step : (unknowns,) from the best unknowns to theirs. residual : (m,) that they would leave.
-    error : (m,) of the residual at the best unknowns."""
+    step : (unknowns,) from the best ones. residual : (m,) left there. error : (m,) at the best
+    ones."""
 
     step: Array
     residual: Array
@@ -391,9 +380,8 @@ class Limit:
 
 def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float) -> Limit | None:
     """Return the optimum of the limit of finer models to first order; None if the QP has no answer.
-    A model of second order is off by c h^2; one refinement by k gives c h^2 (1 - 1/k^2), so all of
-    it. finer : (m,) residual of models finer by `factor`, at the same unknowns. What the weights of
-    the blocks would change without any error is no part of the step."""
+    One refinement by k of a model of second order gives c h^2 (1 - 1/k^2), so all of the error.
+    finer : (m,) residual of models finer by `factor`, at the same unknowns."""
     assert best.jacobian is not None
     error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
     blocks = problem.blocks

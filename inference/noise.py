@@ -33,14 +33,12 @@ BELOW_NOISE = NoteKind("below the noise")
 DISCREPANCY = NoteKind("wrong form", weight=15)
 
 
-#: Rings around a point that others are compared with, unless given.
-RINGS = 60
+RINGS = 60  # rings around a point that others are compared with, unless given
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
 #: Standard deviations of a correlation of independent values, which are no correlation.
 BY_CHANCE = 2.0
-#: Of the largest extent: beyond, there are no neighbours any more, unless given.
-REACH = 0.5
+REACH = 0.5  # of the largest extent: beyond, there are no neighbours any more, unless given
 
 
 def alike_in(objective: Objective, residual: Array) -> float:
@@ -56,8 +54,8 @@ def alike(
     residuals: Sequence[Array], places: Sequence[Array], reach: float = REACH, rings: int = RINGS
 ) -> float:
     """Return the number of values that err as one, 1 where they are independent.
-    residuals : blocks (n,), each of one quantity in one frame; they count alike. places : (n, 2) mm
-    or (n, 1) of each. reach : of the largest extent, where neighbours end. rings : of distances."""
+    residuals : blocks (n,), which count alike. places : (n, 2) mm or (n, 1) of each. reach : of the
+    largest extent, where neighbours end. rings : of distances."""
     from scipy.spatial.distance import cdist
 
     products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
@@ -131,9 +129,8 @@ class Noise:
     @classmethod
     def of(cls, problem: FitProblem, residual: Array) -> Noise:
         """Return the noise from a residual (m,), at least the objective's least noise.
-        Neighbours that err as one count as one; a misfit below the noise does not show them, and is
-        taken for white unless the objective knows better (`alike`, of the specimens of a load
-        curve)."""
+        Neighbours that err as one count as one; a misfit below the noise is taken for white unless
+        the objective knows better (`alike`, of the specimens of a load curve)."""
         scale = problem.scale
         level, together = {}, {}
         rows, least = np.empty_like(scale), np.empty_like(scale)
@@ -153,8 +150,7 @@ class Noise:
 
 #: Degree of the polynomials that are smooth over the whole sheet, and of the next ones.
 SMOOTH, NEXT = 4, 8
-#: Of so many fits in which nothing but noise is left, one is said to leave more.
-FALSE_ALARMS = 0.01
+FALSE_ALARMS = 0.01  # of so many fits in which nothing but noise is left, one is said to leave more
 #: Values of a block for every shape that is looked at, at least; blocks that are asked how many
 #: values err as one.
 LEAST_VALUES, FEW = 2, 3
@@ -217,8 +213,7 @@ def discrepancy(
     unit: str,
 ) -> Discrepancy | None:
     """Return the discrepancy of blocks (n,) at places (n, 2) mm; None where values are too few.
-    Blocks count alike. A block's doubt is taken off its power in the smooth shapes. `unknowns` of
-    the fit have taken as many smooth shapes out of the residual."""
+    Doubt is taken off the smooth shapes; `unknowns` have taken as many out of the residual."""
     usable = [
         (block, doubt, at)
         for block, doubt, at in zip(blocks, doubts, places, strict=True)
@@ -296,8 +291,7 @@ def _words(one: Discrepancy) -> str:
 
 #: Shapes that are tested, at most, and degrees of polynomials among which they are found.
 SHAPES, DEGREES = 2, 8
-#: Of the whole curve, that a specimen must cover to count.
-COVERED = 0.8
+COVERED = 0.8  # of the whole curve, that a specimen must cover to count
 #: Of the largest singular value: below, a slope says nothing of its own; of a shape, likewise.
 NOTHING, LEFT = 1e-6, 1e-3
 
@@ -394,15 +388,12 @@ def _values(along: Array, shapes: Array) -> Array:
 
 #: Of so many fits in which the noise is as it is given, one is said to be off to a side.
 CHANCE = 0.01
-#: Of the noise: less is no matter, however many values say it (rounding, a mesh).
-MATTERS = 0.1
+MATTERS = 0.1  # of the noise: less is no matter, however many values say it (rounding, a mesh)
 
 
 @dataclass(frozen=True)
 class NoiseTest:
-    """A comparison's residual beside the noise given.
-    values : how many; independent : as how many independent ones they count; free : of those, less
-    what the unknowns take up."""
+    """A comparison's residual beside the noise given; free : independent ones less the unknowns."""
 
     misfit: Misfit
     values: int
@@ -457,8 +448,7 @@ class NoiseTest:
 
 def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
     """Return tests of the comparisons with given noise, by name; residual (m,) of all.
-    Neighbours that err as one count as one. The unknowns are shared among the comparisons as their
-    independent values are."""
+    The unknowns are shared among the comparisons as their independent values are."""
     given: dict[str, tuple[Misfit, int, float]] = {}
     total, every = 0.0, misfits(problem, residual)
     if not any(misfit.noise_is == "given" for misfit in every.values()):

@@ -1,10 +1,8 @@
 """The posterior of a fit: a normal distribution within linear inequalities, and draws from it.
 
-Draws outside are drawn again as long as enough of them lie inside. Where hardly any does (the
-optimum lies on bounds), every draw is the end of a walk inside, along random directions, to a place
-drawn from the normal distribution on that line between its ends (hit and run). The directions have
-the shape of what is allowed and likely, so that close bounds do not stop the walk.
-"""
+Draws outside are drawn again as long as enough lie inside. Where hardly any does (the optimum lies
+on bounds), every draw is the end of a walk inside, along random directions in the shape of what is
+allowed and likely, to a place drawn on that line between its ends (hit and run)."""
 
 from __future__ import annotations
 
@@ -20,23 +18,17 @@ from ..materials.forms.base import Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
 
-#: Draws a wanted one, before it is a walk.
-MOST_DRAWS = 20
-#: Steps of a walk: some a dimension, and some in any case.
-STEPS_A_DIMENSION, STEPS = 12, 50
+MOST_DRAWS = 20  # draws a wanted one, before it is a walk
+STEPS_A_DIMENSION, STEPS = 12, 50  # steps of a walk: some a dimension, and some in any case
 #: Standard deviations inside that a walk begins, as far as there is room.
 INSIDE = (0.5, 0.1, 0.02, 1e-3, 1e-6)
-#: Steps of Newton's method, and halvings of one.
-NEWTON, HALVINGS = 40, 30
-#: Standard deviations beyond a point inside that no draw goes.
-BEYOND = 8.0
-#: Of the largest variance: less is none.
-NONE = 1e-14
+NEWTON, HALVINGS = 40, 30  # steps of Newton's method, and halvings of one
+BEYOND = 8.0  # standard deviations beyond a point inside that no draw goes
+NONE = 1e-14  # of the largest variance: less is none
 #: In standard deviations: bounds closer than this leave no room between them; what lies outside by
 #: less is inside.
 CLOSE, ROUNDING = 1e-9, 1e-9
-#: Standard deviations from the mean beyond which a place is no longer drawn.
-FAR = 1e6
+FAR = 1e6  # standard deviations from the mean beyond which a place is no longer drawn
 
 
 def truncated_draws(
@@ -47,9 +39,8 @@ def truncated_draws(
     count: int,
     random: np.random.Generator,
 ) -> Array:
-    """Return `count` draws (count, n) of a normal distribution, given A y >= c.
-    mean : (n,), which may lie outside. covariance : (n, n). inequalities : A (k, n), c (k,).
-    allowed : (n,) a point that keeps them, up to rounding."""
+    """Return `count` draws (count, n) of a normal distribution, given inequalities A y >= c.
+    mean : (n,), which may lie outside. allowed : (n,) a point that keeps them, up to rounding."""
     a, c = inequalities
     c = np.minimum(c, a @ allowed)
     variance, axes = np.linalg.eigh(covariance)
@@ -135,8 +126,8 @@ def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
 
 def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     """Return a point inside, and a root (n, n) of the shape of what is likely around it.
-    It minimises |z - centre|^2 / 2 - sum log(rows z - least) by Newton's method; the shape is the
-    inverse of the curvature there: round in a wide place, flat between bounds that are close."""
+    It minimises |z - centre|^2 / 2 - sum log(rows z - least), whose inverse curvature is the shape.
+    """
     place = _inside(rows, least, centre)
     value, slope, factor = _barrier(rows, least, centre, place)
     for _ in range(NEWTON):
@@ -243,8 +234,7 @@ class Posterior:
         return [self.unknowns.law(law, y) for y in self.sample(count, random)]
 
 
-#: Share of the draws inside a band, and draws.
-LEVEL, DRAWS = 0.95, 1000
+LEVEL, DRAWS = 0.95, 1000  # share of the draws inside a band, and draws
 
 
 def bands_of(

@@ -15,8 +15,7 @@ from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Blocks, Comparison
 from .unknowns import RandomStarts, Starts, Unknowns
 
-#: Status of an analysis that was kept earlier, and ended well then.
-FROM_CACHE = "ok, from the cache"
+FROM_CACHE = "ok, from the cache"  # status of an analysis that was kept earlier
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +180,7 @@ class FitProblem:
         return point
 
     def _by_unknowns(self, comparison: Comparison, slope: Array) -> Array:
-        """Return (m, unknowns) from the slope by free entries of beta and the comparison's
-        nuisance."""
+        """Return (m, unknowns) from the slope by free entries of beta and own nuisance."""
         p = self.unknowns
         jacobian = np.zeros((len(slope), p.count))
         jacobian[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
@@ -232,8 +230,8 @@ RUNS_USED_UP = "runs used up"
 @dataclass(frozen=True, eq=False)
 class Optimum:
     """The best feasible point of one start.
-    runs : of the analyses, those by the solver that counts while a surrogate led (0 without one).
-    failure : why that solver failed, where nothing else ended the fit."""
+    runs : by the solver that counts while a surrogate led; failure : why that ended the fit, if it
+    did."""
 
     best: Evaluation
     status: str
@@ -291,8 +289,7 @@ def factors_of(
 
 
 def rows_of(problem: FitProblem, points: Mapping[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """Return (m,) which residuals are of points, by comparison.
-    Raises InputError where an objective cannot say (`of_points`)."""
+    """Return (m,) which residuals are of points, by comparison; InputError if one cannot say."""
     found = np.zeros(len(problem.blocks.of), dtype=bool)
     for k, comparison in enumerate(problem.comparisons):
         mask = points.get(comparison.name)
@@ -306,8 +303,7 @@ def rows_of(problem: FitProblem, points: Mapping[str, NDArray[np.bool_]]) -> NDA
     return found
 
 
-#: Points that a fold gives to the fit, by comparison.
-Fold = Mapping[str, NDArray[np.bool_]]
+Fold = Mapping[str, NDArray[np.bool_]]  # points given to the fit, by comparison
 
 
 def folds_of(specimens: Mapping[str, Sequence[int]], count: int, seed: int) -> list[Fold]:

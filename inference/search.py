@@ -27,9 +27,8 @@ MOST, TOLERANCE = 40, 1e-9
 def approach(problem: FitProblem, start: Array, method: Method, options: FitOptions) -> Array:
     """Return unknowns at the optimum of the comparisons that lead in; `start` without any.
     Those of the lowest stage are matched first, then those of the lowest two, and so on: from a
-    random start nearly every step of a fit of several tests can end without an equilibrium of one
-    that is hard to run, such as a bias strip. `start` also where a comparison fails at the optimum
-    of the others."""
+    random start nearly every step can end without an equilibrium of one that is hard to run (bias
+    strips). `start` also where a comparison fails at the optimum of the others."""
     stages = sorted({c.stage for c in problem.comparisons})
     if len(stages) < 2:
         return start
@@ -123,8 +122,7 @@ def fit_from(
     problem: FitProblem, start: Array, options: FitOptions, near: bool = False
 ) -> Optimum | None:
     """Fit from the unknowns `start`; None when the analysis at the start fails.
-    near : an optimum is near (that of another mesh), so that no comparisons lead in. Raises
-    InputError for an unknown method."""
+    near : an optimum is near (that of another mesh), so that no comparisons lead in."""
     method = method_named(options.method)
     if not method.needs_slope:
         return method.minimise(problem, start, options)

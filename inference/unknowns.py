@@ -1,9 +1,7 @@
 """The unknowns of a fit: moduli at the control strains of the law's form, and nuisance.
 
-The coefficients of a law (the free entries of its beta, in MPa) may be badly scaled (monomials:
-condition 1e8 against 6e3 in modulus values), so the fit works in values of the moduli at control
-strains. Bounds on coefficients and on moduli are linear in either.
-"""
+The coefficients of a law may be badly scaled (monomials: condition 1e8 against 6e3 in modulus
+values). Bounds on coefficients and on moduli are linear in either."""
 
 from __future__ import annotations
 
@@ -37,8 +35,7 @@ class LawBounds:
 
     @classmethod
     def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
-        """Return bounds (least, largest) of every modulus, MPa; starts are drawn from modulus
-        values."""
+        """Return bounds (least, largest) of every modulus, MPa; starts draw modulus values."""
         for name, (low, high) in ranges.items():
             if not 0 < low < high:
                 problem = f"expected 0 < least < largest, got [{low:g}, {high:g}]"
@@ -52,8 +49,7 @@ class LawBounds:
     def of_entries(
         cls, lower: ArrayLike, upper: ArrayLike, margins: Mapping[str, float]
     ) -> LawBounds:
-        """Return bounds (free,) MPa of every coefficient; starts are drawn from there.
-        margins : MPa, by modulus, the least that it may be anywhere on the strain range."""
+        """Return bounds (free,) MPa of coefficients, and the least of each modulus (`margins`)."""
         low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
         if low.shape != high.shape or not (low <= high).all():
             problem = f"expected lower <= upper, got {low.tolist()} and {high.tolist()}"
@@ -72,8 +68,7 @@ class LawBounds:
 
     def box(self, form: Form, from_values: Array) -> tuple[Array, Array]:
         """Return lower and upper (free,) of the free coefficients, MPa.
-        Where the moduli are bounded this is the smallest box that holds every law whose moduli are
-        between their bounds at the form's control strains."""
+        Of bounded moduli: the smallest box of all laws that keep them at the control strains."""
         if self.lower is not None and self.upper is not None:
             return self.lower, self.upper
         ends = self.control(form)
@@ -87,8 +82,7 @@ class LawBounds:
         return least, np.array([self.largest[name] for name in form.modulus_of])
 
 
-#: MPa; a bound that is zero or negative says nothing of the size of a modulus.
-SMALLEST = 1e-3
+SMALLEST = 1e-3  # MPa; a bound that is zero or negative says nothing of the size of a modulus
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +160,7 @@ class Unknowns:
 
     @cached_property
     def from_values(self) -> Array:
-        """Return (size, size) so that free coefficients = this @ moduli (MPa) at the control
-        strains."""
+        """Return (size, size): free coefficients = this @ moduli (MPa) at control strains."""
         return self.form.from_values(self.strain_range)
 
     @cached_property
@@ -270,8 +263,7 @@ class Unknowns:
         return bool((grid @ coefficients >= margin).all())
 
 
-#: Values of one modulus that are drawn.
-MOST_VALUES = 4
+MOST_VALUES = 4  # values of one modulus that are drawn
 
 
 def draw(unknowns: Unknowns, random: np.random.Generator, count: int) -> Array:
@@ -288,8 +280,8 @@ def dimensions(unknowns: Unknowns) -> int:
 
 def coefficients_at(unknowns: Unknowns, share: Array) -> Array:
     """Return free coefficients (count, size) MPa at places (count, dimensions) between 0 and 1.
-    Even in the box of their bounds; where the moduli are bounded, even in the logarithm of their
-    values at the control strains."""
+    Even in the box of their bounds, or in the logarithm of bounded moduli at the control strains.
+    """
     if unknowns.bounds.largest is None:
         lower, upper = unknowns.box
         return np.asarray(lower + (upper - lower) * share)
@@ -324,8 +316,7 @@ def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:
 
 MOST_DRAWS = 200_000
 BATCH = 500
-#: Points of a Sobol sequence that are even in every box come in powers of two.
-SOBOL_BATCH = 512
+SOBOL_BATCH = 512  # points of a Sobol sequence that are even in every box come in powers of two
 #: Random candidates among which the most promising is a proposed start, and evaluations that a
 #: prediction is made of.
 CANDIDATES, NEIGHBOURS = 64, 5
@@ -379,6 +370,7 @@ class ProposedStarts:
 
     coefficients: Array
     objectives: Array
+    _made: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         try:
@@ -406,10 +398,6 @@ class ProposedStarts:
             values = np.log10(np.maximum(self.objectives, np.finfo(float).tiny))
             self._made["regression"] = near.fit(_places(unknowns, self.coefficients), values)
         return self._made["regression"]
-
-    @cached_property
-    def _made(self) -> dict[str, Any]:
-        return {}
 
 
 def _places(unknowns: Unknowns, coefficients: Array) -> Array:

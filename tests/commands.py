@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import click
 from bubblefit.cli.main import main
 from click.testing import CliRunner
 
@@ -44,6 +45,16 @@ def interrupted(*arguments, cwd, when, number=signal.SIGINT):
     running.send_signal(number)
     _, said = running.communicate(timeout=ENDING_S)
     return subprocess.CompletedProcess(command, running.returncode, None, said)
+
+
+def every_command(group):
+    """Yield every command below a group, groups included, with the words that are typed."""
+    ctx = click.Context(group)
+    for name in group.list_commands(ctx):
+        command = group.get_command(ctx, name)
+        yield (name,), command
+        if isinstance(command, click.Group):
+            yield from (((name, *path), below) for path, below in every_command(command))
 
 
 def result_in(folder):

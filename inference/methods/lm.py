@@ -26,8 +26,7 @@ class LevenbergMarquardt:
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
         """Fit from the unknowns `start`; None when the analysis there fails.
-        Stops when e is below the tolerance, on no progress, or when the analyses are used up (some
-        more only where the fit turns out to depend on its warm starts)."""
+        Stops below the tolerance, on no progress, or when the analyses are used up."""
         tolerance, most = options.tolerance, options.max_analyses
         before_last = most - 1  # the last one checks the optimum from the unloaded state
         met = problem.unstable  # where the start was drawn is no matter of the fit
@@ -74,8 +73,8 @@ def _from_stiffer(
     problem: FitProblem, best: Evaluation, factor: float, tolerance: float, max_analyses: int
 ) -> tuple[Evaluation, str]:
     """Fit again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
-    At the border of instability a fit stops short of a minimum, usually because the shear modulus
-    makes up for others that are still wrong: so these go first, and then all."""
+    At the border of instability G12 usually makes up for others that are still wrong: these go
+    first."""
     if problem.analyses >= max_analyses:
         return best, ANALYSES_USED_UP
     shear = problem.unknowns.shear

@@ -2,9 +2,8 @@
 
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.cli.terminal import every_command
 
-from ..commands import in_process
+from ..commands import every_command, in_process
 from ..golden_files import FOLDER
 from ..projects import constant_strips
 

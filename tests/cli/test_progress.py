@@ -10,12 +10,12 @@ from bubblefit import files
 from bubblefit.cli import terminal
 from bubblefit.cli.main import main
 from bubblefit.cli.progress import COMPILING, SeriesProgress, StudyProgress
-from bubblefit.cli.terminal import EVENTS, Events, every_command
+from bubblefit.cli.terminal import EVENTS, Events
 from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group
 
-from ..commands import in_process, one_line
+from ..commands import every_command, in_process, one_line
 from ..projects import BUBBLE
 
 ENDED = StartRecord(1, (1, 1), 0.25, "done", 1, (), (), 0.1)

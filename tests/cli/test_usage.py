@@ -9,11 +9,11 @@ from pathlib import Path
 import click
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.cli.terminal import HEAD, LOGGER, every_command, examples_in
+from bubblefit.cli.terminal import HEAD, LOGGER
 from click.testing import CliRunner
 
 from .. import needs
-from ..commands import in_process
+from ..commands import every_command, in_process
 from ..places import ROOT
 from ..projects import with_form
 
@@ -55,7 +55,8 @@ ALIASES = {"simulate strips": "simulate uniaxial"}
 def test_the_help_of_every_command_has_examples_that_can_be_typed(name):
     """Each is of this command, and click can parse it: options, choices, numbers, arguments."""
     shown = run(*name.split(), "--help").stdout
-    lines = examples_in(EVERY[name].epilog)
+    typed = EVERY[name].epilog.partition(f"{HEAD}\n")[2]
+    lines = [line.strip() for line in typed.splitlines() if line.strip()]
     assert lines and HEAD in shown
     for line in lines:
         assert f"    {line}\n" in shown, "click has wrapped it"
