@@ -22,7 +22,7 @@ from bubblefit.solvers.settings import PROGRAMS_FROM
 from .complaints import complaint, complaint_with
 from .places import EXAMPLES, ROOT
 from .plug_ins import install
-from .projects import changed
+from .projects import project_file
 
 ROOMS = ("tests", "benchmarks", "out", "build")
 SOURCES = sorted(
@@ -73,22 +73,16 @@ def test_no_shell_no_pickle_no_evaluated_text():
     assert {path: what for path, what in found.items() if what} == ALLOWED
 
 
-@pytest.mark.parametrize(
-    "source",
-    [
+def test_such_faults_are_seen():
+    for source in (
         "import pickle", "from pickle import loads", "import yaml.loader", "eval('1')",
         "np.load(path)", "np.load(path, allow_pickle=True)", "run('ls', shell=True)",
         "archive.extractall()", "jinja2.Environment()",
-    ],
-)  # fmt: skip
-def test_such_faults_are_seen(source):
-    assert faults(source)
-
-
-def test_ruff_looks_for_the_rest():
-    text = (Path(ROOT) / "pyproject.toml").read_text()
+    ):  # fmt: skip
+        assert faults(source)
+    text = (ROOT / "pyproject.toml").read_text()
     line = next(line for line in text.splitlines() if line.startswith("select = "))
-    assert '"S"' in line
+    assert '"S"' in line  # ruff looks for the rest
 
 
 HOSTILE = "a\nb\x00<script>alert(1)</script>\n*INCLUDE, INPUT=/etc/passwd\n include /etc/passwd"
@@ -113,17 +107,15 @@ def test_a_project_says_what_is_run_only_where_it_may(monkeypatch, tmp_path, sol
     complaint(solver_settings, tmp_path / "home" / ".." / "project.toml", table)
 
 
-@pytest.mark.parametrize("name", ["ccx_2.20", "ccx"])
-def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path, name):
+def test_a_solvers_own_program_on_the_path_may_be_said(monkeypatch, tmp_path):
     monkeypatch.delenv(PROGRAMS_FROM)
     path = tmp_path / "project.toml"
-    assert solver_settings(path, {"calculix": {"ccx": name}})["calculix"]["ccx"] == name
-    complaint(solver_settings, path, {"calculix": {"ccx": f"{name}/../evil"}})
+    for name in ("ccx_2.20", "ccx"):
+        assert solver_settings(path, {"calculix": {"ccx": name}})["calculix"]["ccx"] == name
+        complaint(solver_settings, path, {"calculix": {"ccx": f"{name}/../evil"}})
     own = {"marc": {"executable": "run_marc2023"}}
     assert solver_settings(path, own)["marc"]["executable"] == "run_marc2023"
-
-
-def test_a_link_to_a_project_is_where_the_file_is(monkeypatch, tmp_path):
+    # A link to a project is where the file is.
     real, home = tmp_path / "real", tmp_path / "home"
     real.mkdir(), home.mkdir()
     (real / "project.toml").write_text("")
@@ -186,29 +178,21 @@ def test_what_lies_in_the_runs_folder_may_be_named(tmp_path):
     assert deck(tmp_path, text) == text
 
 
-@pytest.mark.parametrize(
-    "name", ["../../evil", "/etc/passwd", "a\nb", "-rf", "a" * 300, "ä" * 300, "..", ".", "\0", "~"]
-)
-def test_the_files_of_a_test_stay_in_their_folder(tmp_path, name):
-    path = Output.of(tmp_path, name, True).path("loads.png")
-    assert path.parent == tmp_path and path.name.endswith("-loads.png")
-    assert path.name[0] not in "-." and len(path.name.encode()) < 200 and "\n" not in path.name
-    path.write_text("")
-
-
-def test_names_that_look_alike_as_files_stay_apart(tmp_path):
-    names = ["a/b", "a-b", "a:b", "a" * 200, "a" * 201]
-    files = [Output.of(tmp_path, name, True).prefix for name in names]
-    assert len(set(files)) == len(names) and files[1] == "a-b-"
+def test_the_files_of_a_test_stay_in_their_folder_and_apart(tmp_path):
+    hostile = "../../evil", "/etc/passwd", "a\nb", "-rf", "a" * 300, "ä" * 300, "..", ".", "\0", "~"
+    for name in hostile:
+        path = Output.of(tmp_path, name, True).path("loads.png")
+        assert path.parent == tmp_path and path.name.endswith("-loads.png")
+        assert path.name[0] not in "-." and len(path.name.encode()) < 200
+        assert "\n" not in path.name
+        path.write_text("")
+    alike = ["a/b", "a-b", "a:b", "a" * 200, "a" * 201]
+    files = [Output.of(tmp_path, name, True).prefix for name in alike]
+    assert len(set(files)) == len(alike) and files[1] == "a-b-"
     assert Output.of(tmp_path, "bubble 1", True).prefix == "bubble-1-"
 
 
-BRACES = ["{index.__class__}", "{index:999999999999d}", "{index!r}", "{0}", "{index:{index}}", "{"]
-
-
-@pytest.mark.parametrize("pattern", BRACES)
-def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path, pattern):
-    text = """
+PATTERN = """
 [fabric]
 thickness = 0.8
 [[bubble]]
@@ -218,11 +202,17 @@ pressures = [20]
 pattern = "PATTERN"
 indices = [1]
 """
-    path = tmp_path / "project.toml"
-    path.write_text(changed(text, ("PATTERN", pattern)))
-    complaint_with(["data.points.pattern: expected a name with {index}"], read_project, path)
+
+
+def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path):
+    words = ["data.points.pattern: expected a name with {index}"]
+    for pattern in (
+        "{index.__class__}", "{index:999999999999d}", "{index!r}", "{0}", "{index:{index}}", "{",
+    ):  # fmt: skip
+        path = project_file(tmp_path, PATTERN, ("PATTERN", pattern))
+        complaint_with(words, read_project, path)
     (tmp_path / "t_{07}.csv").write_text("")
-    path.write_text(changed(text, ("PATTERN", "t_{{{index:02d}}}.csv"), ("[1]", "[7]")))
+    project_file(tmp_path, PATTERN, ("PATTERN", "t_{{{index:02d}}}.csv"), ("[1]", "[7]"))
     assert "there is no file" not in str(read_project(path).tests["bubble"])
 
 
