@@ -198,8 +198,7 @@ class Comparison:
     def differentiate(
         self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
     ) -> tuple[History, Array]:
-        """Run with derivatives and keep the path for a warm start; arguments as for `run`.
-        Returns also the slope of the residual (m, free + nuisance of this comparison)."""
+        """Run as `run`, keep the path for a warm start; also return slopes (m, free + nuisance)."""
         if not isinstance(self.solver, DifferentiatingSolver):
             raise SolverFailure(f"{self.solver.name} gives no derivatives", self.solver.name)
         values = self._model_values(nuisance)

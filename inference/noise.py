@@ -447,8 +447,7 @@ class NoiseTest:
 
 
 def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
-    """Return tests of the comparisons with given noise, by name; residual (m,) of all.
-    The unknowns are shared among the comparisons as their independent values are."""
+    """Return tests of the comparisons with given noise, by name, from the residual (m,) of all."""
     given: dict[str, tuple[Misfit, int, float]] = {}
     total, every = 0.0, misfits(problem, residual)
     if not any(misfit.noise_is == "given" for misfit in every.values()):

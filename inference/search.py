@@ -121,8 +121,7 @@ def _lead(surrogate: FitProblem, y: Array, method: Method, options: FitOptions) 
 def fit_from(
     problem: FitProblem, start: Array, options: FitOptions, near: bool = False
 ) -> Optimum | None:
-    """Fit from the unknowns `start`; None when the analysis at the start fails.
-    near : an optimum is near (that of another mesh), so that no comparisons lead in."""
+    """Fit from the unknowns `start`; None where that fails; near : no comparisons lead in."""
     method = method_named(options.method)
     if not method.needs_slope:
         return method.minimise(problem, start, options)
