@@ -94,7 +94,7 @@ def test_bash_completes():
     script = f"""{documented}
 COMP_WORDS=(bubblefit export a.toml --format gs); COMP_CWORD=4
 _bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
-COMP_WORDS=(bubblefit bi); COMP_CWORD=1
+COMPREPLY=(); COMP_WORDS=(bubblefit bi); COMP_CWORD=1
 _bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
 """
     own = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
