@@ -166,6 +166,7 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     # path: the editable install of bubblefit that hangs on a .pth over there is not read.
     (site_packages(python) / "borrowed.pth").write_text(f"{site_packages(sys.executable)}\n")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
     place = output_of(python, "-c", "import bubblefit; print(bubblefit.__file__)")
     assert place.startswith(str(home))
     assert PROJECT["project"]["version"] in output_of(command, "--version")

@@ -158,7 +158,7 @@ def test_bad_projects_and_another_fit_end_in_one_line(together, tmp_path):
 def test_only_some_of_the_tests(together, tmp_path):
     """By name, or by kind: strips alone from the same file."""
     shutil.copy(together[0] / "points.csv", tmp_path)
-    project_in(tmp_path, ("[[bubble]]", "[fit]\nmax_analyses = 5\n[[bubble]]"))
+    project_in(tmp_path, ('form = "cubic"', 'form = "constant"'))
     run = ("together.toml", "--starts", 1, "--jobs", 1, "--quiet", "--out")
     quick("fit", *run, "one", "--test", "strips", cwd=tmp_path)
     quick("uniaxial", *run, "kind", cwd=tmp_path)
