@@ -8,7 +8,7 @@ import bubblefit as bf
 import pytest
 from bubblefit.reports import vega
 
-from ..figure_checks import check_charts
+from ..drawings import check_charts
 from ..projects import constant_strips, small
 
 
