@@ -64,24 +64,19 @@ def test_an_elliptic_sheet_raises_no_doubt_where_it_is_said_to_lie(angle):
     assert [*names(columns(1 / 25.4)(fields), outline=outline)] == ["length-unit"]
 
 
-def each(change):
-    return lambda fields: tuple(change(field) for field in fields)
+def each(change, *args):
+    return lambda fields: tuple(change(field, *args) for field in fields)
 
 
-def zeros(points: float):
-    """Return fields with six points that do not move, their places times a factor."""
-
-    def change(field):
-        places, moved = field.points.copy(), field.displacement.copy()
-        places[200:206] *= points
-        moved[200:206] = 0.0
-        return replace(field, points=places, displacement=moved)
-
-    return each(change)
+def pressed(field, by):
+    return replace(field, pressure=field.pressure * by)
 
 
-def pressed(by: float):
-    return each(lambda f: replace(f, pressure=f.pressure * by))
+def zeros(field, by):
+    """Six points that do not move, their places times a factor."""
+    places, moved = field.points.copy(), field.displacement.copy()
+    places[200:206], moved[200:206] = by * places[200:206], 0.0
+    return replace(field, points=places, displacement=moved)
 
 
 def swap(field):
@@ -89,12 +84,9 @@ def swap(field):
     return replace(field, points=field.points[:, ::-1].copy(), displacement=moved)
 
 
-def deformed(z: float | None):
-    def change(field):
-        places, height = field.points + field.displacement[:, :2], field.displacement[:, 2]
-        return replace(field, points=places, z=None if z is None else z * height)
-
-    return each(change)
+def deformed(field, z):
+    places, height = field.points + field.displacement[:, :2], field.displacement[:, 2]
+    return replace(field, points=places, z=height if z else None)
 
 
 def exchanged(fields):
@@ -120,20 +112,20 @@ TURN = partial(Rotation.from_euler, degrees=True)
 TRAPS = {
     "places in m": (columns(0.001), "length-unit", True, "radii from the centre"),
     "displacements in m": (columns(1.0, (0.001,) * 3), "length-unit", True, "mm beside m"),
-    "bar read as kPa": (pressed(0.01), "pressure-unit", True, "kPa"),
-    "kPa read as bar": (pressed(100), "pressure-unit", True, "bar"),
+    "bar read as kPa": (each(pressed, 0.01), "pressure-unit", True, "kPa"),
+    "kPa read as bar": (each(pressed, 100), "pressure-unit", True, "bar"),
     "z flipped": (columns(1.0, (1.0, 1.0, -1.0)), "z-flipped", True, "z is flipped"),
     "y flipped in places only": (columns((1.0, -1.0)), "axis-flipped", True, "y and dy"),
     "x flipped in displacements only": (
         columns(1.0, (-1.0, 1.0, 1.0)), "axis-flipped", True, "x and dx",
     ),
     "warp and fill swapped": (each(swap), "swapped", False, "swapped"),
-    "deformed coordinates": (deformed(1.0), "deformed-coordinates", True, "height z follows"),
+    "deformed coordinates": (each(deformed, True), "deformed-coordinates", True, "height z"),
     "deformed coordinates without z": (
-        deformed(None), "deformed-coordinates", True, "from frame to frame",
+        each(deformed, False), "deformed-coordinates", True, "from frame to frame",
     ),
-    "rejected points do not move": (zeros(1.0), "zero-points", True, "5 of 500 points"),
-    "rejected points at the origin": (zeros(0.0), "zero-points", True, "x = y = 0"),
+    "rejected points do not move": (each(zeros, 1.0), "zero-points", True, "5 of 500 points"),
+    "rejected points at the origin": (each(zeros, 0.0), "zero-points", True, "x = y = 0"),
     "a frame repeated": (
         lambda f: (*f[:2], replace(f[1], pressure=f[2].pressure), f[3]), "repeated-frame", True,
         "60 and 150 kPa",
