@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -122,10 +123,8 @@ class Trial:
     def start(self) -> int:
         """Fork this process into the command, with --resume where results exist."""
         used = any((self.out / name).exists() for name in ("run.json", "result.json"))
-        arguments = [*self.arguments, *(["--resume"] if used else [])]
         sys.stdout.flush()
-        child = os.fork()
-        if child:
+        if child := os.fork():
             return child
         try:
             os.setsid()
@@ -137,13 +136,13 @@ class Trial:
             }
             tempfile.tempdir = None
             stream = os.open(self.said, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-            os.dup2(stream, 1)
-            os.dup2(stream, 2)
+            for known in (1, 2):
+                os.dup2(stream, known)
             from bubblefit.cli.main import main
             from bubblefit.reports import vega
 
-            vega.rendered = _stub
-            main(arguments, prog_name="bubblefit")
+            vega.rendered = lambda *_: PICTURE  # drawing would be most of the time
+            main([*self.arguments, *(["--resume"] if used else [])], prog_name="bubblefit")
         except SystemExit as end:
             os._exit(end.code if isinstance(end.code, int) else 0)
         finally:
@@ -155,18 +154,14 @@ class Trial:
         found = []
         for process in Path("/proc").glob("[0-9]*"):
             try:
-                said = (process / "stat").read_text().rpartition(")")
-                name = said[0].partition("(")[2]
-                state, _, _, session = said[2].split()[:4]
+                head, _, tail = (process / "stat").read_text().rpartition(")")
+                state, _, _, session = tail.split()[:4]
                 marked = mark in (process / "environ").read_bytes().split(b"\0")
             except OSError:
                 continue
-            if (
-                state != "Z"
-                and int(process.name) != os.getpid()
-                and (int(session) == own or marked)
-            ):
-                found.append((int(process.name), name))
+            number = int(process.name)
+            if state != "Z" and number != os.getpid() and (int(session) == own or marked):
+                found.append((number, head.partition("(")[2]))
         return found
 
     def left(self) -> list[str]:
@@ -175,11 +170,6 @@ class Trial:
         places += [path for path in self.out.rglob(".*") if path.is_file()]
         places += SHARED.iterdir() if OWN in os.environ else ()  # others may use it, too
         return [str(path) for path in places]
-
-
-def _stub(*_: Any) -> bytes:
-    """Return, in place of a drawing, which would be most of the time, the smallest picture."""
-    return PICTURE
 
 
 def until(done: Any, seconds: float) -> bool:
@@ -205,26 +195,22 @@ def killed(trial: Trial, process: int, draw: random.Random) -> str:
     """Kill one of the trial's processes; return which, "" where it had ended."""
     alive = trial.all_alive(process)
     solvers = [number for number, name in alive if name.startswith("ccx")]
-    workers = [number for number, name in alive if number != process and name != "sh"]
-    workers = [number for number in workers if number not in solvers]
+    others = {process, *solvers, *(number for number, name in alive if name == "sh")}
+    workers = [number for number, _ in alive if number not in others]
     groups = {"the command": [process], "a worker": workers, "CalculiX": solvers}
     what = draw.choice([name for name, several in groups.items() if several])
-    if not alive_still(process):
-        return ""
-    try:
-        os.kill(draw.choice(groups[what]), signal.SIGKILL)
-    except ProcessLookupError:
-        return ""
-    return what
+    if alive_still(process):
+        with suppress(ProcessLookupError):
+            os.kill(draw.choice(groups[what]), signal.SIGKILL)
+            return what
+    return ""
 
 
 def alive_still(process: int) -> bool:
     """Return True while our child has not ended (it is not waited for)."""
-    try:
-        said = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return False
-    return said[0] != "Z"
+    with suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
 
 
 def content(out: Path) -> dict[str, Any]:
@@ -253,15 +239,13 @@ def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, mo
     trial, count, failed = Trial(folder, name), 0, False
     while True:
         process = trial.start()
-        if (
-            count < most
-            and until(lambda p=process: not alive_still(p), draw.uniform(0, seconds)) is False
-        ):
-            what = killed(trial, process, draw)
-            if what:
-                told.killed[what] += 1
-                count += 1
-                failed = failed or what == "CalculiX"
+        ended = count >= most or until(
+            lambda p=process: not alive_still(p), draw.uniform(0, seconds)
+        )
+        if not ended and (what := killed(trial, process, draw)):
+            told.killed[what] += 1
+            count += 1
+            failed = failed or what == "CalculiX"
         code = finish(process)
         if not until(lambda p=process: not trial.all_alive(p), ENDING):
             told.left.append(f"{folder.name}: alive: {trial.all_alive(process)}")
@@ -273,11 +257,10 @@ def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, mo
     told.trials += 1
     found = content(trial.out)
     differ = [key for key in {**whole, **found} if whole.get(key) != found.get(key)]
-    if not differ:
-        told.equal += 1
-    elif not failed:
+    told.equal += not differ
+    if differ and not failed:
         told.other.append(f"{folder.name}: {', '.join(differ)} of another run")
-    else:
+    elif differ:
         # A run that is killed is a point that cannot be analysed: the fit goes another way.
         e, own = found["result.json"]["objective"], whole["result.json"]["objective"]
         told.killed["CalculiX, and another way"] += 1
@@ -325,12 +308,9 @@ def lines(name: str, told: Told) -> Iterator[str]:
 def main(kills: int = 4, seed: int = 1, *commands: str) -> None:
     """Kill each command KILLS times; exit with 1 where anything differs or is left."""
     if OWN not in os.environ and shutil.which("unshare"):
-        words = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
-        command = ["unshare", "-m", "sh", "-c", words, "sh", sys.executable, *sys.argv]
-        allowed = subprocess.run(
-            ["unshare", "-m", "sh", "-c", "mount -t tmpfs tmpfs /dev/shm"], capture_output=True
-        )
-        if allowed.returncode == 0:
+        mount = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs tmpfs /dev/shm && "$@"', "sh"]
+        if subprocess.run([*mount, "true"], capture_output=True).returncode == 0:
+            command = [*mount, sys.executable, *sys.argv]
             sys.exit(subprocess.run(command, env={**os.environ, OWN: "1"}).returncode)
     bad = False
     with tempfile.TemporaryDirectory(prefix="kills-") as place:
@@ -347,10 +327,8 @@ def _write_points(path: Path) -> None:
     for direction, moduli in {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}.items():
         for specimen, modulus in zip("ab", moduli, strict=True):
             loads = 20 * modulus * np.log1p(elongation / 20)
-            rows += [
-                f"{direction},{specimen},{u!r},{load!r}"
-                for u, load in zip(elongation.tolist(), loads.tolist(), strict=True)
-            ]
+            points = zip(elongation.tolist(), loads.tolist(), strict=True)
+            rows += [f"{direction},{specimen},{u!r},{load!r}" for u, load in points]
     path.write_text("\n".join(rows) + "\n")
 
 

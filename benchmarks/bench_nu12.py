@@ -10,7 +10,7 @@ from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.biaxial.prepared import candidates as biaxial_candidates
 from bubblefit.experiments.bubble.prepared import PreparedBubble
 from bubblefit.experiments.kinds import Planning, PreparedTest
-from bubblefit.experiments.strips.candidates import candidates
+from bubblefit.experiments.strips.prepared import candidates
 from bubblefit.inference.assessment import certainty, verdicts
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 from ..errors import InputError, Note, NoteKind, SolverFailure, as_note
 from ..materials.card import MaterialCard, positive, thickness_difference
 from ..readers.frames import FrameSource
-from ..readers.sections import ModulusUnit
+from ..readers.machine_tables import Channel
+from ..readers.registry import Content, format_named
+from ..readers.sections import ModulusUnit, Number, Section
 from ..solvers.base import History, instability
 
 if TYPE_CHECKING:
@@ -42,7 +44,6 @@ UNMATCHED = NoteKind("unmatched direction", weight=9)
 DOUBTFUL = NoteKind("doubtful data", weight=12)
 READING = NoteKind("how a file was read")
 
-
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
 #: Bytes of a test's name in the names of its files.
@@ -60,8 +61,7 @@ class Output:
     def of(cls, folder: Path, test: str, several: bool) -> Output:
         """Return the output of a test; its name stands before every file's if there are several.
 
-        Characters that do not belong in the name of a file become dashes, and long names are cut; a
-        few digits then tell such names apart.
+        What does not belong in the name of a file becomes a dash; digits tell such names apart.
         """
         plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
         plain = plain.encode()[:LONGEST].decode(errors="ignore").strip("-.")
@@ -141,27 +141,26 @@ class Reach:
 
 
 class Test(Protocol):
-    """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa."""
+    """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa.
+
+    weight : among several tests in one fit. reach : of its data. reads_files : whether its data are
+    measured files, which a folder can be named for.
+    """
 
     @property
-    def kind(self) -> str:
-        """Return the name of its kind."""
+    def kind(self) -> str: ...
 
     @property
-    def name(self) -> str:
-        """Return its own name in the project."""
+    def name(self) -> str: ...
 
     @property
-    def weight(self) -> float:
-        """Return how much it counts among several tests in one fit."""
+    def weight(self) -> float: ...
 
     @property
-    def reach(self) -> Reach:
-        """Return the strains that its data reach."""
+    def reach(self) -> Reach: ...
 
     @property
-    def reads_files(self) -> bool:
-        """Return whether its data are measured files, which a folder can be named for."""
+    def reads_files(self) -> bool: ...
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
@@ -260,26 +259,24 @@ FittableTest = Test
 class PreparedTest(Protocol):
     """A test with its data, in memory, as worker processes get it.
 
-    One with measured files also has `data_files()`, for the record of a run (`OfFiles`), as a test
-    that is predicted does. A kind that looks at its data before a fit has `doubts(expected)`, and
-    then lists the names of its doubts, `Kind.doubts`.
+    objective_is : its own objective, in words. known : the law behind computed data. specimens : by
+    comparison, of each point that can be left out of a fit. One with measured files also has
+    `data_files()`, for the record of a run (`OfFiles`), as a test that is predicted does. A kind
+    that looks at its data before a fit has `doubts(expected)`, and then lists the names of its
+    doubts, `Kind.doubts`.
     """
 
     @property
-    def test(self) -> FittableTest:
-        """Return the test."""
+    def test(self) -> FittableTest: ...
 
     @property
-    def objective_is(self) -> str:
-        """Describe its own objective."""
+    def objective_is(self) -> str: ...
 
     @property
-    def known(self) -> HypoelasticLaw | None:
-        """Return the law behind computed data."""
+    def known(self) -> HypoelasticLaw | None: ...
 
     @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return by comparison the specimen of each point that can be left out of a fit."""
+    def specimens(self) -> Mapping[str, Sequence[int]]: ...
 
     def reach(self, masks: Masks) -> Reach:
         """Return the strains that matched points reach; the test's own for all of them."""
@@ -437,11 +434,7 @@ class PredictedOutcome(Protocol):
 def record_of(
     kind: Predicted, model: Any, outcome: History | SolverFailure, seconds: float = 0.0
 ) -> RunRecord:
-    """Return the record of a run that ended, well or not.
-
-    A history that is no result is a failure: only the solver's own reason for an end before the
-    last frame makes it one.
-    """
+    """Return the record of a run that ended, well or not; a history without a result failed."""
     if isinstance(outcome, History):
         try:
             return RunRecord(
@@ -607,8 +600,7 @@ class Divisible(Protocol):
         """Return by sort ("frames", "specimens") and name ("97 kPa") the points kept without it.
 
         Only sorts of which the test has two or more. Masks are of every comparison of the test,
-        over its points in the order of its data; inverted masks give the comparisons of the part
-        alone.
+        over its points in the order of its data.
         """
 
 
@@ -621,10 +613,9 @@ class Refinable(Protocol):
     ) -> tuple[Comparison, ...]:
         """Return its comparisons with edges of elements and increments divided by a factor.
 
-        Every residual is of the same measured value as that of `comparisons`. Where the data were
-        computed with the fit's own model there is nothing finer: the same comparisons. A factor
-        below one makes larger elements, and leaves the increments as they are. Raises InputError
-        without such a mesh.
+        Every residual is of the same measured value as that of `comparisons`; data computed with
+        the fit's own model have the same comparisons. A factor below one leaves the increments as
+        they are. Raises InputError without such a mesh.
         """
 
 
@@ -683,15 +674,12 @@ class Judgement:
     @property
     def notes(self) -> tuple[Note, ...]:
         """Return notes on all other doubts, with their name where they are trusted."""
-        return tuple(
-            Note(
-                DOUBTFUL,
-                d.text + f" (trusted: {d.name})" * (d.name in self.trusted),
-                self.test,
-            )
+        texts = (
+            d.text + f" (trusted: {d.name})" * (d.name in self.trusted)
             for d in self.doubts
             if d not in self.errors
         )
+        return tuple(Note(DOUBTFUL, text, self.test) for text in texts)
 
     def demand(self, project: Path) -> None:
         """Raise an InputError with all sure doubts in one line, each with its name."""
@@ -735,18 +723,14 @@ def files_of(test: object) -> tuple[DataFile, ...]:
 
 def joined(parts: Iterable[DataFile]) -> list[DataFile]:
     """Return one entry a file, in the order of their first part: rows are added up."""
-    by_path: dict[Path, list[DataFile]] = {}
+    files: dict[Path, DataFile] = {}
     for part in parts:
-        by_path.setdefault(part.path, []).append(part)
-    files = []
-    for path, same in by_path.items():
-        counts = [part.used for part in same if part.used is not None]
-        dropped = Counter[str]()
-        for part in same:
-            dropped.update(part.dropped)
-        left = {why: count for why, count in dropped.items() if count}
-        files.append(DataFile(path, same[0].source, sum(counts) if counts else None, left))
-    return files
+        one = files.get(part.path, DataFile(part.path, part.source, None))
+        known = [used for used in (one.used, part.used) if used is not None]
+        dropped = Counter(one.dropped) + Counter(part.dropped)
+        used = sum(known) if known else None
+        files[part.path] = DataFile(part.path, one.source, used, dict(dropped))
+    return list(files.values())
 
 
 #: Number of a card's directions, least certain first, that are run unless laws are drawn: others
@@ -789,8 +773,8 @@ class Around:
         """
         reached = [curve for curve in others if curve is not None]
         whole = np.full(len(own), np.nan)
-        some = len(reached) == len(others) if self.by == "directions" else len(reached) > 1
-        if not some or not reached:
+        least = max(1, len(others)) if self.by == "directions" else 2
+        if len(reached) < least:
             return whole
         end = min(len(own), *(len(curve) for curve in reached))
         curves = np.array([curve[:end] for curve in reached])
@@ -829,3 +813,32 @@ def laws_around(
         steps.append(step)
         laws.append(law)
     return Around("directions", steps), laws
+
+
+class ChannelSection(Section):
+    """A column of a measured file."""
+
+    column: str | None = None
+    unit: str | None = None
+    scale: Number | None = None
+    offset: Number = 0.0
+
+
+def channel_of(section: ChannelSection) -> Channel:
+    """Return the channel of a section."""
+    return Channel(**section.model_dump())
+
+
+def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
+    """Return the name after a check that there is such a format; None where none is given.
+
+    field : dotted key of the name below the section.
+    Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
+    work.
+    """
+    if name is not None:
+        try:
+            format_named(content, name)
+        except InputError as error:
+            raise place.error(field, error.problem) from None
+    return name

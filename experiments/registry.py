@@ -11,7 +11,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from ..errors import InputError, PlugInFailure
-from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
+from ..files import Group, names_with, plug_in_named, plug_ins
 from .kinds import Kind
 
 GROUP: Group = "bubblefit.tests"
@@ -39,14 +39,18 @@ def kinds() -> Mapping[str, Kind]:
 
 def kind_named(name: str) -> Kind:
     """Return the kind of this name, importing no other; raises InputError, PlugInFailure."""
+    made: Kind
     if name in _folders():
-        kind: Kind = import_module(f".{name}", __package__).KIND
-        return kind
+        made = import_module(f".{name}", __package__).KIND
+        return made
     plug_in = plug_in_named(GROUP, name)
     if plug_in is None:
         known = ", ".join(names_with(GROUP, _folders()))
         raise InputError(None, "kind", f"{name!r} is not one of: {known}")
-    return _of(plug_in)
+    made = plug_in.load("kind of test", NEEDED)
+    if made.name != name:
+        raise plug_in.failure(f"calls its kind of test {made.name!r}; both must have one name")
+    return made
 
 
 def report_of(name: str) -> Any:
@@ -66,19 +70,11 @@ def report_of(name: str) -> Any:
     return kind.report
 
 
-def _of(plug_in: PlugIn) -> Kind:
-    kind: Kind = plug_in.load("kind of test", NEEDED)
-    if kind.name != plug_in.name:
-        raise plug_in.failure(f"calls its kind of test {kind.name!r}; both must have one name")
-    return kind
-
-
 @cache
 def _folders() -> tuple[str, ...]:
     """Return the folders of this package: each holds a `KIND` of that name."""
-    return tuple(
-        module.name for module in iter_modules([str(Path(__file__).parent)]) if module.ispkg
-    )
+    here = str(Path(__file__).parent)
+    return tuple(module.name for module in iter_modules([here]) if module.ispkg)
 
 
 @cache

@@ -14,8 +14,7 @@ from ...errors import InputError
 from ...files import is_file
 from ...meshes.strip_models import PatchModel
 from ...readers.sections import Name, Number, Positive, Section, beside
-from ..keys import named_format
-from ..kinds import Place, Reach, Refined
+from ..kinds import Place, Reach, Refined, named_format
 from .data import (
     BiaxialPath,
     BiaxialTable,

@@ -20,8 +20,7 @@ from ...readers.machine_tables import Channel, read_times
 from ...readers.pressure_log import check_pattern, number_in_name, value_in_file
 from ...readers.sections import LENGTH_UNITS
 from ...readers.tables import PRESSURE_UNITS, TIME_UNITS
-from ..keys import channel_of, named_format
-from ..kinds import Array, Place
+from ..kinds import Array, Place, channel_of, named_format
 from .registration import RegistrationOptions
 from .section import BubbleSection, LogSection, PointsSection, PressureSection, registration_options
 

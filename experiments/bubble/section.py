@@ -14,8 +14,7 @@ from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, do
 from ...meshes.mesh import Facet
 from ...readers.sections import LengthUnit, Number, Positive, Section
 from ...readers.sections import Name as Name_of_sections
-from ..keys import ChannelSection
-from ..kinds import Place
+from ..kinds import ChannelSection, Place
 from .registration import PlaneOf, RegistrationOptions
 
 Words = Annotated[

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from .predicted import STUDIED, CylinderPredicted
-from .section import CylinderSection
-from .test import read
+from .test import CylinderSection, read
 
 
 class CylinderKind:

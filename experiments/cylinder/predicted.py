@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -16,7 +16,7 @@ from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
-from ..kinds import PredictedRun, RunRecord, Studied, band_of
+from ..kinds import STRAINS, PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
 
 Array = NDArray[np.float64]
@@ -57,19 +57,17 @@ def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
         raise SolverFailure(f"the results end {where}, and do not say why", "")
     if history.cavity_pressure is None or history.cavity_volume is None:
         raise SolverFailure("the results have no gas pressure or no volume", "")
-    wrinkled = np.empty(0) if history.wrinkled is None else history.wrinkled
-    curves = (history.load, history.cavity_pressure, history.cavity_volume)
-    load, pressure, volume, share = (np.asarray(c, dtype=float) for c in (*curves, wrinkled))
+    share = () if history.wrinkled is None else history.wrinkled
+    curves = (history.load, history.cavity_pressure, history.cavity_volume, share)
+    *known, wrinkled = (np.asarray(curve, dtype=float) for curve in curves)
     ends = history.displacement[0], history.displacement[-1]
-    values = (deflection[:reached], load, pressure, volume, *ends, share)
+    values = (deflection[:reached], *known, *ends, wrinkled)
     return dict(zip((field.name for field in fields(BendingRun)), values, strict=True))
 
 
 def early_end(model: CylinderModel, history: History) -> str:
     """Return the solver's reason for an end before the last deflection, else ""."""
-    if len(history.load) > len(model.deflections):
-        return ""
-    return history.early
+    return "" if len(history.load) > len(model.deflections) else history.early
 
 
 #: The initial stiffness is that of a straight line through at least so many frames.
@@ -181,9 +179,8 @@ def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> P
 def limit_point(d: Array, load: Array) -> Point | None:
     """Return the largest load, where the load falls afterwards."""
     top = int(np.argmax(load))
-    if not load[top:].min() < (1 - FALL) * load[top]:
-        return None
-    return float(d[top]), float(load[top])
+    falls = load[top:].min() < (1 - FALL) * load[top]
+    return (float(d[top]), float(load[top])) if falls else None
 
 
 def wrinkle_onset(run: BendingRun) -> Point | None:
@@ -236,36 +233,6 @@ CURVE = ("deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3", "wrinkle
 MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetitions")
 
 
-def columns_of(m: BendingMeasures | None, places: Sequence[str]) -> Mapping[str, object]:
-    """Return a row of the table of runs; None where a number is unknown or a run failed."""
-    error = None if m is None else m.error
-    row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
-    for name in ("knee", "limit", "wrinkles"):
-        point = (getattr(m, name) if m else None) or (None, None)
-        row |= {f"{name}_mm": point[0], f"{name}_N": point[1]}
-    row |= {f"load_at_{p.replace(' ', '_')}_N": m and m.loads[p] for p in places}
-    body = m.body_strain if m else (None, None)
-    return row | {
-        "inflation_warp_strain": body[0],
-        "inflation_fill_strain": body[1],
-        "pressure_rise_kPa": m and m.pressure_rise,
-        "rms_N": error and error.rms,
-        "rms_relative": error and error.relative,
-        "mean_error_N": error and error.mean,
-        "compared": error and error.compared,
-        "reached_mm": m and m.reached,
-    }
-
-
-def curve_of(run: BendingRun | None) -> pd.DataFrame:
-    """Return a run frame by frame; no rows where it failed."""
-    if run is None:
-        return pd.DataFrame({name: np.empty(0) for name in CURVE})
-    share = run.wrinkled if len(run.wrinkled) else np.full(len(run.load), np.nan)
-    values = (run.deflection, run.load, 1e3 * run.pressure, run.volume, share)
-    return pd.DataFrame(dict(zip(CURVE, values, strict=True)))
-
-
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     """Return mean and scatter of the repetitions on a grid, of the tests that were measured."""
     parts = []
@@ -277,7 +244,7 @@ def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(MEASURED))
 
 
-def place_names(tests: Sequence[CylinderTest]) -> list[str]:
+def place_names(tests: Iterable[CylinderTest]) -> list[str]:
     """Return the places of listed loads in all tests, each once."""
     return list(dict.fromkeys(name for test in tests for name in test.reading.places))
 
@@ -287,44 +254,6 @@ def load_words(load: float | None, sigma: float | None, unit: str = "") -> str:
     if load is None:
         return "-"
     return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
-
-
-def terminal_table(
-    runs: Sequence[PredictedRun],
-    measures: Mapping[int, BendingMeasures],
-    ended: Sequence[str],
-    sigma: Mapping[int, Mapping[str, float | None]] | None = None,
-) -> list[str]:
-    """Return stiffness, buckling, loads and errors run by run; sigma (N) by number."""
-    spreads = sigma or {}
-    places = place_names([run.test for run in runs])
-    widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
-    compared = any(m.error is not None for m in measures.values())
-    count = 3 if any(run.wall for run in runs) else 2
-    rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
-    names = [row[:count] for row in rows]
-    wide = [max(map(len, column)) for column in zip(*names, strict=True)]
-    starts = ["  ".join(f"{n:<{w}}" for n, w in zip(row, wide, strict=True)) for row in names]
-    head = f"{starts.pop(0)}   N/mm   buckles at"
-    head += "".join(f"{p:>{w}}" for p, w in zip(places, widths, strict=True))
-    lines = [head + ("   error" if compared else "")]
-    for i, run in enumerate(runs):
-        start, m = starts[i], measures.get(i)
-        if m is None:
-            lines.append(f"{start}  {ended[i]}")
-            continue
-        at = f"{m.buckling[1]:.0f} N {m.buckling[0]:.0f} mm" if m.buckling else "-"
-        text = f"{start} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6} {at:>13}"
-        for place, width in zip(places, widths, strict=True):
-            load = m.loads.get(place)
-            text += f"{load_words(load, spreads.get(i, {}).get(place), ' N'):>{width}}"
-        if compared:
-            text += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
-        words = [ended[i]] if run.record.early else []
-        if marked := marks(run.notes):
-            words.append(f"[{', '.join(marked)}]")
-        lines.append("  ".join([text, *words]))
-    return lines
 
 
 FINISHED = "finished"
@@ -358,41 +287,36 @@ class CylinderOutcome:
     def other_end(self, number: int) -> BendingRun | None:
         """Return the run at the other end of the band of a run, if it did not fail."""
         own = self.runs[number]
-        for i, run in enumerate(self.runs):
-            if run.test is own.test and run.card == own.card and not run.predicted:
-                return self.bent.get(i)
-        return None
+        same = (
+            i for i, run in enumerate(self.runs)
+            if run.test is own.test and run.card == own.card and not run.predicted
+        )  # fmt: skip
+        return self.bent.get(next(same, -1))
 
     @cached_property
     def spreads(self) -> Mapping[int, Array]:
-        """Return the standard deviations (frames,) N of the load due to the card; NaN if unknown.
-
-        Of the runs with laws around the card's, by number; NaN where that is not known.
-        """
+        """Return the standard deviations (frames,) N of the load due to the card, by number."""
         found = {}
         for i, bent in self.bent.items():
-            around = self.runs[i].around
-            if around is not None:
+            if (around := self.runs[i].around) is not None:
                 others = [run_of(record) for record in around.records]
-                loads = [None if other is None else other.load for other in others]
-                found[i] = around.sigma(bent.load, loads)
+                found[i] = around.sigma(bent.load, [o.load if o else None for o in others])
         return found
 
     def sigma(self, number: int) -> dict[str, float | None]:
         """Return the standard deviation (N) of the load at each place; None if unknown."""
-        own = self.spreads.get(number)
-        if own is None:
+        if number not in self.spreads:
             return dict.fromkeys(self.measures[number].loads)
         places = self.runs[number].test.reading.places
-        known = loads_at(self.bent[number].deflection, own, places)
+        known = loads_at(self.bent[number].deflection, self.spreads[number], places)
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
 
     @property
     def unsure(self) -> Sequence[str]:
         """Return notes on cards of unknown spread."""
-        cards = [run.card for run in self.runs if run.material.certainty is None]
-        words = f"no spread of loads with {', '.join(dict.fromkeys(cards))}"
-        return [f"{words}: the card does not say how sure it is"] if cards else []
+        cards = dict.fromkeys(run.card for run in self.runs if run.material.certainty is None)
+        words = f"no spread of loads with {', '.join(cards)}: the card does not say how sure it is"
+        return [words] if cards else []
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""
@@ -413,7 +337,6 @@ class CylinderOutcome:
         """Return the numbers of a run that did not fail, for result.json."""
         m = self.measures[number]
         around = self.runs[number].around if number in self.spreads else None
-        names = ("warp", "fill")
         return {
             "reached_mm": m.reached,
             "stiffness_N_per_mm": m.stiffness,
@@ -425,8 +348,8 @@ class CylinderOutcome:
             "load_sigma_N": self.sigma(number),
             "spread": None if around is None else around.words,
             "inflation_strain": {
-                "body": dict(zip(names, m.body_strain, strict=True)),
-                "with_seam_and_ends": dict(zip(names, m.anywhere_strain, strict=True)),
+                "body": dict(zip(STRAINS, m.body_strain, strict=False)),
+                "with_seam_and_ends": dict(zip(STRAINS, m.anywhere_strain, strict=False)),
             },
             "straight_before_buckling": m.straightness
             and dict(zip(("r_squared", "largest_deviation"), m.straightness, strict=True)),
@@ -435,17 +358,39 @@ class CylinderOutcome:
         }
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """Return a row of the table of runs."""
-        places = self.runs[number].test.reading.places
-        row = dict(columns_of(self.measures.get(number), tuple(places)))
+        """Return a row of the table of runs; None where a number is unknown or a run failed."""
+        m = self.measures.get(number)
+        row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
+        for name in ("knee", "limit", "wrinkles"):
+            point = (getattr(m, name) if m else None) or (None, None)
+            row |= {f"{name}_mm": point[0], f"{name}_N": point[1]}
+        places = [p.replace(" ", "_") for p in self.runs[number].test.reading.places]
+        loads = m.loads.values() if m else [None] * len(places)
+        row |= {f"load_at_{p}_N": load for p, load in zip(places, loads, strict=True)}
+        body, error = (m.body_strain, m.error) if m else ((None, None), None)
+        row |= {
+            "inflation_warp_strain": body[0],
+            "inflation_fill_strain": body[1],
+            "pressure_rise_kPa": m and m.pressure_rise,
+            "rms_N": error and error.rms,
+            "rms_relative": error and error.relative,
+            "mean_error_N": error and error.mean,
+            "compared": error and error.compared,
+            "reached_mm": m and m.reached,
+        }
         if number in self.spreads:
-            sigma = self.sigma(number)
-            row |= {f"load_at_{p.replace(' ', '_')}_sigma_N": sigma[p] for p in places}
+            sigma = zip(places, self.sigma(number).values(), strict=True)
+            row |= {f"load_at_{p}_sigma_N": value for p, value in sigma}
         return row
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Return deflection, load, gauge pressure, volume and wrinkled share by frame."""
-        curve = curve_of(self.bent.get(number))
+        """Return the run frame by frame; no rows where it failed."""
+        run = self.bent.get(number)
+        values = [np.empty(0)] * len(CURVE)
+        if run is not None:
+            share = run.wrinkled if len(run.wrinkled) else np.full(len(run.load), np.nan)
+            values = [run.deflection, run.load, 1e3 * run.pressure, run.volume, share]
+        curve = pd.DataFrame(dict(zip(CURVE, values, strict=True)))
         if number in self.spreads:
             curve["load_sigma_N"] = self.spreads[number]
         return curve
@@ -467,10 +412,36 @@ class CylinderOutcome:
         }
 
     def lines(self) -> Sequence[str]:
-        """Return a table for the terminal."""
-        ended = [self.ended(i) for i in range(len(self.runs))]
-        sigma = {i: self.sigma(i) for i in self.spreads}
-        return [*terminal_table(self.runs, self.measures, ended, sigma), *self.unsure]
+        """Return a table for the terminal: stiffness, buckling, loads and errors run by run."""
+        runs, spreads = self.runs, self.spreads
+        places = place_names(run.test for run in runs)
+        widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
+        compared = any(m.error is not None for m in self.measures.values())
+        count = 3 if any(run.wall for run in runs) else 2
+        rows = [("test", "card", "wall"), *((run.test.name, run.card, run.wall) for run in runs)]
+        names = [row[:count] for row in rows]
+        wide = [max(map(len, column)) for column in zip(*names, strict=True)]
+        starts = ["  ".join(f"{n:<{w}}" for n, w in zip(row, wide, strict=True)) for row in names]
+        head = f"{starts.pop(0)}   N/mm   buckles at"
+        head += "".join(f"{p:>{w}}" for p, w in zip(places, widths, strict=True))
+        lines = [head + ("   error" if compared else "")]
+        for i, run in enumerate(runs):
+            m, ended = self.measures.get(i), self.ended(i)
+            if m is None:
+                lines.append(f"{starts[i]}  {ended}")
+                continue
+            at = f"{m.buckling[1]:.0f} N {m.buckling[0]:.0f} mm" if m.buckling else "-"
+            text = f"{starts[i]} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6} {at:>13}"
+            sigma = self.sigma(i)
+            for place, width in zip(places, widths, strict=True):
+                text += f"{load_words(m.loads.get(place), sigma.get(place), ' N'):>{width}}"
+            if compared:
+                text += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
+            words = [ended] if run.record.early else []
+            if marked := marks(run.notes):
+                words.append(f"[{', '.join(marked)}]")
+            lines.append("  ".join([text, *words]))
+        return [*lines, *self.unsure]
 
 
 def _point(point: Point | None) -> dict[str, float | None]:

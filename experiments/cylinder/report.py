@@ -67,13 +67,11 @@ def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
     for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
         if name not in mesh.node_sets:
             continue
+        turned = np.where(np.arange(3) == axis, -1.0, 1.0)
         count = len(points)
         points, quads, source = with_mirror_image(points, quads, axis)
-        sign = np.ones((len(points), 3))
-        sign[count:, axis] = -1.0
+        sign = np.where((np.arange(len(points)) < count)[:, None], 1.0, turned)
         moves = [u[source] * sign for u in moves]
-        turned = np.ones(3)
-        turned[axis] = -1.0
         warp = np.concatenate([warp, warp * turned])
         lines = {name: line[source] for name, line in lines.items()}
     sets = {name: np.flatnonzero(line) for name, line in lines.items()}
@@ -125,23 +123,16 @@ FIGURES, BEAMS = "figures", "beams"
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
-    """Draw loads, gas and beam of every test, and all loads; return those of the page.
-
-    Those that the page shows, each with its caption: the loads are charts there.
-    """
+    """Draw loads, gas and beam of every test, and all loads; return those of the page."""
     tests = tests_of(outcome)
-    ranks = _ranks(outcome)
     names = file_names([test.name for test in tests])
-    panels, figures = {}, []
+    panels, figures = {test.name: _panel(test, outcome) for test in tests}, []
     for test in tests:
-        ended = _ended(test, outcome)
-        panels[test.name] = _panel(test, outcome, ended, ranks)
-        if not ended:
+        if not (ended := _ended(test, outcome)):
             continue
-        stem = f"{FIGURES}/{names[test.name]}"
-        loads = bending_charts([panels[test.name]], misses=True, columns=1)
-        save(out.path(f"{stem}-load.png"), loads)
-        save(out.path(f"{stem}-gas.png"), gas_charts(panels[test.name]))
+        stem, panel = f"{FIGURES}/{names[test.name]}", panels[test.name]
+        save(out.path(f"{stem}-load.png"), bending_charts([panel], misses=True, columns=1))
+        save(out.path(f"{stem}-gas.png"), gas_charts(panel))
         first, run = outcome.runs[ended[0]], outcome.bent[ended[0]]
         drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
         draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
@@ -152,18 +143,18 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     if sum(bool(panel.lines) for panel in panels.values()) > 1:
         rows = _rows(tests)
         columns = max(map(len, rows))
-        laid = []
-        for row in rows:
-            laid += [panels[t.name] for t in row] + [BendPanel("")] * (columns - len(row))
+        laid = [
+            panels[row[k].name] if k < len(row) else BendPanel("")
+            for row in rows
+            for k in range(columns)
+        ]
         save(out.path(f"{FIGURES}/all-loads.png"), bending_charts(laid, columns=columns))
     return figures
 
 
 def load_charts(outcome: CylinderOutcome) -> list[Charts]:
     """Return charts of load over deflection of every test; none where no run ended."""
-    ranks = _ranks(outcome)
-    tests = tests_of(outcome)
-    panels = [_panel(test, outcome, _ended(test, outcome), ranks) for test in tests]
+    panels = [_panel(test, outcome) for test in tests_of(outcome)]
     if not any(panel.lines for panel in panels):
         return []
     caption = "Load over deflection"
@@ -205,10 +196,6 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
     return files
 
 
-def _ranks(outcome: CylinderOutcome) -> dict[str, int]:
-    return {card: k for k, card in enumerate(dict.fromkeys(run.card for run in outcome.runs))}
-
-
 def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
     """Return a row a diameter, where several diameters have several pressures."""
     rows: dict[float, list[CylinderTest]] = {}
@@ -216,21 +203,18 @@ def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
         rows.setdefault(round(test.diameter, 6), []).append(test)
     if len(rows) > 1 and max(map(len, rows.values())) > 1:
         return list(rows.values())
-    flat = list(tests)
-    return [flat[i : i + 3] for i in range(0, len(flat), 3)]
+    return [list(tests[i : i + 3]) for i in range(0, len(tests), 3)]
 
 
 def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
     """Return the runs of a test that did not fail, of what the solver predicts."""
-    own = [i for i in outcome.bent if outcome.runs[i].test is test]
-    return [i for i in own if outcome.runs[i].predicted]
+    runs = outcome.runs
+    return [i for i in outcome.bent if runs[i].test is test and runs[i].predicted]
 
 
-def _panel(
-    test: CylinderTest, outcome: CylinderOutcome, ended: Sequence[int], ranks: Mapping[str, int]
-) -> BendPanel:
-    lines = []
-    for i in ended:
+def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
+    cards, lines = list(dict.fromkeys(run.card for run in outcome.runs)), []
+    for i in _ended(test, outcome):
         run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
         rms = None if m.error is None else m.error.rms
         curves = run.deflection, run.load, run.pressure, run.volume
@@ -238,7 +222,7 @@ def _panel(
         band = None if other is None else (other.deflection, other.load)
         sure = outcome.spreads.get(i)
         off = None if sure is None or np.isnan(sure).all() else BAND * sure
-        lines.append(BendLine(card, ranks[card], *curves, m.knee, m.limit, rms, band, off))
+        lines.append(BendLine(card, cards.index(card), *curves, m.knee, m.limit, rms, band, off))
     measured = None
     if test.measured:
         s = scatter(test.measured)
@@ -264,14 +248,13 @@ SIZES: Mapping[str, Callable[[CylinderTest], float]] = {
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
     """Return notes on the uncertainty of the loads and on assumptions."""
     lines = []
-    if outcome.spreads:
-        shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
-                  for i, s in outcome.spreads.items() if not np.isnan(s).all()]  # fmt: skip
-        if shares:
-            lines.append(
-                f"By what the cards leave open of their laws, loads are off by up to "
-                f"{percent(max(shares))} of the largest (one standard deviation)."
-            )
+    shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
+              for i, s in outcome.spreads.items() if not np.isnan(s).all()]  # fmt: skip
+    if shares:
+        lines.append(
+            f"By what the cards leave open of their laws, loads are off by up to "
+            f"{percent(max(shares))} of the largest (one standard deviation)."
+        )
     lines += [f"{words[:1].upper()}{words[1:]}." for words in outcome.unsure]
     if len(outcome.band) > 1:
         ends = "; ".join(f"{end.name}: {end.meaning}" for end in outcome.band)
@@ -288,7 +271,6 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
 #: Letters of a cell that is not broken.
 SHORT = 30
 CURVES = "load_deflection.csv"
-CONTENT = ("deflection", "load", "pressure", "volume", "wrinkled share")
 MEASURED = "measured.csv"
 
 
@@ -314,15 +296,11 @@ def _write_tables(
 ) -> list[Shown]:
     curves = [outcome.curve(i) for i in range(len(outcome.runs))]
     for run, curve in zip(outcome.runs, curves, strict=True):
-        curve.insert(0, "wall", run.wall)
-        curve.insert(0, "card", run.card)
-        curve.insert(0, "test", run.test.name)
+        for k, column in enumerate((run.test.name, run.card, run.wall)):
+            curve.insert(k, ("test", "card", "wall")[k], column)
+    what = "every curve: deflection, load, pressure, volume, wrinkled share"
     found = [
-        (
-            CURVES,
-            pd.concat(curves),
-            "every curve: deflection, load, pressure, volume, wrinkled share",
-        ),
+        (CURVES, pd.concat(curves), what),
         (MEASURED, measured_table(tests), "mean and scatter of the repetitions on a grid"),
     ]
     files = []
@@ -396,8 +374,8 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     for i, m in outcome.measures.items():
         if (error := m.error) is not None:
             run = outcome.runs[i]
+            head = [run.test.name, run.card, *(walls and [run.wall])]
             numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
-            head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
             rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
     if not rows:
         return []
@@ -421,17 +399,16 @@ def simulate(
     within_range: bool = False,
 ) -> Simulation:
     """Write load_deflection.csv, figures and beams; return the numbers of every card."""
-    kind, predicted = CylinderPredicted(), []
+    predicted = []
     for name, card in cards.items():
         run = runs[name, PART]
-        record = record_of(kind, run.model, run.outcome)
+        record = record_of(CylinderPredicted(), run.model, run.outcome)
         predicted.append(PredictedRun(test, name, card, run.model, record))
     outcome = CylinderOutcome(predicted)
     if outcome.measures:
         show_outcome(outcome, out)
     numbers = {
-        run.card: {"ended": outcome.ended(i)}
-        | (dict(outcome.numbers(i)) if i in outcome.measures else {})
-        for i, run in enumerate(predicted)
+        name: {"ended": outcome.ended(i), **(outcome.numbers(i) if i in outcome.measures else {})}
+        for i, name in enumerate(cards)
     }
     return Simulation({"cards": numbers}, outcome.lines())

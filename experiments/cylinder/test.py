@@ -1,4 +1,4 @@
-"""A cylinder in bending, as its section describes it, and its model."""
+"""A cylinder in bending: its section [[cylinder]] of a project, and its model."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from ...errors import InputError
 from ...files import is_file
@@ -29,39 +29,76 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve, read_bending_curves
 from ...readers.frames import FrameSource
-from ..keys import channel_of, named_format
-from ..kinds import DataFile, Place, Reach, Refined, joined
-from .section import CylinderSection, MeasuredSection
+from ...readers.sections import Name, Number, Positive, Section
+from ..kinds import (
+    ChannelSection,
+    DataFile,
+    Place,
+    Reach,
+    Refined,
+    channel_of,
+    joined,
+    named_format,
+)
+
+Frames = Annotated[int, Field(ge=1, le=10000)]
+FileNames = Annotated[list[str], Field(min_length=1)]
+Lengths = Annotated[list[Positive], Field(min_length=1)]
+NotNegative = Annotated[float, Field(ge=0, le=1e18)]
 
 
-def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
-    """Read every repetition in the files of a section; none where it lists none."""
-    names = section.files or []
-    folder = place.data_folder
-    if folder is None:
-        folder = place.path.parent / section.folder
-    format = named_format(place, "measured.format", "machine table", section.format)
-    curves: list[BendingCurve] = []
-    for k, name in enumerate(names):
-        file, key = folder / name, f"measured.files[{k}]"
-        if Path(name) in map(Path, names[:k]):
-            raise place.error(key, f"{name!r} is listed twice; it would count double")
-        if not is_file(file):
-            if not place.need_data:
-                continue
-            raise place.error(key, f"there is no file {file}; --data DIR names another folder")
-        curves += read_bending_curves(
-            file,
-            deflection=channel_of(section.deflection),
-            load=channel_of(section.load),
-            repetition=section.repetition,
-            preload=section.preload,
-            zero=section.zero,
-            comment=section.comment,
-            decimal=section.decimal,
-            format=format,
-        )
-    return tuple(curves)
+class CollarSection(Section):
+    """The ring that bends the cylinder; by its diameter unless given."""
+
+    inner_diameter: Positive
+    length: Positive
+    fillet: Positive | None = None
+
+
+class GasSection(Section):
+    """The gas that fills the cylinder."""
+
+    ambient: Positive | None = None
+    temperature: Positive | None = None
+    density: Positive | None = None
+
+
+class MeasuredSection(Section):
+    """Measured loads: a file a repetition, or a column that tells repetitions apart."""
+
+    files: FileNames | None = None
+    folder: str = ""
+    format: str | None = None
+    deflection: ChannelSection = ChannelSection()
+    load: ChannelSection = ChannelSection()
+    repetition: str | None = None
+    preload: Number = 0.0
+    zero: Literal["none", "first", "line"] = "none"
+    comment: str = "#"
+    decimal: Literal[".", ","] | None = None
+
+
+class CylinderSection(Section):
+    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar."""
+
+    name: Name | None = None
+    diameter: Positive
+    pressure: Positive
+    length: Positive | None = None
+    seam_width: NotNegative | None = None
+    element_size: Positive | None = None
+    symmetry: Literal["full", "quarter"] = "quarter"
+    span: Positive | None = None
+    support_diameter: Positive | None = None
+    collar: CollarSection | None = None
+    deflection: Positive | None = None
+    frames: Frames | None = None
+    deflections: Lengths | None = None
+    places: Lengths | None = None
+    slope_over: Positive | None = None
+    cap_warp: Literal["x", "y"] = "x"
+    gas: GasSection = GasSection()
+    measured: MeasuredSection = MeasuredSection()
 
 
 #: The one part of the test.
@@ -78,8 +115,8 @@ KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size"
 class CylinderTest:
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
-    deflections : frames of the bending. listed : whether the section lists measured files. assumed
-    : what the section leaves to usual values, in words.
+    deflections : frames of the bending. reads_files : whether the section lists any. assumed : what
+    the section leaves to usual values, in words.
     """
 
     name: str
@@ -97,16 +134,13 @@ class CylinderTest:
     gas: Gas
     reading: CurveReading
     measured: tuple[BendingCurve, ...] = ()
-    listed: bool = False
+    reads_files: bool = False
     assumed: tuple[str, ...] = ()
     kind: str = "cylinder"
     #: Nothing of it is fitted.
     weight: float = 1.0
-
-    @property
-    def reads_files(self) -> bool:
-        """Return whether its section lists measured files."""
-        return self.listed
+    #: The strains are known only with a card.
+    reach = Reach()
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the files of the measured repetitions."""
@@ -115,11 +149,6 @@ class CylinderTest:
             for c in self.measured
             if c.path is not None
         )
-
-    @property
-    def reach(self) -> Reach:
-        """Return nothing: the strains are known only with a card."""
-        return Reach()
 
     def model(self, thickness: float | None = None) -> CylinderModel:
         """Return the model with a fabric of this thickness (mm), else of the project's."""
@@ -149,66 +178,83 @@ class CylinderTest:
 
     def settings(self) -> Mapping[str, object]:
         """Return everything but names, measurements and where the curve is read."""
-        names = (
-            "diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
-            "deflections",
-        )  # fmt: skip
+        names = ("diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
+                 "deflections")  # fmt: skip
         bodies = {name: asdict(getattr(self, name)) for name in ("supports", "collar", "gas")}
         return {**{name: getattr(self, name) for name in names}, **bodies}
 
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     """Read the section of a test; refuse a cylinder that makes no model."""
-    scales = place.scales
+    length, pressure = place.scales.length, place.scales.pressure
 
-    def length(value: float | None, default: float) -> float:
-        return default if value is None else float(value * scales.length)
+    def own(value: float | None, default: float) -> float:
+        return default if value is None else float(value * length)
 
-    diameter = section.diameter * scales.length
-    places = section.places
+    def scaled(part: BaseModel, scale: float, *names: str) -> dict[str, Any]:
+        given = part.model_dump(exclude_none=True)
+        return {k: v * scale if k in names else v for k, v in given.items()}
+
+    def listed(values: Sequence[float] | None) -> list[float] | None:
+        return None if values is None else [v * length for v in values]
+
+    diameter, usual = section.diameter * length, RigidSupports()
+    deflections, end = listed(section.deflections), own(section.deflection, DEFLECTION)
+    if deflections is None:
+        deflections = np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist()
     try:
+        collar = section.collar and Collar(
+            **scaled(section.collar, length, "inner_diameter", "length", "fillet")
+        )
         test = CylinderTest(
             name=name,
             place=place,
             diameter=diameter,
-            pressure=section.pressure * scales.pressure,
-            length=length(section.length, LENGTH),
-            seam_width=length(section.seam_width, SEAM_WIDTH),
-            size=length(section.element_size, SIZE),
+            pressure=section.pressure * pressure,
+            length=own(section.length, LENGTH),
+            seam_width=own(section.seam_width, SEAM_WIDTH),
+            size=own(section.element_size, SIZE),
             symmetry=section.symmetry,
             cap_warp=section.cap_warp,
             supports=RigidSupports(
-                length(section.span, RigidSupports().span),
-                length(section.support_diameter, RigidSupports().diameter),
+                own(section.span, usual.span), own(section.support_diameter, usual.diameter)
             ),
-            collar=usual_collar(diameter)
-            if section.collar is None
-            else Collar(**_scaled(section.collar, scales.length)),
-            deflections=_deflections(section, scales.length),
-            gas=Gas(**_scaled(section.gas, scales.pressure, ("ambient",))),
+            collar=collar or usual_collar(diameter),
+            deflections=tuple(deflections),
+            gas=Gas(**scaled(section.gas, pressure, "ambient")),
             reading=curve_reading(
-                diameter,
-                None if places is None else [p * scales.length for p in places],
-                section.slope_over and section.slope_over * scales.length,
+                diameter, listed(section.places), section.slope_over and section.slope_over * length
             ),
         )
         test.model()
     except InputError as error:
         raise place.error(KEYS.get(error.field, error.field), error.problem) from None
-    listed = bool(section.measured.files)
-    assumed = tuple(words for key, words in USUAL.items() if getattr(section, key) is None)
-    measured = read_measured(section.measured, place)
-    return replace(test, measured=measured, listed=listed, assumed=assumed)
+    return replace(
+        test,
+        measured=read_measured(section.measured, place),
+        reads_files=bool(section.measured.files),
+        assumed=tuple(words for key, words in USUAL.items() if getattr(section, key) is None),
+    )
 
 
-def _scaled(section: BaseModel, scale: float, names: Sequence[str] | None = None) -> dict[str, Any]:
-    given = section.model_dump(exclude_none=True)
-    return {k: v * scale if names is None or k in names else v for k, v in given.items()}
-
-
-def _deflections(section: CylinderSection, scale: float) -> tuple[float, ...]:
-    """Return the deflections listed, else equal steps."""
-    if section.deflections is not None:
-        return tuple(d * scale for d in section.deflections)
-    end = DEFLECTION if section.deflection is None else section.deflection * scale
-    return tuple(np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist())
+def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
+    """Read every repetition in the files of a section; none where it lists none."""
+    names = section.files or []
+    folder = place.data_folder
+    if folder is None:
+        folder = place.path.parent / section.folder
+    format = named_format(place, "measured.format", "machine table", section.format)
+    way, load = channel_of(section.deflection), channel_of(section.load)
+    keys = ("repetition", "preload", "zero", "comment", "decimal")
+    said = {key: getattr(section, key) for key in keys}
+    curves: list[BendingCurve] = []
+    for k, name in enumerate(names):
+        file, key = folder / name, f"measured.files[{k}]"
+        if Path(name) in map(Path, names[:k]):
+            raise place.error(key, f"{name!r} is listed twice; it would count double")
+        if not is_file(file):
+            if not place.need_data:
+                continue
+            raise place.error(key, f"there is no file {file}; --data DIR names another folder")
+        curves += read_bending_curves(file, deflection=way, load=load, format=format, **said)
+    return tuple(curves)

@@ -3,46 +3,31 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import BaseModel
 
 from ...materials.law import HypoelasticLaw
-from ...meshes.strip_models import UniaxialModel
-from ...solvers.base import History
-from ..kinds import Kind, MakeSolver, Predicted, Studied
-from .candidates import candidates
-from .prepared import Array, PreparedStrips
-from .section import StripsSection
-from .test import StripsTest, read
-
-
-def _end_load(model: UniaxialModel, history: History) -> dict[str, float]:
-    return {"load at the end, N": float(history.load[-1])}
-
-
-def _load_curve(model: UniaxialModel, history: History) -> tuple[Array, Array]:
-    return np.array(model.elongations), history.load
+from ..kinds import MakeSolver, Studied
+from .prepared import PreparedStrips, candidates
+from .test import StripsSection, StripsTest, read
 
 
 class Strips:
     """Cut strips pulled along warp, fill and across the yarns."""
 
-    name: str = "strips"
-    title: str = "cut strips pulled along warp, fill and 45 degrees"
-    section: type[BaseModel] = StripsSection
-    folder_key: str = "data.folder"
-    fitted: bool = True
-    predicted: Predicted | None = None
-    doubts: tuple[str, ...] = (
-        "elongation-unit", "load-unit", "preload", "after-failure", "swapped",
-    )  # fmt: skip
+    name = "strips"
+    title = "cut strips pulled along warp, fill and 45 degrees"
+    section = StripsSection
+    folder_key = "data.folder"
+    fitted = True
+    predicted = None
+    doubts = ("elongation-unit", "load-unit", "preload", "after-failure", "swapped")
     read = staticmethod(read)
     candidates = staticmethod(candidates)
-    studied: Studied | None = Studied(
+    studied = Studied(
         steps=lambda model: model.elongations,
-        quantities=_end_load,
-        responses=_end_load,
+        quantities=lambda model, history: {"load at the end, N": float(history.load[-1])},
+        responses=lambda model, history: {"load at the end, N": float(history.load[-1])},
         response="load",
-        curve=_load_curve,
+        curve=lambda model, history: (np.array(model.elongations), history.load),
     )
 
     def prepare(
@@ -52,4 +37,4 @@ class Strips:
         return PreparedStrips(test)
 
 
-KIND: Kind = Strips()
+KIND = Strips()

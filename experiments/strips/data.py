@@ -1,39 +1,28 @@
-"""Data of strip tests: files, load curves by direction, polynomials of them and their regions."""
+"""Data of one direction: load curves, their polynomials and regions, and doubts about them."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
-from ...files import is_file
 from ...inference.comparison import NoiseIs
-from ...meshes.strip_models import WIDTH
 from ...readers.curves import (
-    DIRECTIONS,
     LoadCurve,
     LoadPolynomial,
     checked_points,
     fit_load_polynomial,
-    read_load_curves,
-    read_published_polynomials,
-    specimen_scatter,
-    split_at_restarts,
     terms_of,
 )
 from ...readers.frames import FrameSource
 from ...readers.registry import format_of
-from ...readers.sections import beside
-from ..keys import named_format
-from ..kinds import DataFile, Place
-from .section import CurvesSection, GaugeSection, StripsSection
+from ..kinds import DataFile, Doubt, Expected
 
 Array = NDArray[np.float64]
 
@@ -96,21 +85,17 @@ def compare_orders(
     ]
     scores = tuple(_score(u, f, order, through_origin, groups) for order in sorted(set(orders)))
 
-    def best(values: list[float]) -> int:
-        return scores[int(np.argmin(values))].order
+    def best(rule: str, sign: float = 1.0) -> int:
+        return scores[int(np.argmin([sign * getattr(s, rule) for s in scores]))].order
 
-    rules = ("rmse", "aic", "bic", "left_out")
-    fit, aic, bic, left_out = (best([getattr(s, rule) for s in scores]) for rule in rules)
-    adjusted = best([-score.adjusted_r_squared for score in scores])
-    return OrderComparison(scores, fit, adjusted, aic, bic, left_out)
+    adjusted = best("adjusted_r_squared", -1.0)
+    return OrderComparison(
+        scores, best("rmse"), adjusted, best("aic"), best("bic"), best("left_out")
+    )
 
 
 def _score(
-    u: Array,
-    f: Array,
-    order: int,
-    through_origin: bool,
-    groups: list[NDArray[np.intp]],
+    u: Array, f: Array, order: int, through_origin: bool, groups: list[NDArray[np.intp]]
 ) -> OrderScore:
     fitted = fit_load_polynomial(u, f, order, through_origin)
     terms, _, _ = terms_of(u, order, through_origin)
@@ -158,91 +143,14 @@ def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
         raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
     places = np.linspace(0.0, x.max(), BREAKS + 2)[1:-1]
     hinges = np.maximum(x[:, None] - places, 0.0)
-    best, least = (places[0], places[-1]), np.inf
-    for a, b in itertools.combinations(range(BREAKS), 2):
-        terms = np.stack([x, hinges[:, a], hinges[:, b]], axis=1)
+
+    def error(pair: tuple[int, int]) -> float:
+        terms = np.stack([x, hinges[:, pair[0]], hinges[:, pair[1]]], axis=1)
         slopes, *_ = np.linalg.lstsq(terms, f, rcond=None)
-        error = float(np.sum((terms @ slopes - f) ** 2))
-        if error < least:
-            best, least = (places[a], places[b]), error
-    return float(best[0]), float(best[1])
+        return float(np.sum((terms @ slopes - f) ** 2))
 
-
-@dataclass(frozen=True)
-class ListedFile:
-    """A file of a section, with its key, and the direction it is listed for or None.
-
-    field : its key below the section. direction : the one it is listed for; None where the file
-    itself names it.
-    """
-
-    path: Path
-    field: str
-    direction: str | None = None
-
-
-def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
-    """Return the files of [strips.data], there or not, in the order of the section."""
-    if data.polynomials is not None:
-        return [ListedFile(folder / data.polynomials, "data.polynomials")]
-    field = "data.files"
-    by_direction: dict[str | None, list[str]] = {}
-    if isinstance(data.files, list):
-        by_direction[None] = data.files
-    elif data.files is not None:
-        by_direction = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
-    listed = []
-    for direction, names in by_direction.items():
-        key = field if direction is None else f"{field}.{direction}"
-        for i, name in enumerate(names):
-            if Path(name) in map(Path, names[:i]):
-                problem = f"{name!r} is listed twice; its points would count double"
-                raise place.error(f"{key}[{i}]", problem)
-            listed.append(ListedFile(folder / name, f"{key}[{i}]", direction))
-    if not listed:
-        problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
-        raise place.error(field, problem)
-    return listed
-
-
-def measured_curves(
-    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
-) -> dict[str, tuple[LoadCurve, ...]]:
-    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
-
-    A file with one curve in a direction perhaps lists several specimens, one after the other and
-    not named: it is split where the elongation starts again. width : of the strips, mm.
-    """
-    format = named_format(place, "data.format", "machine table", data.format)
-    columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
-    by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
-    first: dict[Path, LoadCurve] = {}
-    for file in listed:
-        curves = read_load_curves(
-            file.path,
-            columns=columns or None,
-            load_unit=data.load_unit,
-            length_unit=data.length_unit,
-            width=width,
-            comment=data.comment,
-            direction=file.direction,
-            decimal=data.decimal,
-            format=format,
-        )
-        before = first.setdefault(file.path, curves[0])
-        if before.direction != curves[0].direction and all(
-            np.array_equal(getattr(before, name), getattr(curves[0], name))
-            for name in ("elongation", "load")
-        ):
-            problem = f"is listed for {before.direction} too, and does not tell the two apart"
-            raise place.error(file.field, problem)
-        for direction in DIRECTIONS:
-            own = [curve for curve in curves if curve.direction == direction]
-            if len(own) == 1:
-                parts = split_at_restarts(own[0])
-                own = list(parts) if len(parts) > 1 else own
-            by_direction[direction] += own
-    return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
+    first, second = min(itertools.combinations(range(BREAKS), 2), key=error)
+    return float(places[first]), float(places[second])
 
 
 #: Of the largest load: the least noise to reckon with where no scatter is known. The thesis'
@@ -291,8 +199,7 @@ class Strip:
     @property
     def points(self) -> tuple[Array, Array]:
         """Return elongation and load of all specimens up to the end of the model, by elongation."""
-        elongation, load, _ = self._inside
-        return elongation, load
+        return self._inside[:2]
 
     @property
     def specimen_of(self) -> NDArray[np.intp]:
@@ -334,11 +241,8 @@ class Strip:
         if polynomial is None:
             return None
         if mask is not None and self.curves:
-            elongation, load = self.points
-            order = polynomial.order
-            polynomial = fit_load_polynomial(
-                elongation[mask], load[mask], order, self.through_origin
-            )
+            u, load = (values[mask] for values in self.points)
+            polynomial = fit_load_polynomial(u, load, polynomial.order, self.through_origin)
         u = np.linspace(0.0, self._end_of(mask), PLACES)[1:]
         strain, whole = np.log1p(u / self.gauge_length), self.strain_by(mask)
         first, second = strain_regions(strain, polynomial(u))
@@ -363,126 +267,100 @@ class Strip:
         return elongation[order], load[order], owners[order].astype(np.intp)
 
 
-#: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
-#: breaks between two readings.
-EXTRAPOLATED = 0.05
+#: Strains at the end of a curve: no coated fabric ends below or above.
+LEAST_END, MOST_END = 0.002, 1.5
+#: Of the largest load: more than that at no elongation is a preload, or a zero that is not one.
+PRELOAD = 0.05
+#: Of the elongation: where a curve is taken to begin.
+BEGINNING = 0.01
+#: Of the largest load: a fall below while the strip is pulled further is a failure.
+FAILED = 0.7
+#: Of the end strain: where the modulus of a curve is taken.
+SLOPE_AT = 0.5
+#: The modulus along the yarns whose bounds a direction's curve can be held against.
+ALONG = {"warp": "E1", "fill": "E2"}
+#: How much stiffer than the warp the fill must be to be taken for it.
+STIFFER = 1.15
 
 
-def read_strips(place: Place, section: StripsSection) -> dict[str, Strip]:
-    """Read the strips of a section, by direction: those with a table or data.
-
-    Missing files are no error where the place needs none and all lengths are given.
-    """
-    data = section.data
-    if (data.polynomials is None) == (data.files is None):
-        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
-    folder = place.data_folder
-    if folder is None:
-        folder = beside(place.path.parent, data.folder)
-    tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
-    listed = listed_files(place, data, folder)
-    missing = next((file for file in listed if not is_file(file.path)), None)
-    if missing is not None:
-        lengths = [x for t in tables.values() for x in (t.gauge_length, t.final_length)]
-        if place.need_data or not lengths or None in lengths:
-            problem = f"there is no file {missing.path}; --data DIR names another folder"
-            raise place.error(missing.field, problem)
-        length = place.scales.length
-        return {
-            d: _strip(place, d, t.gauge_length * length, t.final_length * length)
-            for d, t in tables.items()
-        }
-    if data.polynomials is not None:
-        strips = _published(place, data, tables, listed[0])
-    else:
-        width = WIDTH if section.width is None else section.width * place.scales.length
-        strips = _measured(place, data, tables, listed, width)
-    if not strips:
-        problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
-        raise place.error("data", problem)
-    for direction in tables:
-        if direction not in strips:
-            problem = f"the data hold no {direction} test; leave this section out or add its data"
-            raise place.error(direction, problem)
-    return strips
+def doubts_of_strips(
+    strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected
+) -> Sequence[Doubt]:
+    """Return the doubts about the strips of a test, by direction; widths and thickness mm."""
+    found: list[Doubt] = []
+    moduli: dict[str, list[float]] = {}
+    for direction, strip in strips.items():
+        for name, elongation, load in curves_of(strip):
+            what = f"{direction}, {name}" if name else direction
+            found += _of_curve(what, strip, elongation, load)
+            if direction not in ALONG or not expected.moduli:
+                continue
+            modulus = _modulus(strip, elongation, load, width * thickness)
+            moduli.setdefault(direction, []).append(modulus)
+            if far := expected.outside(modulus, [ALONG[direction]]):
+                text = (
+                    f"{what}: load over strain is a modulus of about {far}: are load and "
+                    "elongation in the units that are said, and are width and thickness right?"
+                )
+                found.append(Doubt("load-unit", True, text))
+    if set(ALONG) <= set(strips) and expected.moduli and expected.warp_is_stiffer:
+        warp, fill = (float(np.median(moduli.get(d) or np.nan)) for d in ALONG)
+        if fill > STIFFER * warp:
+            text = (
+                f"the fill's modulus is about {fill:.3g} MPa, the warp's {warp:.3g} MPa, and the "
+                "bounds have the warp stiffer: warp and fill seem to be swapped"
+            )
+            found.append(Doubt("swapped", False, text))
+    return found
 
 
-def _published(
-    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
-) -> dict[str, Strip]:
-    format = named_format(place, "data.format", "load polynomials", data.format)
-    curves, length = read_published_polynomials(file.path, format), place.scales.length
-    wanted = [d for d in DIRECTIONS if d in curves and (d in tables or not tables)]
-    strips = {}
-    for direction in wanted:
-        curve, own = curves[direction], tables.get(direction) or GaugeSection()
-        start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
-        end = curve.final_length if own.final_length is None else own.final_length * length
-        scatter = None if np.isnan(curve.scatter) else curve.scatter
-        known = {"scatter": scatter, "published": file.path}
-        strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
-    return strips
+def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
+    """Return name, elongation and load of every specimen, else of the polynomial."""
+    if strip.curves:
+        return [(curve.specimen, curve.elongation, curve.load) for curve in strip.curves]
+    if strip.polynomial is None:
+        return []
+    elongation = np.linspace(0.0, strip.elongation, 50)
+    return [("", elongation, strip.polynomial(elongation))]
 
 
-def _measured(
-    place: Place,
-    data: CurvesSection,
-    tables: Mapping[str, GaugeSection],
-    listed: Sequence[ListedFile],
-    width: float,
-) -> dict[str, Strip]:
-    said = {file.direction for file in listed}
-    strips = {}
-    for direction, curves in measured_curves(place, data, listed, width).items():
-        # A table picks among what a file holds; a file listed for a direction is meant.
-        if tables and direction not in tables and direction not in said:
-            continue
-        own = tables.get(direction) or GaugeSection()
-        if own.gauge_length is None:
-            problem = "this key is missing; the strain follows from it"
-            raise place.error(f"{direction}.gauge_length", problem)
-        start = own.gauge_length * place.scales.length
-        elongation = np.concatenate([c.elongation for c in curves])
-        load = np.concatenate([c.load for c in curves])
-        try:
-            polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
-            scatter = specimen_scatter(curves, polynomial).deviation
-        except InputError as error:
-            problem = f"no load curve through the {direction} points: {error.problem}"
-            raise place.error(f"data, {error.field}", problem) from None
-        end = start + polynomial.end
-        if own.final_length is not None:
-            end = own.final_length * place.scales.length
-        strips[direction] = _strip(
-            place,
-            direction,
-            start,
-            end,
-            polynomial=polynomial,
-            curves=curves,
-            scatter=scatter,
-            through_origin=data.through_origin,
-            open_end=own.final_length is None,
+def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
+    """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
+    strain = elongation[-1] / strip.gauge_length
+    if not LEAST_END < strain < MOST_END:
+        text = (
+            f"{what}: the curve ends at an elongation of {strain:.3g} gauge lengths: is it a length"
+            " in the unit that is said (not percent, not a strain), and is the gauge length right?"
         )
-    return strips
-
-
-def _strip(
-    place: Place,
-    direction: str,
-    start: float,
-    end: float,
-    polynomial: LoadPolynomial | None = None,
-    **data: Any,
-) -> Strip:
-    field = f"{direction}.final_length"
-    if not end > start:
-        problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"
-        raise place.error(field, problem)
-    if polynomial is not None and end - start > polynomial.end * (1 + EXTRAPOLATED):
-        problem = (
-            f"the data end at an elongation of {polynomial.end:.5g} mm; expected up to"
-            f" {start + polynomial.end:.5g} mm, got {end:g} mm"
+        yield Doubt("elongation-unit", True, text)
+    largest, end = float(load.max()), float(elongation.max())
+    # A curve may begin where the strip is elongated already.
+    first = load[np.abs(elongation) <= BEGINNING * end]
+    level = float(np.median(first)) / largest if first.size and largest > 0 else 0.0
+    if abs(level) >= PRELOAD:
+        text = (
+            f"{what}: the load is {level * largest:.3g} N ({level:.0%} of the largest) where the "
+            "curve begins: a preload, or a zero that was not set; begin the elongation where the "
+            "load does"
         )
-        raise place.error(field, problem)
-    return Strip(direction, start, end, polynomial, **data)
+        yield Doubt("preload", False, text)
+    largest, end = 0.0, strip.elongation
+    for u, f in zip(elongation, load, strict=True):
+        if u > end * (1 + 1e-9):
+            break
+        largest = max(largest, float(f))
+        if f < FAILED * largest and u > SLOPE_AT * end:
+            text = (
+                f"{what}: the load falls from {largest:.3g} to {f:.3g} N at an elongation of "
+                f"{u:.3g} mm: rows after failure; cut them off, or say a shorter final_length"
+            )
+            yield Doubt("after-failure", True, text)
+            break
+
+
+def _modulus(strip: Strip, elongation: Array, load: Array, area: float) -> float:
+    """Return secant modulus (MPa) at half of the end strain."""
+    strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
+    near = np.argsort(np.abs(strain - SLOPE_AT * float(strain.max())))[:5]
+    value = np.median(load[near] / np.where(strain[near] > 0, strain[near], np.nan))
+    return float(value) / area if np.isfinite(value) else float("nan")

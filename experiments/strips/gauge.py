@@ -24,10 +24,7 @@ if TYPE_CHECKING:
     from scipy.spatial import Delaunay
 
 #: Kinds of notes that are made here.
-LOST = NoteKind("correlation lost")
-NO_LOAD = NoteKind("frames without load")
-
-
+LOST, NO_LOAD = NoteKind("correlation lost"), NoteKind("frames without load")
 Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
@@ -76,29 +73,20 @@ def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
     """
     if surface is None:
         return "no three correlated points that span a surface"
-    triangle, weights = _triangle_around(end, surface)
-    if triangle < 0:
-        return "outside the correlated points"
-    widest = float(surface.longest_edge(np.array([triangle]))[0])
-    if widest > limit:
-        return f"the points around it are {widest:.3g} mm apart, allowed {limit:.3g}"
-    corners = surface.places[surface.mesh.simplices[triangle]]
-    return np.asarray(np.einsum("i,ijk->jk", weights, corners))
-
-
-def _triangle_around(end: Array, surface: Surface) -> tuple[int, Array]:
-    """Return the triangle that holds a point (2,), -1 for none, and its corners' weights (3,).
-
-    Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
-    triangulating.
-    """
+    # Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
+    # triangulating. Twice the areas that the point makes with the sides opposite to each corner:
     x, y = np.moveaxis(surface.places[surface.mesh.simplices, 0, :2] - end, -1, 0)
-    # Twice the areas that the point makes with the sides opposite to each corner.
     areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
     whole = areas.sum(axis=1, keepdims=True)
     weights = np.divide(areas, whole, out=np.full_like(areas, -1.0), where=whole != 0)
     best = int(np.argmax(weights.min(axis=1)))
-    return (best if weights[best].min() >= -1e-9 else -1), weights[best]
+    if weights[best].min() < -1e-9:
+        return "outside the correlated points"
+    widest = float(surface.longest_edge(np.array([best]))[0])
+    if widest > limit:
+        return f"the points around it are {widest:.3g} mm apart, allowed {limit:.3g}"
+    corners = surface.places[surface.mesh.simplices[best]]
+    return np.asarray(np.einsum("i,ijk->jk", weights[best], corners))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +141,7 @@ def virtual_strain_gauge(
     places = [[place_of(end, surface, limit) for surface in seen] for end in ends]
     warnings = []
     for name, end, per_frame in zip(("lower", "upper"), ends, places, strict=True):
-        why = {i: place for i, place in enumerate(per_frame) if isinstance(place, str)}
-        if not why:
+        if not (why := {i: place for i, place in enumerate(per_frame) if isinstance(place, str)}):
             continue
         at = f"{name} end of the gauge at ({end[0]:g}, {end[1]:g}) mm"
         first = next(iter(why.values()))
@@ -185,15 +172,9 @@ def _record(lower: Sequence, upper: Sequence, warnings: tuple[Note, ...]) -> Gau
     if not length[np.isfinite(length)].all():
         raise InputError(None, "gauge", "the two ends meet in a frame; are the columns right?")
     lost = tuple(i for i, pair in enumerate(pairs) if pair is None)
-    return GaugeRecord(
-        reference,
-        length,
-        length - reference,
-        (length - reference) / reference,
-        np.log(length / reference),
-        lost,
-        warnings,
-    )
+    further = length - reference
+    strains = further / reference, np.log(length / reference)
+    return GaugeRecord(reference, length, further, *strains, lost, warnings)
 
 
 def _end(point: ArrayLike, name: str) -> Array:
@@ -225,17 +206,14 @@ def gauge_load_curve(
     if (frame_times is None) != (load_times is None):
         raise InputError(path, "times", "expected both frame_times and load_times, or neither")
     inside = np.ones(count, dtype=bool)
-    if frame_times is None or load_times is None:
-        if load.shape != (count,):
-            problem = f"expected one load a frame, got {load.size} for {count} frames; pair by time"
-            raise InputError(path, "loads", problem)
-    else:
+    if frame_times is not None and load_times is not None:
         load, inside = _at_times(load, np.asarray(frame_times), np.asarray(load_times), count, path)
-    early = int((~inside).sum())
-    if early:
-        which = ", ".join(map(str, np.flatnonzero(~inside)))
+    elif load.shape != (count,):
+        problem = f"expected one load a frame, got {load.size} for {count} frames; pair by time"
+        raise InputError(path, "loads", problem)
+    if len(early := np.flatnonzero(~inside)):
         problem = "%s: %d of %d frames have no load at their time: %s"
-        log.warning(problem, specimen, early, count, which)
+        log.warning(problem, specimen, len(early), count, ", ".join(map(str, early)))
     kept = inside & np.isfinite(record.elongation)
     if kept.sum() < 2:
         problem = f"only {kept.sum()} of {count} frames have both length and load; expected two"
@@ -285,10 +263,13 @@ class PairedLoads:
         direction_named(self.direction)
         if self.frame_times is not None and self.frame_interval is not None:
             raise InputError(None, "frame_times, frame_interval", "give one of them, not both")
-        if not self.timed:
-            self._refuse("time_column", "time_offset", needs="frame_times or frame_interval")
-        if self.frame_times is None:
-            self._refuse("frame_time_column", needs="frame_times")
+        for name, needs in (
+            ("time_column", None if self.timed else "frame_times or frame_interval"),
+            ("time_offset", None if self.timed else "frame_times or frame_interval"),
+            ("frame_time_column", "frame_times" if self.frame_times is None else None),
+        ):
+            if needs and getattr(self, name) is not None:
+                raise InputError(None, name, f"means nothing without {needs}")
         for name in ("frame_interval", "time_offset"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
@@ -302,11 +283,6 @@ class PairedLoads:
         """Return whether loads and frames are paired by time."""
         return self.frame_times is not None or self.frame_interval is not None
 
-    def _refuse(self, *useless: str, needs: str) -> None:
-        for name in useless:
-            if getattr(self, name) is not None:
-                raise InputError(None, name, f"means nothing without {needs}")
-
 
 def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
     """Return the load curve of a gauge."""
@@ -319,16 +295,11 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
         if len(times) != count:
             problem = f"expected one time for each of the {count} frames, got {len(times)}"
             raise InputError(loads.frame_times, "", problem)
-    named = {"load": loads.load_column, "time": loads.time_column}
+    columns = {"load": loads.load_column, "time": loads.time_column}
+    named = {quantity: column for quantity, column in columns.items() if column is not None}
+    own = {name: getattr(loads, name) for name in ("timed", "load_unit", "decimal", "format")}
     with _naming("load_column, time_column" if loads.timed else "load_column"):
-        machine = read_machine_loads(
-            loads.path,
-            columns={quantity: column for quantity, column in named.items() if column is not None},
-            timed=loads.timed,
-            load_unit=loads.load_unit,
-            decimal=loads.decimal,
-            format=loads.format,
-        )
+        machine = read_machine_loads(loads.path, columns=named, **own)
     if not loads.timed and len(machine.load) != count:
         problem = (
             f"expected one load for each of the {count} frames, got {len(machine.load)};"
@@ -384,8 +355,7 @@ class GaugeTable:
         notes = [*self.record.warnings, *([as_note(self.note)] if self.note else [])]
         if without := self.without_load:
             words = f"{len(without)} of {len(self.files)} frames have a length and no load; they "
-            words += f"are left out: {', '.join(without)}"
-            notes.append(Note(NO_LOAD, words))
+            notes.append(Note(NO_LOAD, f"{words}are left out: {', '.join(without)}"))
         return notes
 
     @property
@@ -414,13 +384,13 @@ class GaugeTable:
         """Write the table with its notes; with loads, strips of a project read it as a curve."""
         ends = [f"({x:g}, {y:g})" for x, y in (self.lower, self.upper)]
         about = (
-            f"# virtual strain gauge between {ends[0]} and {ends[1]} mm,"
-            f" {self.record.reference_length:.6g} mm long in the reference state\n"
+            f"virtual strain gauge between {ends[0]} and {ends[1]} mm,"
+            f" {self.record.reference_length:.6g} mm long in the reference state"
         )
         # A line each, whatever the names of the files hold.
-        about += "".join(f"# note: {' '.join(note.split())}\n" for note in self.notes)
+        lines = [about, *(f"note: {' '.join(note.split())}" for note in self.notes)]
         with replacing(path) as temporary, open(temporary, "w", encoding="utf-8") as stream:
-            stream.write(about)
+            stream.writelines(f"# {line}\n" for line in lines)
             self.frame().to_csv(stream, index=False, lineterminator="\n")
 
     def numbers(self) -> dict[str, Any]:
@@ -438,13 +408,9 @@ class GaugeTable:
             "notes": rows(self.notes),
         }
         if curve is not None:
-            numbers |= {
-                "direction": curve.direction,
-                "specimen": curve.specimen,
-                "points": len(curve.load),
-                "largest_load_N": float(curve.load.max()),
-                "without_load": self.without_load,
-            }
+            numbers |= {"direction": curve.direction, "specimen": curve.specimen}
+            numbers |= {"points": len(curve.load), "largest_load_N": float(curve.load.max())}
+            numbers["without_load"] = self.without_load
         return numbers
 
     def _used(self) -> NDArray[np.intp]:

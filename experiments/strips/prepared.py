@@ -1,4 +1,4 @@
-"""Strip tests in a fit: residuals (Eqs 3.4-3.6), comparisons, and the number of independent loads.
+"""Strips in a fit: residuals (Eqs 3.4-3.6), comparisons, independent loads; strips to make next.
 
 Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not a
 hundred measurements: five specimens reduce an uncertainty by the root of five, whatever the number
@@ -8,9 +8,11 @@ of readings.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,22 +20,23 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import InputError
 from ...inference.comparison import Comparison, NoiseIs
 from ...inference.noise import alike
-from ...materials.law import HypoelasticLaw
-from ...meshes.strip_models import UniaxialModel
+from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
+from ...readers.curves import DIRECTIONS, LoadCurve
 from ...solvers.base import History
 from ..kinds import (
+    Candidate,
     DataFile,
     Doubt,
     Expected,
     FittedTest,
     MakeSolver,
     Masks,
+    Planning,
     Reach,
     Weighting,
     joined,
 )
-from .data import Strip
-from .doubts import doubts_of_strips
+from .data import Strip, doubts_of_strips
 from .test import StripsTest, reach_of
 
 Array = NDArray[np.float64]
@@ -135,8 +138,7 @@ class LoadObjective:
 PLACES = 1.25
 #: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
 SPECIMENS = 5
-#: Distances along a curve, up to its whole length, at which loads are compared: a specimen may have
-#: ten of them.
+#: Distances along a curve at which loads are compared: a specimen may have ten of them.
 RINGS = 8
 
 
@@ -218,6 +220,7 @@ class PreparedStrips:
     """A test of strips with its data."""
 
     test: StripsTest
+    known = None  # loads are measured, not computed
 
     @property
     def objective_is(self) -> str:
@@ -225,32 +228,27 @@ class PreparedStrips:
         return OBJECTIVES[self.test.objective]
 
     @property
-    def known(self) -> HypoelasticLaw | None:
-        """Return None: loads are measured, not computed."""
-        return None
-
-    @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
         """Return number of the specimen of each measured point that is matched, by comparison."""
-        test = self.test
-        if test.match_by != "points":
-            return {}
-        return {self.part(d): test.strips[d].specimen_of.tolist() for d in test.matched}
+        matched = self.test.matched if self.test.match_by == "points" else ()
+        return {self.part(d): self.test.strips[d].specimen_of.tolist() for d in matched}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each part, by sort and name; sorts of one part are left out."""
         test = self.test
         points = test.match_by == "points"
-        counts = {
-            d: len(test.strips[d].points[0]) if points else test.increments for d in test.matched
+        whole = {
+            self.part(d): np.ones(
+                len(test.strips[d].points[0]) if points else test.increments, dtype=bool
+            )
+            for d in test.matched
         }
-        whole = {self.part(d): np.ones(count, dtype=bool) for d, count in counts.items()}
         directions: dict[str, Masks] = {}
         specimens: dict[str, Masks] = {}
-        for direction, count in counts.items():
+        for direction in test.matched:
             name = self.part(direction)
-            directions[direction] = {**whole, name: np.zeros(count, dtype=bool)}
+            directions[direction] = {**whole, name: ~whole[name]}
             others = _without(test.strips[direction]) if points else {}
             for which, mask in others.items():
                 specimens[f"{direction}, {which}"] = {**whole, name: mask}
@@ -259,8 +257,7 @@ class PreparedStrips:
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the law in the points matched."""
-        by_direction = {d: masks.get(self.part(d)) for d in self.test.matched}
-        return reach_of(self.test, by_direction)
+        return reach_of(self.test, {d: masks.get(self.part(d)) for d in self.test.matched})
 
     def kept(self, masks: Masks | None) -> tuple[str, ...]:
         """Return the directions in which masks leave points to match."""
@@ -320,8 +317,7 @@ class PreparedStrips:
         largest = float(np.abs(load).max(initial=0.0))
         if relative and not largest > 0:
             raise test.place.error(direction, "the measured load is zero")
-        scale = largest if relative else 1.0
-        weight = share * test.weights[direction]
+        scale, weight = largest if relative else 1.0, share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
         return LoadObjective(
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
@@ -332,19 +328,15 @@ class PreparedStrips:
         known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
         strips = []
         for direction in self.test.matched:
-            comparison, history = known[self.part(direction)]
-            objective = comparison.objective
-            assert isinstance(objective, LoadObjective)
-            strip = self.test.strips[direction]
-            strips.append(FittedStrip(strip, comparison.model, objective, history))
+            own, history = known[self.part(direction)]
+            objective: Any = own.objective
+            strips.append(FittedStrip(self.test.strips[direction], own.model, objective, history))
         return tuple(strips)
 
     def data_files(self) -> Sequence[DataFile]:
         """Return the files of the curves that are matched."""
-        points = self.test.match_by == "points"
-        return joined(
-            file for d in self.test.matched for file in self.test.strips[d].data_files(points)
-        )
+        test, points = self.test, self.test.match_by == "points"
+        return joined(file for d in test.matched for file in test.strips[d].data_files(points))
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the load curves."""
@@ -364,11 +356,120 @@ def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tupl
 
 def _without(strip: Strip) -> Mapping[str, NDArray[np.bool_]]:
     """Return masks without each specimen, by its name; none of a strip of one specimen."""
-    numbers = np.unique(strip.specimen_of).tolist()
-    if len(numbers) < 2:
-        return {}
+    owners = strip.specimen_of
+    numbers = np.unique(owners).tolist()
     names = [strip.curves[number].specimen for number in numbers]
     if len(set(names)) < len(names):  # files may name theirs alike
         names = [str(number + 1) for number in numbers]
-    owners = strip.specimen_of
-    return {f"specimen {name}": owners != n for name, n in zip(names, numbers, strict=True)}
+    masks = {f"specimen {name}": owners != n for name, n in zip(names, numbers, strict=True)}
+    return masks if len(masks) > 1 else {}
+
+
+#: Degrees from the pull to the warp yarn, of strips across the yarns.
+ANGLES = (30.0, 45.0, 60.0)
+#: Where the project has no strips: mm of the gauge, increments and values of a curve, specimens.
+GAUGE, INCREMENTS, USUAL = 20.0, 20, 3
+#: Of the largest load: scatter of specimens where none is known. That of the published strips is
+#: 2, 6 and 4 % (examples/uniaxial-valmex7318/curves.csv).
+SCATTER = 0.04
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A strip that could be pulled: its direction (warp, fill, bias) and its angle in degrees."""
+
+    direction: str
+    angle: float
+
+    @property
+    def name(self) -> str:
+        """Return a readable name."""
+        across = self.direction == "bias"
+        return f"strip at {self.angle:g} degrees" if across else f"{self.direction} strip"
+
+
+def candidates(planning: Planning) -> Sequence[Candidate]:
+    """Return each direction by itself, after the project's first strips or usual ones."""
+    own = [test for test in planning.present if isinstance(test, PreparedStrips)]
+    template = own[0] if own else None
+    angles = dict.fromkeys([*ANGLES, *([template.test.bias_angle] if template else [])])
+    pulls = [Pull("warp", 0.0), Pull("fill", 90.0), *(Pull("bias", a) for a in sorted(angles))]
+    noise_is = "assumed" if template is None else f"that of {template.test.name}"
+    noise_is = noise_is if planning.noise is None else "given"
+    return [
+        Candidate(pull.name, partial(_made, pull, template, planning), noise_is, USUAL)
+        for pull in pulls
+    ]
+
+
+def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
+    """Return the strip with the loads that the law gives, one value an increment.
+
+    It is as long as the project's own, else pulled up to the end of the known law.
+    """
+    own = None if template is None else template.test
+    strip = None if own is None else own.strips.get(pull.direction)
+    gauge = GAUGE if strip is None else strip.gauge_length
+    final = gauge * math.exp(_strain(pull, planning))
+    if own is not None and strip is not None:
+        alike = pull.direction != "bias" or pull.angle == own.bias_angle
+        final = strip.final_length if alike else final
+    strip = Strip(pull.direction, gauge, final)
+    width, grips = (WIDTH, GRIP_DISTANCE) if own is None else (own.width, own.grip_distance)
+    test = StripsTest(
+        name=pull.name,
+        place=planning.place,
+        weight=1.0,
+        width=width,
+        grip_distance=grips,
+        bias_angle=pull.angle if pull.direction == "bias" else 45.0,
+        increments=INCREMENTS,
+        strips={pull.direction: strip},
+        match_by="points",
+        weights=dict.fromkeys(DIRECTIONS, 1.0),
+        objective="N",
+    )
+    (model,) = test.models().values()
+    load = np.asarray(planning.make_solver().run(model, planning.law).load)
+    noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
+    curve = LoadCurve(pull.direction, "computed", np.array(model.elongations), load, None)
+    done = replace(strip, curves=(curve,))
+    return PreparedStrips(replace(test, strips={pull.direction: done}, noise=noise))
+
+
+def _strain(pull: Pull, planning: Planning) -> float:
+    """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
+
+    A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
+    """
+    warp, fill, shear = planning.ends.tolist()
+    if pull.direction != "bias":
+        return float(warp if pull.direction == "warp" else fill)
+    turn = math.radians(2 * pull.angle)
+    along, end = math.cos(turn), warp if pull.angle < 45 else fill
+    most = shear / (2 * math.sin(turn))
+    return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
+
+
+def _noise(
+    pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
+) -> float:
+    """Return the noise (N) of independent loads: of the own direction, the others, or usual."""
+    if planning.noise is not None:
+        return planning.noise
+    if template is None:
+        return SCATTER * largest * math.sqrt(values / PLACES)
+    test, own = template.test, {}
+    for d in test.matched:  # the precision of one specimen
+        known = planning.precision[template.part(d)]
+        specimens = len(test.strips[d].curves) or test.specimens or 1
+        if test.match_by != "points":  # one curve of all of them: one says so much less
+            known = replace(known, alike=known.alike * specimens)
+        else:
+            known = replace(known, values=max(1, known.values // specimens))
+        own[d] = known.at(values)
+    if pull.direction in own:
+        return own[pull.direction]
+    models = test.models()
+    loads = {d: loads_to_match(test, test.strips[d], models[d])[1] for d in own}
+    return max(noise / float(np.abs(loads[d]).max()) for d, noise in own.items()) * largest

@@ -32,7 +32,6 @@ from ...reports.vega import save
 from ...solvers.base import History
 from ..kinds import (
     READING,
-    STRAINS,
     UNMATCHED,
     CardRun,
     Findings,
@@ -40,17 +39,15 @@ from ..kinds import (
     Output,
     Shown,
     Simulation,
+    by_strain,
     strains_of,
 )
-from .data import Strip, compare_orders
-from .doubts import curves_of
+from .data import Strip, compare_orders, curves_of
 from .prepared import FittedStrip, PreparedStrips
 from .test import StripsTest
 
-#: Kinds of notes that are made here.
+#: The kind of notes that is made here.
 LEFT_OUT = NoteKind("points left out")
-
-
 #: The modulus that each direction pins down.
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
@@ -119,11 +116,9 @@ def load_panels(
     """Return the panels of `load_charts`; `models` and their `rms` (N) by direction."""
     panels = []
     for strip in strips:
-        curve = None
-        if strip.polynomial is not None:
-            u = np.linspace(0.0, strip.elongation, SMOOTH)
-            curve = u, strip.polynomial(u)
         d, points = strip.direction, strip.points if strip.curves else None
+        u, line = np.linspace(0.0, strip.elongation, SMOOTH), strip.polynomial
+        curve = None if line is None else (u, line(u))
         errors = rms.get(d, ())
         panels.append(StripCurves(d, models.get(d, ()), points, curve, strip.scatter, errors))
     return panels
@@ -131,9 +126,8 @@ def load_panels(
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
     """Draw the deformed strip with its shear strain; write it for ParaView."""
-    u = history.displacement[-1]
-    strain = middle_strain(model.mesh, u, model.warp)
-    mesh = model.mesh
+    u, mesh = history.displacement[-1], model.mesh
+    strain = middle_strain(mesh, u, model.warp)
     gauge = mesh.node_sets["gauge"]
     save(picture, strip_charts(mesh.points, mesh.quads, u, strain[:, 2], gauge))
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
@@ -208,11 +202,6 @@ class Pull:
         """Return the elongation of the gauge at every increment, mm."""
         return np.array(self.model.elongations)
 
-    @property
-    def whole(self) -> bool:
-        """Return whether nothing is left out."""
-        return self.shown == len(self.model.elongations)
-
 
 #: By (card, direction).
 Pulls = Mapping[tuple[str, str], "Pull | SolverFailure"]
@@ -266,22 +255,23 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict[str, Any]:
     """Return RMS errors, end loads and strains of a card, strip by strip."""
     directions: dict[str, Any] = {}
-    total: float | None = 0.0
+    errors: list[float | None] = []
     for direction in test.strips:
         pull = pulls[name, direction]
         if isinstance(pull, SolverFailure):
-            directions[direction], total = {"failed": pull.reason}, None
+            directions[direction] = {"failed": pull.reason}
+            errors.append(None)
             continue
-        reached = strains_of(pull.history)
         directions[direction] = {
             "rms_N": pull.rms,
             "end_load_N": float(pull.history.load[-1]),
             "shown_to_mm": float(pull.elongation[pull.shown - 1]) if pull.shown else 0.0,
-            "strain_reached": dict(zip(STRAINS, reached.tolist(), strict=True)),
+            "strain_reached": by_strain(strains_of(pull.history)),
         }
-        # A sum of errors over parts of the curves could be compared with nothing.
-        known = pull.whole and pull.rms is not None and total is not None
-        total = total + pull.rms if known else None  # type: ignore[operator]
+        errors.append(pull.rms if pull.shown == len(pull.elongation) else None)
+    # A sum of errors over parts of the curves could be compared with nothing.
+    known = [error for error in errors if error is not None]
+    total = sum(known) if len(known) == len(errors) else None
     return {"e_uniaxial_N": total, "directions": directions}
 
 
@@ -297,9 +287,8 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
     drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
     rms: dict[str, list[float]] = {d: [] for d in test.strips}
     for (name, direction), pull in ended.items():
-        if pull.shown:
-            part = slice(pull.shown)
-            drawn[direction].append((name, pull.elongation[part], pull.history.load[part]))
+        if n := pull.shown:
+            drawn[direction].append((name, pull.elongation[:n], pull.history.load[:n]))
             rms[direction] += [] if pull.rms is None else [pull.rms]
     panels = load_panels(list(test.strips.values()), drawn, rms)
     save(out.path("loads.png"), load_charts("loads", panels))
@@ -316,11 +305,12 @@ def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
     for name, card in cards.items():
         parts = []
         for direction, numbers in card["directions"].items():
-            words = "failed"
-            if "failed" not in numbers:
+            if "failed" in numbers:
+                words = "failed"
+            elif numbers["rms_N"] is None:
                 words = f"{numbers['end_load_N']:.4g} N at the end"
-                if numbers["rms_N"] is not None:
-                    words = f"{numbers['rms_N']:.4g} N to {numbers['shown_to_mm']:.3g} mm"
+            else:
+                words = f"{numbers['rms_N']:.4g} N to {numbers['shown_to_mm']:.3g} mm"
             parts.append(f"{direction} {words}")
         total = card["e_uniaxial_N"]
         words = "" if total is None else f"; sum {total:.4g} N"
@@ -333,11 +323,11 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     test, strips = prepared.test, prepared.fitted_strips(fitted)
     total = sum(s.rms for s in strips)
     errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
-    beside = [
-        "" if s.strip.scatter is None else f" (specimens scatter by {s.strip.scatter:.3g})"
+    line = ", ".join(
+        f"{s.direction} {s.rms:.3g}"
+        + ("" if s.strip.scatter is None else f" (specimens scatter by {s.strip.scatter:.3g})")
         for s in strips
-    ]
-    line = ", ".join(f"{s.direction} {s.rms:.3g}{b}" for s, b in zip(strips, beside, strict=True))
+    )
     numbers = {
         s.direction: {
             "rms_N": s.rms,

@@ -1,16 +1,20 @@
-"""A test of strips, as its section describes it, and its models."""
+"""A test of strips: its section, the reading of its load curves, and its models."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, TypeAdapter
 
+from ...errors import InputError
+from ...files import is_file
 from ...meshes.strip_models import (
     GRIP_DISTANCE,
     WIDTH,
@@ -19,11 +23,100 @@ from ...meshes.strip_models import (
     refined_quads,
     straight_strip,
 )
-from ..kinds import Place, Reach, Refined
-from .data import Strip, read_strips
-from .section import Match, StripsSection, Unit
+from ...readers.curves import (
+    DIRECTIONS,
+    LoadCurve,
+    LoadPolynomial,
+    fit_load_polynomial,
+    read_load_curves,
+    read_published_polynomials,
+    specimen_scatter,
+    split_at_restarts,
+)
+from ...readers.sections import Name, Positive, Section, beside
+from ..kinds import Place, Reach, Refined, named_format
+from .data import Strip
 
 Mask = NDArray[np.bool_]
+Weight = Annotated[float, Field(ge=0, le=1e6)]
+FileNames = Annotated[list[str], Field(min_length=1)]
+Match = Literal["polynomial", "points"]
+Unit = Literal["N", "relative"]
+
+
+class GaugeSection(Section):
+    """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
+
+    gauge_length: Positive | None = None
+    final_length: Positive | None = None
+
+
+class ColumnsSection(Section):
+    """Section [strips.data.columns]: the files' own column names."""
+
+    elongation: str | None = None
+    load: str | None = None
+    specimen: str | None = None
+    direction: str | None = None
+
+
+class FilesSection(Section):
+    """Files that do not name their direction, by direction."""
+
+    warp: FileNames | None = None
+    fill: FileNames | None = None
+    bias: FileNames | None = None
+
+
+def _files(given: Any) -> Any:
+    # Either form is checked here and not as a union: complaints then name the key, not the form.
+    if isinstance(given, dict):
+        return FilesSection.model_validate(given)
+    return given if given is None else TypeAdapter(FileNames).validate_python(given, strict=True)
+
+
+class CurvesSection(Section):
+    """Section [strips.data]: load curves, as polynomials or as measured."""
+
+    polynomials: str | None = None
+    files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
+    folder: str = ""
+    format: str | None = None
+    columns: ColumnsSection = ColumnsSection()
+    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None
+    length_unit: Literal["mm", "cm", "m"] | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str = "#"
+    order: Annotated[int, Field(ge=1, le=10)] = 4
+    through_origin: bool = True
+    specimens: Annotated[int, Field(ge=1, le=10000)] | None = None
+
+
+class WeightsSection(Section):
+    """Section [strips.weights]: of each direction's error in the objective."""
+
+    warp: Weight = 1.0
+    fill: Weight = 1.0
+    bias: Weight = 1.0
+
+
+class StripsSection(Section):
+    """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
+
+    name: Name | None = None
+    width: Positive | None = None
+    grip_distance: Positive | None = None
+    bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    increments: Annotated[int, Field(ge=1, le=10000)] = 100
+    warp: GaugeSection | None = None
+    fill: GaugeSection | None = None
+    bias: GaugeSection | None = None
+    data: CurvesSection
+    noise: Positive | None = None
+    match: Match = "polynomial"
+    objective: Unit = "N"
+    weight: Weight = 1.0
+    weights: WeightsSection = WeightsSection()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,16 +141,12 @@ class StripsTest:
     noise: float | None = None
     specimens: int | None = None
     kind: str = "strips"
+    reads_files = True
 
     @property
     def thickness(self) -> float:
         """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
-
-    @property
-    def reads_files(self) -> bool:
-        """Return True: load curves are measured or published."""
-        return True
 
     @cached_property
     def reach(self) -> Reach:
@@ -73,22 +162,21 @@ class StripsTest:
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
         """Return the models by direction; edges of quads, or increments, divided by a factor."""
-        quads = factor if what == "elements" else 1.0
-        steps = factor if what == "increments" else 1.0
+        quads, steps = (factor, 1.0) if what == "elements" else (1.0, factor)
         thick = self.thickness if thickness is None else thickness
         increments = max(1, round(self.increments * steps))
-        return {d: self._model(s, thick, quads, increments) for d, s in self.strips.items()}
-
-    def _model(
-        self, strip: Strip, thickness: float, refinement: float, increments: int
-    ) -> UniaxialModel:
-        lengths = strip.gauge_length, strip.final_length, thickness, self.width
-        if strip.direction == "bias":
-            quads = refined_quads("bias", refinement)
-            return bias_strip(*lengths, self.grip_distance, self.bias_angle, increments, **quads)
-        quads = refined_quads("straight", refinement)
-        direction: Literal["warp", "fill"] = "warp" if strip.direction == "warp" else "fill"
-        return straight_strip(direction, *lengths, increments, **quads)
+        models = {}
+        for d, s in self.strips.items():
+            lengths = s.gauge_length, s.final_length, thick, self.width
+            if d == "bias":
+                across = refined_quads("bias", quads)
+                grips = self.grip_distance, self.bias_angle
+                models[d] = bias_strip(*lengths, *grips, increments, **across)
+            else:
+                along = refined_quads("straight", quads)
+                yarn: Literal["warp", "fill"] = "warp" if d == "warp" else "fill"
+                models[d] = straight_strip(yarn, *lengths, increments, **along)
+        return models
 
     def settings(self) -> Mapping[str, object]:
         """Return everything but names and places of files."""
@@ -103,7 +191,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     """Read the section of a test, and its load curves."""
     length = place.scales.length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
-    strips = read_strips(place, section)
+    width = WIDTH if section.width is None else section.width * length
+    strips = read_strips(place, section, width)
     weights = section.weights.model_dump()
     if not sum(weights[d] for d in strips) > 0:
         raise place.error("weights", "expected one above 0: nothing would be matched")
@@ -118,20 +207,17 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
             if strip.curves and not len(strip.points[0]):
                 problem = "no measured point lies between the gauge length and this one"
                 raise place.error(f"{direction}.final_length", problem)
+    same = ("weight", "bias_angle", "increments", "objective", "noise")
     return StripsTest(
         name=name,
         place=place,
-        weight=section.weight,
-        width=WIDTH if section.width is None else section.width * length,
+        width=width,
         grip_distance=grips,
-        bias_angle=section.bias_angle,
-        increments=section.increments,
         strips=strips,
         match_by=section.match,
         weights=weights,
-        objective=section.objective,
-        noise=section.noise,
         specimens=section.data.specimens,
+        **{key: getattr(section, key) for key in same},
     )
 
 
@@ -152,3 +238,179 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
         (ends.get("warp"), ends.get("fill"), ends.get("bias")),
         (shares.get("warp"), shares.get("fill"), shares.get("bias")),
     )
+
+
+@dataclass(frozen=True)
+class ListedFile:
+    """A file of a section, its key below the section, and its direction if it is listed for one."""
+
+    path: Path
+    field: str
+    direction: str | None = None
+
+
+def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
+    """Return the files of [strips.data], there or not, in the order of the section."""
+    if data.polynomials is not None:
+        return [ListedFile(folder / data.polynomials, "data.polynomials")]
+    by_direction: dict[str | None, list[str]]
+    if isinstance(data.files, list):
+        by_direction = {None: data.files}
+    else:
+        by_direction = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
+    listed = []
+    for direction, names in by_direction.items():
+        key = "data.files" if direction is None else f"data.files.{direction}"
+        for i, name in enumerate(names):
+            if Path(name) in map(Path, names[:i]):
+                problem = f"{name!r} is listed twice; its points would count double"
+                raise place.error(f"{key}[{i}]", problem)
+            listed.append(ListedFile(folder / name, f"{key}[{i}]", direction))
+    if not listed:
+        problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
+        raise place.error("data.files", problem)
+    return listed
+
+
+def measured_curves(
+    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
+) -> dict[str, tuple[LoadCurve, ...]]:
+    """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
+
+    A file with one curve in a direction perhaps lists several specimens, one after the other and
+    not named: it is split where the elongation starts again. width : of the strips, mm.
+    """
+    format = named_format(place, "data.format", "machine table", data.format)
+    columns = data.columns.model_dump(exclude_none=True)
+    said = {n: getattr(data, n) for n in ("load_unit", "length_unit", "comment", "decimal")}
+    by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
+    first: dict[Path, LoadCurve] = {}
+    for file in listed:
+        curves = read_load_curves(
+            file.path, columns=columns or None, width=width, direction=file.direction,
+            format=format, **said,
+        )  # fmt: skip
+        before = first.setdefault(file.path, curves[0])
+        if before.direction != curves[0].direction and all(
+            np.array_equal(getattr(before, name), getattr(curves[0], name))
+            for name in ("elongation", "load")
+        ):
+            problem = f"is listed for {before.direction} too, and does not tell the two apart"
+            raise place.error(file.field, problem)
+        for direction in DIRECTIONS:
+            own = [curve for curve in curves if curve.direction == direction]
+            parts = split_at_restarts(own[0]) if len(own) == 1 else ()
+            by_direction[direction] += parts if len(parts) > 1 else own
+    return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
+
+
+#: How far beyond the last point a load polynomial may be followed, of the last elongation: a strip
+#: breaks between two readings.
+EXTRAPOLATED = 0.05
+
+
+def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
+    """Read the strips of a section (width mm), by direction: those with a table or data.
+
+    Missing files are no error where the place needs none and all lengths are given.
+    """
+    data, length = section.data, place.scales.length
+    if (data.polynomials is None) == (data.files is None):
+        raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
+    folder = place.data_folder
+    if folder is None:
+        folder = beside(place.path.parent, data.folder)
+    tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
+    listed = listed_files(place, data, folder)
+    missing = next((file for file in listed if not is_file(file.path)), None)
+    if missing is not None:
+        ends = {d: (t.gauge_length, t.final_length) for d, t in tables.items()}
+        if place.need_data or not ends or any(None in pair for pair in ends.values()):
+            problem = f"there is no file {missing.path}; --data DIR names another folder"
+            raise place.error(missing.field, problem)
+        return {d: _strip(place, d, a * length, b * length) for d, (a, b) in ends.items()}
+    if data.polynomials is not None:
+        strips = _published(place, data, tables, listed[0])
+    else:
+        strips = _measured(place, data, tables, listed, width)
+    if not strips:
+        problem = f"these data hold none of the directions {', '.join(tables or DIRECTIONS)}"
+        raise place.error("data", problem)
+    for direction in tables:
+        if direction not in strips:
+            problem = f"the data hold no {direction} test; leave this section out or add its data"
+            raise place.error(direction, problem)
+    return strips
+
+
+def _published(
+    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
+) -> dict[str, Strip]:
+    format = named_format(place, "data.format", "load polynomials", data.format)
+    curves, length = read_published_polynomials(file.path, format), place.scales.length
+    strips = {}
+    for direction in DIRECTIONS:
+        if direction not in curves or (tables and direction not in tables):
+            continue
+        curve, own = curves[direction], tables.get(direction) or GaugeSection()
+        start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
+        end = curve.final_length if own.final_length is None else own.final_length * length
+        scatter = None if np.isnan(curve.scatter) else curve.scatter
+        known = {"scatter": scatter, "published": file.path}
+        strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
+    return strips
+
+
+def _measured(
+    place: Place,
+    data: CurvesSection,
+    tables: Mapping[str, GaugeSection],
+    listed: Sequence[ListedFile],
+    width: float,
+) -> dict[str, Strip]:
+    said = {file.direction for file in listed}
+    strips, length = {}, place.scales.length
+    for direction, curves in measured_curves(place, data, listed, width).items():
+        # A table picks among what a file holds; a file listed for a direction is meant.
+        if tables and direction not in tables and direction not in said:
+            continue
+        own = tables.get(direction) or GaugeSection()
+        if own.gauge_length is None:
+            problem = "this key is missing; the strain follows from it"
+            raise place.error(f"{direction}.gauge_length", problem)
+        elongation = np.concatenate([c.elongation for c in curves])
+        load = np.concatenate([c.load for c in curves])
+        try:
+            polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
+            scatter = specimen_scatter(curves, polynomial).deviation
+        except InputError as error:
+            problem = f"no load curve through the {direction} points: {error.problem}"
+            raise place.error(f"data, {error.field}", problem) from None
+        start, open_end = own.gauge_length * length, own.final_length is None
+        end = start + polynomial.end if own.final_length is None else own.final_length * length
+        known = {"curves": curves, "scatter": scatter, "through_origin": data.through_origin}
+        strips[direction] = _strip(
+            place, direction, start, end, polynomial, open_end=open_end, **known
+        )
+    return strips
+
+
+def _strip(
+    place: Place,
+    direction: str,
+    start: float,
+    end: float,
+    polynomial: LoadPolynomial | None = None,
+    **data: Any,
+) -> Strip:
+    problem = ""
+    if not end > start:
+        problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"
+    elif polynomial is not None and end - start > polynomial.end * (1 + EXTRAPOLATED):
+        problem = (
+            f"the data end at an elongation of {polynomial.end:.5g} mm; expected up to"
+            f" {start + polynomial.end:.5g} mm, got {end:g} mm"
+        )
+    if problem:
+        raise place.error(f"{direction}.final_length", problem)
+    return Strip(direction, start, end, polynomial, **data)

@@ -40,7 +40,7 @@ from ..published_laws import TABLE_4_2
 
 # Packages of kinds have functions of the same names.
 bubbles = import_module("bubblefit.experiments.bubble.prepared")
-strips = import_module("bubblefit.experiments.strips.candidates")
+strips = import_module("bubblefit.experiments.strips.prepared")
 #: MPa, near the optima of the tests; without contraction loads along the yarns are 20 mm^2 E eps.
 CARD = MaterialCard(HypoelasticLaw.linear(330.0, 190.0, 10.0, 0.0), 0.8, "near")
 ENDS = {"one": 2.9, "two": 2.5}

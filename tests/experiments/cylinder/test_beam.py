@@ -1,55 +1,64 @@
-"""The whole beam of a run that meshed a part of it, and where the bodies are."""
+"""The whole beam of a run that meshed a part of it, its bodies, and the picture of its end."""
 
+from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.cylinder.predicted import BendingRun, run_of
+from bubblefit.experiments.cylinder import report
+from bubblefit.experiments.cylinder.predicted import run_of
 from bubblefit.experiments.cylinder.report import Beam, bodies_of, whole_beam
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.mesh import enclosed_volume, surface_strain
+from scipy.spatial import cKDTree
 
 from ...cylinder_cases import ran
+from ...drawings import lines
 
-WAY = np.linspace(0.0, 240.0, 61)
-
-
-def model(symmetry: str = "quarter") -> CylinderModel:
-    way = WAY[1:].tolist()
-    return inflated_cylinder(150.0, 0.14, 0.81, 40.0, deflections=way, symmetry=symmetry)
+CARD = MaterialCard(HypoelasticLaw.linear(500.0, 150.0, 20.0), 0.81)
 
 
-def run(m: CylinderModel) -> BendingRun:
-    ended = run_of(ran(m, MaterialCard(HypoelasticLaw.linear(500.0, 150.0, 20.0), 0.81)))
-    assert ended is not None
-    return ended
+def made(symmetry: str):
+    """A tube of 150 mm, and its run by the formula."""
+    way = np.linspace(0.0, 240.0, 61)[1:].tolist()
+    model = inflated_cylinder(150.0, 0.14, 0.81, 40.0, deflections=way, symmetry=symmetry)
+    return model, run_of(ran(model, CARD))
 
 
-def test_a_quarter_makes_the_whole_beam():
-    whole, quarter = run(model("full")), run(model())
-    beam, same = whole_beam(model(), quarter), whole_beam(model("full"), whole)
+@pytest.fixture(scope="module")
+def quarter():
+    return made("quarter")
+
+
+@pytest.fixture(scope="module")
+def picture(quarter):
+    drawn = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "save", lambda _, charts: drawn.append(charts))
+        report.draw_beam(*quarter, Path("beam.png"), "150 mm, 140 kPa")
+    return drawn[0]
+
+
+def test_a_quarter_makes_the_whole_beam(quarter):
+    part, run = quarter
+    beam, same = whole_beam(part, run), whole_beam(*made("full"))
     for one, other in ((beam.bent, same.bent), (beam.inflated, same.inflated)):
         a, b = (np.round(m.mesh.points + u, 6) + 0.0 for m, u in ((beam, one), (same, other)))
         np.testing.assert_allclose(np.unique(a, axis=0), np.unique(b, axis=0), atol=1e-5)
     assert len(beam.mesh.quads) == len(same.mesh.quads)
-    at = beam.mesh.points + beam.bent
-    assert enclosed_volume(at, beam.mesh.quads) == pytest.approx(
-        enclosed_volume(same.mesh.points + same.bent, same.mesh.quads)
-    )
+    one, other = (enclosed_volume(b.mesh.points + b.bent, b.mesh.quads) for b in (beam, same))
+    assert one == pytest.approx(other)
+    wanted = surface_strain(part.mesh, run.inflated)
     for b in (beam, same):
-        strain = surface_strain(b.mesh, b.inflated)
-        assert strain[: len(model().mesh.quads)] == pytest.approx(
-            surface_strain(model().mesh, quarter.inflated), abs=1e-12
-        )
+        found = surface_strain(b.mesh, b.inflated)[: len(part.mesh.quads)]
+        assert found == pytest.approx(wanted, abs=1e-12)
 
 
-def test_bodies_touch_the_inflated_beam():
-    m = model()
-    beam = whole_beam(m, run(m))
-    bodies = bodies_of(m, beam, 30.0)
+def test_bodies_touch_the_inflated_beam(quarter):
+    beam = whole_beam(*quarter)
+    bodies = bodies_of(quarter[0], beam, 30.0)
     at = beam.mesh.points + beam.inflated
     assert bodies.support_radius == 50.0 and bodies.collar_radius == 120.0
     for z, y in bodies.supports:
@@ -74,16 +83,104 @@ def test_bodies_touch_the_inflated_beam():
         ([[0.0, 20.0, 0.0], [0.0, -99.0, 250.0]], 10.0, -80.0),
     ],
 )
-def test_bodies_touch_where_the_beam_is_nearest(points: Any, height: float, top: float):
+def test_bodies_touch_where_the_beam_is_nearest(points, height, top):
     """Beside a node that stands on a support 60 mm high."""
     rest = np.array([*points, [0.0, 60.0, 200.0]])
-    made: Any = SimpleNamespace(
+    model = SimpleNamespace(
         supports=SimpleNamespace(diameter=100.0, span=400.0),
         collar=SimpleNamespace(inner_diameter=200.0, length=40.0),
     )
-    mesh: Any = SimpleNamespace(points=rest - [0.0, 7.0, 0.0])
     moved = np.tile([0.0, 7.0, 0.0], (len(rest), 1))
-    found = bodies_of(made, Beam(mesh, moved, moved), 12.0)
+    found = bodies_of(model, Beam(SimpleNamespace(points=rest - moved), moved, moved), 12.0)
     assert found.supports == ((-200.0, pytest.approx(height)), (200.0, pytest.approx(height)))
     assert (found.support_radius, found.collar_radius, found.collar_length) == (50.0, 100.0, 40.0)
     assert found.collar_height == pytest.approx(top - 12.0)
+
+
+# The picture shows the run's own places, strains and bodies
+
+
+def places(model, moved, name, axes):
+    """Of the nodes of a set and their mirror image in the first of two axes, (k, 2) mm."""
+    at = (model.mesh.points + moved)[model.mesh.node_sets[name]][:, axes]
+    return np.concatenate([at, at * [-1.0, 1.0]])
+
+
+def in_turn(model, moved, name, along):
+    """The nodes of a set in the order that they have along an axis at rest, (k, 3) mm."""
+    nodes = model.mesh.node_sets[name]
+    return (model.mesh.points + moved)[nodes[np.argsort(model.mesh.points[nodes, along])]]
+
+
+def same(points, others) -> bool:
+    """Of two sets of places, to six digits."""
+    return max(cKDTree(a).query(b)[0].max() for a, b in ((points, others), (others, points))) < 0.01
+
+
+def length(line) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=1), axis=0).sum())
+
+
+def middle(ring):
+    return 0.5 * (ring.min(axis=1) + ring.max(axis=1))
+
+
+def test_the_dashed_outline_is_the_inflated_tube_from_the_side(quarter, picture):
+    model, run = quarter
+    both = ("top_line", "bottom_line")
+    expected = np.vstack([places(model, run.inflated, name, [2, 1]) for name in both])
+    ways = [in_turn(model, run.inflated, name, along=2)[:, [2, 1]].T for name in both]
+    down = np.linalg.norm(ways[0][:, -1] - ways[1][:, -1])
+    around = 2 * (sum(length(way) for way in ways) + down)
+    for chart in picture.charts[:2]:
+        (outline,) = lines(chart, "inflated")
+        assert same(outline.T, expected)
+        # Once there along the top, down, and back along the bottom: no way is crossed.
+        np.testing.assert_array_equal(outline[:, 0], outline[:, -1])
+        assert length(outline) == pytest.approx(around, rel=1e-4)
+
+
+def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(quarter, picture):
+    model, run = quarter
+    ((before,), (now,)) = (lines(picture.charts[2], name) for name in ("inflated", "bent"))
+    for ring, moved in ((before, run.inflated), (now, run.bent)):
+        assert same(ring.T, places(model, moved, "mid_span", [0, 1]))
+        np.testing.assert_array_equal(ring[:, 0], ring[:, -1])
+        # In turn around the ring: twice the length of the half that was meshed.
+        half = in_turn(model, moved, "mid_span", along=1)[:, :2].T
+        assert length(ring) == pytest.approx(2 * length(half), rel=1e-4)
+    assert now[1].max() < before[1].max() - 200.0  # went down with the collar
+
+
+def test_the_colours_are_strains_along_the_axis_at_the_end(quarter, picture):
+    model, run = quarter
+    strain = surface_strain(model.mesh, run.bent)[:, 0]
+    at = (model.mesh.points + run.bent)[:, [2, 1]]
+    for chart in picture.charts[:2]:
+        (faces,) = (s for s in chart.series if s.look == "faces")
+        # The half that is seen is the quarter and its image beyond mid-span.
+        wanted = np.sort(np.tile(strain, 2))
+        np.testing.assert_allclose(np.sort(faces.values), wanted, rtol=1e-5, atol=1e-9)
+        corners = np.column_stack([faces.x, faces.y])
+        assert same(corners, np.concatenate([at, at * [-1.0, 1.0]]))
+    assert picture.charts[0].scale == "log strain along the axis"
+    assert picture.charts[0].title == "150 mm, 140 kPa"
+
+
+def test_supports_and_collar_stand_where_the_test_has_them(quarter, picture):
+    model, run = quarter
+    inflated = model.mesh.points + run.inflated
+    whole, _, cut = picture.charts
+    half = 0.5 * model.supports.span
+    # Below the inflated tube, within what a chord of its quads leaves open.
+    lowest = inflated[model.mesh.node_sets["bottom_line"], 1].min()
+    for ring, place in zip(lines(whole, "support"), (-half, half), strict=True):
+        assert middle(ring)[0] == pytest.approx(place)
+        assert np.ptp(ring[0]) == pytest.approx(model.supports.diameter)
+        assert ring[1].max() == pytest.approx(lowest, abs=1.0)
+    assert np.ptp(lines(whole, "collar")[0][0]) == pytest.approx(model.collar.length)
+    (ring,) = lines(cut, "collar")
+    inner = 0.5 * model.collar.inner_diameter
+    # It touched the crown and then went down by the deflection of the last frame.
+    crown = inflated[model.mesh.node_sets["top_line"], 1].max()
+    assert middle(ring)[1] + inner == pytest.approx(crown - run.deflection[-1], abs=1.0)

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.experiments.strips import KIND
-from bubblefit.experiments.strips.section import StripsSection
-from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.experiments.strips.test import StripsSection, StripsTest
 from bubblefit.readers.sections import LENGTH_UNITS, first_error
 from pydantic import ValidationError
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+from ...places import EXAMPLES
+
 CURVES = EXAMPLES / "uniaxial-valmex7318"
 #: Table 3.1: gauge and final lengths, mm.
 LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
@@ -46,12 +46,14 @@ files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }
 """
 
 
+def ends(further: float) -> list[tuple[str, str]]:
+    """Final lengths (mm) of the small section so much beyond its gauges."""
+    gauges = {a: f"gauge_length = {a}.0" for a in (20, 22, 19)}
+    return [(said, f"{said}\nfinal_length = {a + further}") for a, said in gauges.items()]
+
+
 def read(
-    path: Path,
-    data_folder: Path | None = None,
-    need_data: bool = True,
-    length: str = "mm",
-    thickness: float = 0.81,
+    path: Path, data_folder: Path | None = None, need_data: bool = True, length: str = "mm"
 ) -> StripsTest:
     """The test of a file that holds one section alone, as a project's first [[strips]]."""
     try:
@@ -59,7 +61,7 @@ def read(
     except ValidationError as found:
         raise first_error(path, found, StripsSection, at="strips[0]") from None
     scales = Scales(length=LENGTH_UNITS[length], length_unit=length)
-    place = Place(path, "strips[0]", Fabric("", thickness), scales, data_folder, need_data)
+    place = Place(path, "strips[0]", Fabric("", 0.81), scales, data_folder, need_data)
     return KIND.read(section, place, section.name or "strips")
 
 
@@ -72,11 +74,9 @@ def rows(separator: str, *columns: np.ndarray, comma: bool = False) -> str:
 def write_exports(folder: Path):
     """MTS (warp, 200 N/mm, in kN), ZwickRoell (fill, 80 N/mm), Instron (bias, 50 N/mm)."""
     u = np.linspace(0, 4, 21)
-    head = (
-        "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
-    )
-    (folder / "w1.csv").write_text(head + rows(",", u, 0.2 * u, u))
-    (folder / "w2.csv").write_text(head + rows(",", 0.9 * u, 0.18 * u, u))
+    mts = "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
+    (folder / "w1.csv").write_text(mts + rows(",", u, 0.2 * u, u))
+    (folder / "w2.csv").write_text(mts + rows(",", 0.9 * u, 0.18 * u, u))
     zwick = (
         '"Prüfgeschwindigkeit"\t300\t"mm/min"\n"Prüfzeit"\t"Standardkraft"\t"Standardweg"\n'
         '"s"\t"N"\t"mm"\n'

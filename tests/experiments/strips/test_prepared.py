@@ -1,6 +1,5 @@
-"""Strips in a fit: comparisons, weights, folds; what a finished fit says, shows and writes."""
+"""Strips in a fit and with cards: comparisons, weights, folds; numbers, files and figures."""
 
-import functools
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,122 +9,107 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.experiments.kinds import FittedTest, Output, Weighting
+from bubblefit.errors import SolverFailure
+from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, FittedTest, Output, Weighting
 from bubblefit.experiments.strips import KIND, report
-from bubblefit.experiments.strips import report as figures
-from bubblefit.experiments.strips.data import Strip, compare_orders
-from bubblefit.experiments.strips.prepared import PreparedStrips
-from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
+from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective, PreparedStrips
+from bubblefit.experiments.strips.report import LEFT_OUT, examine, load_table, misfit_table
+from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
+from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
 from ...drawings import caught
 from ...projects import project_file
-from ...published_laws import TABLE_4_2
-from .sections import CURVES, PUBLISHED, SMALL, read, write_exports
+from ...published_laws import TABLE_3_2, TABLE_4_2
+from .sections import CURVES, LENGTHS, PUBLISHED, SMALL, read, rows, write_exports
 
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 COARSE = ("increments = 100", "increments = 5")
 POINTS = ("[warp]", 'match = "points"\nincrements = 5\n[warp]')
+Prepare = Callable[..., PreparedStrips]
+
+
+def of(folder: Path, text: str, *changes: tuple[str, str]) -> PreparedStrips:
+    return KIND.prepare(read(project_file(folder, text, *changes)), LAW, MembraneSolver)
 
 
 @pytest.fixture
-def published(tmp_path) -> Callable[..., PreparedStrips]:
+def published(tmp_path) -> Prepare:
     """The published polynomials, five increments."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
-
-    def prepared(*changes: tuple[str, str]) -> PreparedStrips:
-        test = read(project_file(tmp_path, PUBLISHED, COARSE, *changes))
-        return KIND.prepare(test, LAW, MembraneSolver)
-
-    return prepared
+    return lambda *changes: of(tmp_path, PUBLISHED, COARSE, *changes)
 
 
 @pytest.fixture
-def exported(tmp_path) -> Callable[..., PreparedStrips]:
+def exported(tmp_path) -> Prepare:
     """Measured points of one or two specimens a direction, five increments."""
     write_exports(tmp_path)
-
-    def prepared(*changes: tuple[str, str]) -> PreparedStrips:
-        test = read(project_file(tmp_path, SMALL, POINTS, *changes))
-        return KIND.prepare(test, LAW, MembraneSolver)
-
-    return prepared
+    return lambda *changes: of(tmp_path, SMALL, POINTS, *changes)
 
 
-def fitted(prepared: PreparedStrips, law: HypoelasticLaw = LAW) -> FittedTest:
+def fitted(prepared: PreparedStrips) -> FittedTest:
     """As if the law had been found."""
     comparisons = prepared.comparisons(MembraneSolver, Weighting())
-    histories = tuple(c.solver.run(c.model, law) for c in comparisons)
+    histories = tuple(c.solver.run(c.model, LAW) for c in comparisons)
     valid = np.array([0.1, 0.5, 0.3])
-    return FittedTest(comparisons, histories, {}, law, (law,), 1.5 * valid, valid, None)
+    return FittedTest(comparisons, histories, {}, LAW, (LAW,), 1.5 * valid, valid, None)
 
 
-def runs(prepared: PreparedStrips, weighting: Weighting) -> dict[str, float]:
-    """Norm of each comparison's residual with the law."""
+def norms(prepared: PreparedStrips, *weighting) -> dict[str, float]:
+    """Of each comparison's residual with the law."""
     return {
         c.name: float(np.linalg.norm(c.objective.residual(c.solver.run(c.model, LAW), {})))
-        for c in prepared.comparisons(MembraneSolver, weighting)
+        for c in prepared.comparisons(MembraneSolver, Weighting(*weighting))
     }
 
 
-# What is compared
+# Comparisons and models
 
 
 def test_a_comparison_a_direction(published):
-    compared = published().comparisons(MembraneSolver, Weighting())
+    prepared = published()
+    compared = prepared.comparisons(MembraneSolver, Weighting())
     assert [c.name for c in compared] == ["strips: warp", "strips: fill", "strips: bias"]
     # Strips along the yarns lead into a fit; all are free to contract.
     assert [c.stage for c in compared] == [0, 0, 1] and all(c.contracts for c in compared)
-    assert not any(c.must_be_stable for c in compared)
-    assert all(c.nuisance == () for c in compared)
+    assert not any(c.must_be_stable or c.nuisance for c in compared)
     assert len({id(c.solver) for c in compared}) == 3
     assert [len(c.objective.load) for c in compared] == [5, 5, 5]
     assert [c.objective.least_noise for c in compared] == [21.7, 64.1, 40.3]
-    warp = published().test.strips["warp"]
-    np.testing.assert_allclose(
-        compared[0].objective.load, warp.polynomial(compared[0].model.elongations)
-    )
+    load = prepared.test.strips["warp"].polynomial(compared[0].model.elongations)
+    np.testing.assert_allclose(compared[0].objective.load, load)
 
 
-def test_a_direction_without_weight_is_not_run(published):
-    prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
-    assert prepared.test.matched == ("warp", "bias")
-    assert list(runs(prepared, Weighting())) == ["strips: warp", "strips: bias"]
-
-
-def test_alone_the_errors_are_in_newtons_or_relative(published):
-    plain, relative = published(), published(('objective = "N"', 'objective = "relative"'))
-    assert "N" in plain.objective_is and "largest load" in relative.objective_is
-    largest = {
-        c.name: c.objective.load.max() for c in plain.comparisons(MembraneSolver, Weighting())
-    }
-    newtons, shares = runs(plain, Weighting()), runs(relative, Weighting())
-    for name, rms in newtons.items():
-        assert rms > 1
-        assert shares[name] == pytest.approx(rms / largest[name])
-
-
-def test_among_other_tests_the_strips_share_one_weight(published):
-    """The blocks add up to the weight times the weighted mean of the relative errors."""
-    prepared = published(("[data]", "[weights]\nwarp = 3\nbias = 0.5\n[data]"))
-    alone = published(('objective = "N"', 'objective = "relative"'))
-    own = runs(alone, Weighting())
-    wanted = 2.0 * np.dot([3, 1, 0.5], list(own.values())) / 4.5
-    assert sum(runs(prepared, Weighting(True, 2.0)).values()) == pytest.approx(wanted)
+def test_weights_and_units_of_the_errors(published):
+    relative = ('objective = "N"', 'objective = "relative"')
+    plain, alone = published(), published(relative)
+    assert "N" in plain.objective_is and "largest load" in alone.objective_is
+    largest = [c.objective.load.max() for c in plain.comparisons(MembraneSolver, Weighting())]
+    newtons, shares = list(norms(plain).values()), list(norms(alone).values())
+    assert min(newtons) > 1
+    assert shares == pytest.approx([rms / load for rms, load in zip(newtons, largest, strict=True)])
+    # Among other tests the blocks add up to the weight times the weighted mean of these.
+    weighted = published(("[data]", "[weights]\nwarp = 3\nbias = 0.5\n[data]"))
+    wanted = 2.0 * np.dot([3, 1, 0.5], shares) / 4.5
+    assert sum(norms(weighted, True, 2.0).values()) == pytest.approx(wanted)
+    # A direction without weight is not run.
+    unmatched = published(("[data]", "[weights]\nfill = 0\n[data]"))
+    assert unmatched.test.matched == ("warp", "bias")
+    assert list(norms(unmatched)) == ["strips: warp", "strips: bias"]
 
 
 def test_specimens_of_points_can_be_left_out(published, exported):
     assert published().specimens == {}
     prepared = exported()
-    whose = prepared.specimens
-    assert {name: len(set(w)) for name, w in whose.items()} == {
-        "strips: warp": 2, "strips: fill": 1, "strips: bias": 2,
-    }  # fmt: skip
-    masks = {"strips: warp": np.array(whose["strips: warp"]) == 1}
+    whose = {name.split()[1]: np.array(w) for name, w in prepared.specimens.items()}
+    assert {name: len(set(w)) for name, w in whose.items()} == {"warp": 2, "fill": 1, "bias": 2}
+    masks = {"strips: warp": whose["warp"] == 1}
     warp, fill, _ = prepared.comparisons(MembraneSolver, Weighting(), masks)
     np.testing.assert_allclose(warp.objective.elongation, 0.9 * np.linspace(0, 4, 21), atol=1e-6)
     assert len(fill.objective.load) == 21
@@ -133,18 +117,12 @@ def test_specimens_of_points_can_be_left_out(published, exported):
 
 
 def test_loads_that_are_zero_have_no_relative_error(exported, tmp_path):
-    text = (tmp_path / "f.TXT").read_bytes().decode("latin-1")
-    head, *lines = text.split('"s"\t"N"\t"mm"\n')
-    rows = [line.split("\t") for line in lines[0].splitlines()]
-    # Loads only beyond the end of the model.
-    new = [f"{a}\t{b if i > 15 else '0,0'}\t{c}" for i, (a, b, c) in enumerate(rows)]
-    (tmp_path / "f.TXT").write_bytes((head + '"s"\t"N"\t"mm"\n' + "\n".join(new)).encode("latin-1"))
+    u = np.linspace(0, 4, 21)  # with loads only beyond the end of the model
+    text = "Extension (mm),Load (N)\n" + rows(",", u, np.where(u > 3, 80 * u, 0))
+    (tmp_path / "f.TXT").write_text(text)
     prepared = exported(("gauge_length = 22.0", "gauge_length = 22.0\nfinal_length = 24.0"))
     message = complaint(prepared.comparisons, MembraneSolver, Weighting(True))
     assert "strips[0].fill: the measured load is zero" in message
-
-
-# Models
 
 
 def test_refined_models(published):
@@ -154,17 +132,15 @@ def test_refined_models(published):
     assert [len(m.mesh.quads) for m in own.values()] == [40, 40, 300]
     assert [len(m.mesh.quads) for m in finer.values()] == [160, 160, 1200]
     assert [len(m.elongations) for m in more.values()] == [10, 10, 10]
-    assert [m.thickness for m in own.values()] == [0.81] * 3
-    assert [m.thickness for m in more.values()] == [0.5] * 3
+    assert [m.thickness for m in (*own.values(), *more.values())] == [0.81] * 3 + [0.5] * 3
     assert len(test.models(what="increments", factor=0.01)["warp"].elongations) == 1
 
 
-def settings(test: StripsTest) -> str:
-    return repr(dict(test.settings()))
-
-
 def test_settings_are_what_a_result_depends_on(published, tmp_path):
-    own = settings(published().test)
+    def settings(*changes):
+        return repr(dict(published(*changes).test.settings()))
+
+    own = settings()
     assert str(tmp_path) not in own and "curves" not in own
     for change in (
         ("width = 25.0", "width = 24.0"),
@@ -174,230 +150,429 @@ def test_settings_are_what_a_result_depends_on(published, tmp_path):
         ('objective = "N"', 'objective = "relative"'),
         ("bias_angle = 45.0", "bias_angle = 44.0"),
     ):
-        assert settings(published(change).test) != own, change
+        assert settings(change) != own, change
 
 
-# What a fit says and shows
+# Results of a fit
 
 
-def test_findings(published):
-    prepared = published()
+def test_results_are_written(exported, tmp_path):
+    prepared = exported()
     fit = fitted(prepared)
     found = report.findings(prepared, fit)
-    directions = found.numbers["directions"]
-    assert list(directions) == ["warp", "fill", "bias"]
-    for (name, numbers), c, h in zip(
-        directions.items(), fit.comparisons, fit.histories, strict=True
-    ):
-        off = h.load - c.objective.load
-        assert numbers["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2))), name
-        assert numbers["end_load_N"] == h.load[-1] and numbers["matched"] == 5
-        assert f"{numbers['rms_N']:.3g}" in found.lines[0]
-        assert f"{numbers['rms_N']:.4g}" in found.quality
-    total = sum(n["rms_N"] for n in directions.values())
-    assert found.numbers["e_uniaxial_N"] == pytest.approx(total)
-    assert found.numbers["matched_by"] == "polynomial"
-    assert "specimens scatter by 21.7" in found.lines[0]
-    assert found.warnings == ()
-
-
-def test_what_the_data_leave_open_is_said(published, exported):
-    prepared = published(("[data]", "[weights]\nfill = 0\n[data]"))
-    assert report.findings(prepared, fitted(prepared)).warnings == (
-        "no fill strip of strips is matched: E2 rests on the other directions",
-    )
-    cut = exported(("gauge_length = 20.0", "gauge_length = 20.0\nfinal_length = 22.5"))
-    (words,) = report.findings(cut, fitted(cut)).warnings
-    beyond = cut.test.strips["warp"].beyond
-    left = "points beyond the final length (or before zero) were left out"
-    assert words.line == f"warp: {beyond} {left}"
-
-
-def test_residuals_are_every_matched_load(exported):
-    prepared = exported()
-    fit = fitted(prepared)
+    shown = report.show(prepared, fit, found, Output(tmp_path / "out", "two-"))
+    names = {name.removeprefix("two-") for name, _ in (*shown.figures, *shown.files)}
+    assert {f"two-{name}" for name in names} == {p.name for p in (tmp_path / "out").iterdir()}
+    assert names >= {"loads.png", "bias.png", "failure.png", "orders.png", "bias.vtu"}
+    strips = prepared.fitted_strips(fit)
+    loads = pd.read_csv(tmp_path / "out" / "two-loads.csv")
+    pd.testing.assert_frame_equal(loads, report.load_table(strips))
     table = report.residuals(prepared, fit)
-    assert list(table.columns) == [
-        "part", "elongation_mm", "quantity", "measured", "modelled", "difference", "unit",
-    ]  # fmt: skip
-    assert set(table["unit"]) == {"N"}
     assert len(table) == sum(len(c.objective.load) for c in fit.comparisons)
-    for direction, numbers in report.findings(prepared, fit).numbers["directions"].items():
-        own = table[table["part"] == direction]
-        np.testing.assert_allclose(own["modelled"] - own["measured"], own["difference"])
-        assert np.sqrt((own["difference"] ** 2).mean()) == pytest.approx(numbers["rms_N"])
+    for strip in strips:
+        off = table[table["part"] == strip.direction]["difference"]
+        numbers = found.numbers["directions"][strip.direction]
+        assert np.sqrt((off**2).mean()) == pytest.approx(numbers["rms_N"])
 
 
-@pytest.mark.parametrize("prefix", ["", "two-"])
-def test_what_is_shown_is_written(exported, tmp_path, prefix):
-    prepared = exported()
-    fit = fitted(prepared)
-    shown = report.show(
-        prepared, fit, report.findings(prepared, fit), Output(tmp_path / "out", prefix)
-    )
-    names = [name for name, _ in (*shown.figures, *shown.files)]
-    there = {p.name for p in (tmp_path / "out").iterdir()}
-    assert set(names) == there and all(name.startswith(prefix) for name in names)
-    assert {f"{prefix}{n}" for n in ("loads.png", "bias.png", "failure.png")} <= there
-    assert f"{prefix}orders.png" in there and f"{prefix}bias.vtu" in there
-    loads = pd.read_csv(tmp_path / "out" / f"{prefix}loads.csv")
-    for strip in prepared.fitted_strips(fit):
-        own = loads[loads["direction"] == strip.direction]
-        np.testing.assert_allclose(own["model_N"], strip.history.load)
-        np.testing.assert_allclose(
-            own["polynomial_N"], strip.strip.polynomial(own["elongation_mm"])
-        )
-        strain = own["elongation_mm"] / strip.strip.gauge_length
-        np.testing.assert_allclose(own["engineering_strain"], strain)
-    (table,) = shown.tables
-    assert [row[0] for row in table.rows] == ["warp", "fill", "bias"]
-
-
-def test_no_modulus_is_shown_beyond_where_it_is_fitted(published):
+def test_no_modulus_is_shown_beyond_where_it_is_fitted(published, monkeypatch):
     """Gauges that went further than the card is valid for are drawn to the card's end."""
     prepared = published()
     fit = fitted(prepared)
     strips = prepared.fitted_strips(fit)
     gauges = [s.strip.strain for s in strips]
     assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
-    ends = figures.failure_strains(strips, fit.valid)
+    ends = report.failure_strains(strips, fit.valid)
     assert (ends <= fit.valid).all()
     assert ends[:2] == pytest.approx([fit.valid[0], gauges[1]])
     # As far as the card goes otherwise: nothing but the gauge ends it.
-    far = figures.failure_strains(strips, np.array([9.0, 9.0, 9.0]))
+    far = report.failure_strains(strips, np.array([9.0, 9.0, 9.0]))
     assert far[:2] == pytest.approx(gauges[:2]) and 0.5 < far[2] < 1.2
-    warp_only = figures.failure_strains(strips[:1], fit.valid)
+    warp_only = report.failure_strains(strips[:1], fit.valid)
     assert warp_only[1:] == pytest.approx(fit.valid[1:])
+    # E1 is drawn over the warp strain, E2 over the fill's, G12 over the shear.
+    drawn = caught(monkeypatch, report, "moduli_together")
+    law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), strain_range=np.full(3, 0.13))
+    report.draw_moduli(strips, replace(fit, law=law), Path("m.png"))
+    ((path, strains, curves),) = drawn
+    assert path == Path("m.png") and strains.shape == curves.shape == (3, 121)
+    assert strains[:, 0].tolist() == [0.0] * 3
+    for name, x, y in zip(COMPONENTS, strains, curves, strict=True):
+        assert x[-1] == pytest.approx(ends[COMPONENTS[name]])
+        np.testing.assert_allclose(y, law.modulus(name, x))
 
 
 @pytest.mark.parametrize("through_origin", [True, False])
 def test_orders_are_those_of_polynomials_as_they_are_fitted(
     exported, tmp_path, monkeypatch, through_origin
 ):
-    drawn = caught(monkeypatch, figures, "order_charts")
-    write = functools.partial(write_offset, tmp_path)
-    write()
-    prepared = exported(("[data]", f"[data]\nthrough_origin = {str(through_origin).lower()}"))
-    strip = prepared.test.strips["warp"]
-    assert figures.draw_orders([strip], tmp_path / "orders.png")
-    expected = compare_orders(
-        *strip.points, range(1, 9), through_origin=through_origin,
-        specimens=strip.specimen_of.tolist(),
-    )  # fmt: skip
-    ((_, told),) = drawn
-    assert told[0].rmse == [s.rmse for s in expected.scores]
-    assert told[0].left_out == [s.left_out for s in expected.scores]
+    """Of two warp specimens that are pretensioned by 50 N, and one of the fill."""
+    drawn = caught(monkeypatch, report, "order_charts")
+    u = np.linspace(0, 4, 21)
+    for number, name in enumerate(("w1.csv", "w2.csv")):
+        text = rows(",", u, 50 + 200 * u + 0.01 * number)
+        (tmp_path / name).write_text("Extension (mm),Load (N)\n" + text + "\n")
+    said = f"[data]\norder = 3\nthrough_origin = {str(through_origin).lower()}"
+    strips = exported(("[data]", said)).test.strips
+    bare = replace(strips["fill"], polynomial=None)
+    assert report.draw_orders([strips["warp"], bare, strips["fill"]], tmp_path / "orders.png")
+    ((_, panels),) = drawn
+    for panel, direction, several in zip(panels, ("warp", "fill"), (True, False), strict=True):
+        strip = strips[direction]
+        scores = compare_orders(
+            *strip.points, range(1, 9), through_origin=through_origin,
+            specimens=strip.specimen_of.tolist() if several else None,
+        ).scores  # fmt: skip
+        assert (panel.direction, panel.orders, panel.chosen) == (direction, [*range(1, 9)], 3)
+        assert panel.rmse == [s.rmse for s in scores]
+        assert panel.left_out == [s.left_out for s in scores]
     # A load at rest of 50 N: only a polynomial with a constant can follow it.
-    assert (min(told[0].rmse) < 1.0) == (not through_origin)
-
-
-def test_points_at_few_elongations_have_no_picture_of_orders(tmp_path):
-    """Many specimens read at the same seven places settle no polynomial of order eight."""
+    assert (min(panels[0].rmse) < 1.0) == (not through_origin)
+    assert not report.draw_orders([bare], tmp_path / "orders.png")
+    # Many specimens read at the same seven places settle no polynomial of order eight.
     u = np.linspace(0.5, 3.5, 7)
     curves = tuple(LoadCurve("warp", s, u, 100 * u + i, None) for i, s in enumerate("abc"))
     strip = Strip("warp", 20.0, 23.5, fit_load_polynomial(u, 100 * u), curves)
-    assert not figures.draw_orders([strip], tmp_path / "orders.png")
-    assert not (tmp_path / "orders.png").exists()
+    assert not report.draw_orders([strip], tmp_path / "orders.png")
 
 
-def test_what_the_panels_of_loads_show():
+def test_panels_of_loads():
     """The polynomial from rest to the end of the model; points only where there are any."""
     u = np.linspace(0.5, 4.5, 9)
     polynomial = fit_load_polynomial(u, 100 * u + 3 * u**2)
     curves = (LoadCurve("warp", "a", u, 100 * u, None),)
     warp = Strip("warp", 20.0, 23.5, polynomial, curves, scatter=7.0)
     models = {"warp": [("model", u, 90 * u)]}
-    one, bare = figures.load_panels([warp, Strip("fill", 20.0, 23.0)], models, {"warp": [4.2]})
+    one, bare = report.load_panels([warp, Strip("fill", 20.0, 23.0)], models, {"warp": [4.2]})
     places, loads = one.polynomial
     assert (places[0], places[-1], len(places)) == (0.0, pytest.approx(3.5), 200)
     assert loads == pytest.approx(100 * places + 3 * places**2, abs=1e-6)
     assert one.points[0].tolist() == u[u <= 3.5].tolist()
-    assert (one.direction, one.scatter, one.rms, one.models) == (
-        "warp", 7.0, [4.2], models["warp"]
-    )  # fmt: skip
-    assert (bare.direction, bare.points, bare.polynomial, bare.scatter) == (
-        "fill", None, None, None
-    )  # fmt: skip
+    assert (one.direction, one.scatter, one.rms) == ("warp", 7.0, [4.2])
+    assert one.models is models["warp"]
+    assert (bare.direction, bare.points, bare.polynomial, bare.scatter) == ("fill", *[None] * 3)
     assert (bare.models, bare.rms) == ((), ())
 
 
-def bias(*shear: float) -> tuple[Any, Any]:
-    """A row of quads, 10 mm long, from -20 mm on, between gauge points at -10 and 10 mm."""
-    heights = np.arange(-20.0, 10.0 * len(shear) - 19.0, 10.0)
-    points = np.array([[x, y, 0.0] for y in heights for x in (0.0, 5.0)])
-    quads = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(len(shear))]
-    gauge = [int(np.flatnonzero(points[:, 1] == y)[0]) for y in (-10.0, 10.0)]
-    mesh = SimpleNamespace(points=points, quads=np.array(quads), node_sets={"gauge": gauge})
-    frames = np.array([np.zeros_like(points), np.ones_like(points)])
-    return SimpleNamespace(mesh=mesh, warp="warp"), SimpleNamespace(displacement=frames)
-
-
 def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
-    model, history = bias(0.9, 0.2, -0.3, 0.8)
-    strain = np.column_stack([np.ones(4), np.ones(4), [0.9, 0.2, -0.3, 0.8]])
+    """A row of quads, 10 mm long, from -20 mm on, between gauge points at -10 and 10 mm."""
+    shear = [0.9, 0.2, -0.3, 0.8]
+    points = np.array([[x, y, 0.0] for y in (-20.0, -10.0, 0.0, 10.0, 20.0) for x in (0.0, 5.0)])
+    quads = np.array([[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(4)])
+    mesh = SimpleNamespace(points=points, quads=quads, node_sets={"gauge": [2, 6]})
+    model = SimpleNamespace(mesh=mesh, warp="warp")
+    history = SimpleNamespace(displacement=np.array([0 * points, 0 * points + 1]))
+    strain = np.column_stack([np.ones(4), np.ones(4), shear])
 
-    def middle(mesh: Any, u: np.ndarray, warp: Any) -> np.ndarray:
-        assert mesh is model.mesh and warp == "warp" and (u == 1.0).all()
+    def middle(of, u, warp):
+        assert of is mesh and warp == "warp" and (u == 1.0).all()
         return strain
 
-    monkeypatch.setattr(figures, "middle_strain", middle)
-    strip: Any = SimpleNamespace(direction="bias", model=model, history=history)
-    assert figures.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
-    drawn = caught(monkeypatch, figures, "strip_charts")
-    monkeypatch.setattr(figures, "write_vtu", lambda *what, **more: drawn.append((what, more)))
-    figures.draw_bias(model, history, Path("b.png"), Path("b.vtu"))
-    picture, (written, more) = drawn
-    assert picture[0] == Path("b.png") and (picture[3] == 1.0).all()
-    assert picture[4].tolist() == [0.9, 0.2, -0.3, 0.8]
-    assert picture[5] == model.mesh.node_sets["gauge"]
-    assert written[0] is model.mesh and (written[1] == 1.0).all() and written[2] == Path("b.vtu")
+    monkeypatch.setattr(report, "middle_strain", middle)
+    strip = SimpleNamespace(direction="bias", model=model, history=history)
+    assert report.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
+    drawn = caught(monkeypatch, report, "strip_charts")
+    monkeypatch.setattr(report, "write_vtu", lambda *what, **more: drawn.append((what, more)))
+    report.draw_bias(model, history, Path("b.png"), Path("b.vtu"))
+    (picture, *_, moved, drawn_shear, gauge), (written, more) = drawn
+    assert picture == Path("b.png") and (moved == 1.0).all()
+    assert drawn_shear.tolist() == shear and gauge == [2, 6]
+    assert written[0] is mesh and (written[1] == 1.0).all() and written[2] == Path("b.vtu")
     assert more == {"cell_data": {"log_strain_1_2_12": strain}}
 
 
-def test_moduli_are_drawn_to_the_end_of_the_strips(published, monkeypatch) -> None:
-    drawn = caught(monkeypatch, figures, "moduli_together")
-    law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), strain_range=np.full(3, 0.13))
-    prepared = published()
-    fit = fitted(prepared)
-    strips = prepared.fitted_strips(fit)
-    figures.draw_moduli(strips, replace(fit, law=law), Path("m.png"))
-    ((path, strains, curves),) = drawn
-    assert path == Path("m.png") and strains.shape == curves.shape == (3, 121)
-    assert strains[:, 0].tolist() == [0.0] * 3
-    ends = figures.failure_strains(strips, fit.valid)
-    # E1 over the warp strain, E2 over the fill's, G12 over the shear.
-    assert sorted(strains[:, -1]) == pytest.approx(sorted(ends))
-    for name, x, y in zip(COMPONENTS, strains, curves, strict=True):
-        assert x[-1] == pytest.approx(ends[COMPONENTS[name]])
-        np.testing.assert_allclose(y, law.modulus(name, x))
+# Results whose numbers are known
+
+WAY = np.array([2.0, -0.5, 1.0, 4.0, 4.5, 0.0])
+TWO = (
+    LoadCurve("warp", "1", WAY, 100 * WAY, Path("w.csv"), notes=("a note", "another")),
+    LoadCurve("warp", "2", WAY[:3], 120 * WAY[:3], None, notes=("a note",)),
+)
+LINE = fit_load_polynomial(np.linspace(0, 4, 9), 110 * np.linspace(0, 4, 9), 1)
+WARP = Strip("warp", 20.0, 24.0, LINE, TWO, scatter=7.5)
+BIAS = replace(WARP, direction="bias", scatter=None, curves=(), polynomial=None)
+#: Two increments, to 2 and 4 mm.
+MODEL = straight_strip("warp", 20.0, 24.0, 0.8, increments=2)
+#: RMS of 3 and -4 N.
+RMS = float(np.sqrt(12.5))
 
 
-def test_the_order_in_use_and_the_specimens_are_in_the_picture(exported, monkeypatch) -> None:
-    drawn = caught(monkeypatch, figures, "order_charts")
-    test = exported(("[data]", "[data]\norder = 3")).test
-    strips = [
-        test.strips["warp"],
-        replace(test.strips["fill"], polynomial=None),
-        test.strips["fill"],
-    ]
-    assert figures.draw_orders(strips, Path("o.png"))
-    ((_, told),) = drawn
-    assert [(p.direction, p.orders, p.chosen) for p in told] == [
-        ("warp", list(range(1, 9)), 3), ("fill", list(range(1, 9)), 3)
+def history(*load: float, shear: float = 0.0) -> History:
+    strain = np.array([0.1, 0.02, shear])
+    return History(np.array(load), np.zeros((2, 4, 3)), -strain / 2, strain)
+
+
+def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
+    """2 and 4 mm matched at 200 and 400 N."""
+    objective = LoadObjective([2.0, 4.0], [2.0, 4.0], [200.0, 400.0])
+    return FittedStrip(strip, MODEL, objective, history(*loads))
+
+
+def holding(test, strips) -> Any:
+    return SimpleNamespace(test=test, fitted_strips=lambda _: strips)
+
+
+def test_findings():
+    test = SimpleNamespace(name="s", match_by="points", weights={"warp": 1.0, "bias": 2.5})
+    found = report.findings(holding(test, [matched(), matched(BIAS, (200.0, 410.0))]), None)
+    other = float(np.sqrt(50.0))
+    warp = {
+        "rms_N": pytest.approx(RMS), "scatter_N": 7.5, "weight": 1.0, "matched": 2,
+        "gauge_length_mm": 20.0, "final_length_mm": 24.0, "end_load_N": 396.0,
+    }  # fmt: skip
+    bias = warp | {
+        "rms_N": pytest.approx(other), "scatter_N": None, "weight": 2.5, "end_load_N": 410.0
+    }  # fmt: skip
+    assert found.numbers == {
+        "directions": {"warp": warp, "bias": bias},
+        "e_uniaxial_N": pytest.approx(RMS + other),
+        "matched_by": "points",
+    }
+    (line,) = found.lines
+    for words, numbers in (
+        (line, ("warp 3.54", "7.5", "bias 7.07", "10.61")),
+        (found.quality, (" N: warp 3.536", "bias 7.071")),
+        (found.summary, (" N: warp 3.54", "bias 7.07", "10.61")),
+    ):
+        assert all(number in words for number in numbers), words
+    unmatched, *notes, left_out = found.warnings
+    assert (unmatched.kind, unmatched.of) == (UNMATCHED, "") and "no fill" in unmatched
+    assert [(n.kind, str(n)) for n in notes] == [
+        (READING, "a note"), (READING, "another")
     ]  # fmt: skip
-    for strip, panel in zip((strips[0], strips[2]), told, strict=True):
-        several = len(set(strip.specimen_of.tolist())) > 1
-        whose = strip.specimen_of.tolist() if several else None
-        scores = compare_orders(
-            *strip.points, range(1, 9), through_origin=True, specimens=whose
-        ).scores
-        assert panel.left_out == [score.left_out for score in scores]
-    assert not figures.draw_orders(strips[1:2], Path("o.png"))
+    assert (left_out.kind, left_out.of, left_out[:8]) == (LEFT_OUT, "warp", "3 points")
+    test.match_by = "polynomial"
+    found = report.findings(holding(test, [matched()]), None)
+    assert LEFT_OUT not in [n.kind for n in found.warnings]
 
 
-def write_offset(folder: Path):
-    """Two warp specimens that are pretensioned by 50 N."""
-    u = np.linspace(0, 4, 21)
-    for number, name in enumerate(("w1.csv", "w2.csv")):
-        lines = [f"{a},{50 + 200 * a + 0.01 * number}" for a in u]
-        (folder / name).write_text("Extension (mm),Load (N)\n" + "\n".join(lines) + "\n")
+def test_tables():
+    both = [matched(), matched(BIAS, (200.0, 410.0))]
+    table = misfit_table(both)
+    assert [h.split(", ")[-1] for h in table.header] == [
+        "strip", "N", "N", "R² of polynomial", "N", "points matched", "N"
+    ]  # fmt: skip
+    assert [row[0] for row in table.rows] == ["warp", "bias"]
+    assert table.rows[0][1:] == pytest.approx([RMS, 7.5, 1.0, 0.0, 2, 396.0], abs=1e-9)
+    assert table.rows[1][1:] == [pytest.approx(np.sqrt(50.0)), None, None, None, 2, 410.0]
+    loads = load_table(both)
+    columns = "direction elongation_mm engineering_strain model_N polynomial_N"
+    assert list(loads.columns) == columns.split()
+    assert loads["direction"].tolist() == ["warp"] * 2 + ["bias"] * 2
+    assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
+    assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
+    rest = report.residuals(holding(None, both), None)
+    assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
+    columns = "part elongation_mm quantity measured modelled difference unit"
+    assert list(rest.columns) == columns.split()
+    part, at, quantity, *numbers, unit = rest.iloc[1].tolist()
+    assert (part, at, quantity, unit) == ("warp", 4.0, "load", "N")
+    assert numbers == pytest.approx([400.0, 396.0, -4.0])
+
+
+def test_points_of_a_strip_and_those_left_out():
+    elongation, load = WARP.points
+    assert elongation.tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 4.0]
+    assert load.tolist() == [0.0, 100.0, 120.0, 200.0, 240.0, 400.0]
+    assert WARP.specimen_of.tolist() == [0, 0, 1, 0, 1, 0] and WARP.beyond == 3
+    (file,) = WARP.data_files(points=True)
+    assert (file.path, file.used, file.dropped) == (Path("w.csv"), 4, {BELOW: 1, BEYOND: 1})
+    (file,) = WARP.data_files(points=False)
+    assert (file.used, file.dropped) == (6, {})
+    # The last point may lie at the end by rounding.
+    for shorter, beyond in ((1e-10, 3), (1e-8, 4)):
+        just = replace(WARP, final_length=20.0 + 4.0 * (1 - shorter))
+        assert just.beyond == beyond and just.data_files(True)[0].dropped[BEYOND] == beyond - 2
+    assert BIAS.points[0].size == BIAS.specimen_of.size == BIAS.beyond == 0
+
+
+def test_lengths_and_noise_of_a_strip():
+    assert WARP.elongation == 4.0 and WARP.strain == pytest.approx(np.log(1.2))
+    some = np.array([True, True, True, True, True, False])
+    assert WARP.strain_by(some) == WARP.strain
+    opened = replace(WARP, open_end=True)
+    assert opened.strain_by(some) == pytest.approx(np.log(1.1))
+    assert opened.strain_by(None) == pytest.approx(np.log(1.2))
+    assert replace(BIAS, open_end=True).strain_by(some) == pytest.approx(np.log(1.2))
+    assert WARP.noise(1000.0) == (7.5, "specimens' scatter")
+    assert WARP.noise(1000.0, 0.0) == (0.0, "given")
+    assert BIAS.noise(1000.0) == (5.0, "assumed")
+    assert BIAS.break_shares() is None
+
+
+def test_breaks_of_a_strip_are_shares_of_its_strain():
+    """A load that bends at a quarter and at two thirds of the strain, and one that is cut there."""
+    strain = np.log1p(np.linspace(0, 4, 400) / 20.0)
+    first, second = (np.maximum(strain - strain[-1] * share, 0) for share in (1 / 4, 2 / 3))
+    load = 900 * strain - 800 * first + 500 * second
+    polynomial = fit_load_polynomial(np.linspace(0, 4, 400), load, 12)
+    shares = replace(WARP, polynomial=polynomial).break_shares()
+    assert shares == pytest.approx((0.25, 0.667), abs=0.05)
+
+
+# Cards, one beside the other
+
+
+@pytest.fixture
+def drawn(monkeypatch) -> dict[str, list[Any]]:
+    biases: list[Any] = []
+    monkeypatch.setattr(report, "draw_bias", lambda *what: biases.append(what))
+    return {"loads": caught(monkeypatch, report, "load_charts"), "bias": biases}
+
+
+def simulated(folder, outcomes, within: bool = False):
+    strips = {"warp": WARP, "bias": BIAS}
+    test: Any = SimpleNamespace(strips={d: strips[d] for _, d in outcomes})
+    law = SimpleNamespace(strain_range=np.array([0.1, 0.1, 0.1]))
+    cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
+    runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
+    return report.simulate(test, cards, runs, Output(folder), within)
+
+
+def test_cards_side_by_side(tmp_path, drawn):
+    """The polynomial says 220 and 440 N at 2 and 4 mm."""
+    found = simulated(tmp_path, {
+        ("soft", "warp"): history(223.0, 436.0), ("soft", "bias"): history(10.0, 20.0, shear=0.3),
+        ("hard", "warp"): SolverFailure("no equilibrium", "membrane"),
+        ("hard", "bias"): history(11.0, 21.5),
+    })  # fmt: skip
+    warp = {
+        "rms_N": pytest.approx(RMS), "end_load_N": 436.0, "shown_to_mm": 4.0,
+        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.0},
+    }  # fmt: skip
+    bias = {
+        "rms_N": None, "end_load_N": 20.0, "shown_to_mm": 4.0,
+        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.3},
+    }  # fmt: skip
+    cards = found.numbers["cards"]
+    assert cards["soft"] == {"e_uniaxial_N": None, "directions": {"warp": warp, "bias": bias}}
+    assert cards["hard"]["directions"]["warp"] == {"failed": "no equilibrium"}
+    assert found.lines == [
+        "soft: RMS warp 3.536 N to 4 mm, bias 20 N at the end",
+        "hard: RMS warp failed, bias 21.5 N at the end",
+    ]
+    assert [name for name, _ in found.figures] == ["loads.png"]
+    table = pd.read_csv(tmp_path / "loads.csv")
+    assert list(table.columns) == ["card", "direction", "elongation_mm", "load_N"]
+    assert table.to_numpy().tolist() == [
+        ["soft", "warp", 2.0, 223.0], ["soft", "warp", 4.0, 436.0],
+        ["soft", "bias", 2.0, 10.0], ["soft", "bias", 4.0, 20.0],
+        ["hard", "bias", 2.0, 11.0], ["hard", "bias", 4.0, 21.5],
+    ]  # fmt: skip
+    ((path, _, (first, second)),) = drawn["loads"]
+    assert path == tmp_path / "loads.png"
+    assert [(name, load.tolist()) for name, _, load in first.models] == [("soft", [223.0, 436.0])]
+    assert list(first.rms) == pytest.approx([RMS]) and list(second.rms) == []
+    assert [name for name, *_ in second.models] == ["soft", "hard"]
+    assert [call[2].name for call in drawn["bias"]] == ["bias-1.png", "bias-2.png"]
+    assert [call[3].name for call in drawn["bias"]] == ["bias-1.vtu", "bias-2.vtu"]
+
+
+def test_one_card_has_a_sum_and_files_without_a_number(tmp_path, drawn):
+    found = simulated(tmp_path, {("soft", "warp"): history(223.0, 436.0)})
+    assert found.numbers["cards"]["soft"]["e_uniaxial_N"] == pytest.approx(RMS)
+    assert found.lines == ["soft: RMS warp 3.536 N to 4 mm; sum 3.536 N"]
+    simulated(tmp_path, {("soft", "bias"): history(10.0, 20.0)})
+    assert drawn["bias"][0][2].name == "bias.png"
+
+
+@pytest.mark.parametrize(
+    ("strains", "shown"),
+    [
+        ([[0] * 3, [0.1, 0.1, 0.1]], 2), ([[0] * 3, [0.101, 0.0, 0.0]], 1),
+        ([[0] * 3, [0.0, 0.101, 0.0]], 1), ([[0] * 3, [0.0, 0.0, -0.101]], 1),
+        ([[0] * 3, [-0.5, -0.5, 0.0]], 2), ([[0] * 3, [0.1 * (1 + 1e-7), 0.0, 0.0]], 2),
+        ([[1, 1, 1]], 0),
+    ],
+)  # fmt: skip
+def test_curves_end_where_the_range_of_the_card_does(tmp_path, drawn, monkeypatch, strains, shown):
+    """At the first increment and at the second."""
+    strain = iter(strains)
+    monkeypatch.setattr(report, "middle_strain", lambda *_: np.array([next(strain)]))
+    found = simulated(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
+    (card,) = found.numbers["cards"].values()
+    warp = card["directions"]["warp"]
+    assert warp["shown_to_mm"] == 2.0 * shown and warp["end_load_N"] == 436.0
+    assert warp["rms_N"] == (None, pytest.approx(3.0), pytest.approx(RMS))[shown]
+    assert (card["e_uniaxial_N"] is None) == (shown < 2)
+    ((_, _, (panel,)),) = drawn["loads"]
+    assert [len(model[1]) for model in panel.models] == [shown] * bool(shown)
+    assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
+
+
+def test_every_cell(tmp_path):
+    way = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
+    curve = LoadCurve("warp", "W1", way, np.array([2.0, 50.0, 90.0, 160.0, 120.0]), None)
+    line = fit_load_polynomial(np.linspace(0, 6, 9), 30 * np.linspace(0, 6, 9), 1)
+    strips = {
+        "warp": Strip("warp", 20.0, 24.0, None, (curve,)),
+        "fill": Strip("fill", 25.0, 30.0, line),
+        "bias": Strip("bias", 20.0, 30.0),  # without data
+    }
+    shown = examine(SimpleNamespace(test=SimpleNamespace(strips=strips)), Output(tmp_path, "s/"))
+    assert [name for name, _ in shown.figures] == ["s/curves.png"]
+    assert (tmp_path / "s" / "curves.png").is_file()
+    (table,) = shown.tables
+    assert [h.split(", ")[-1] for h in table.header] == [
+        "direction", "specimen", "points", "mm", "mm", "last strain", "N", "N"
+    ]  # fmt: skip
+    first, second = table.rows
+    assert first[:2] == ["warp", "W1"] and second[:2] == ["fill", "polynomial"]
+    assert first[2:] == pytest.approx([5, 0.1, 3.9, np.log(23.9 / 20), 2.0, 160.0])
+    assert second[2:] == pytest.approx([50, 0.0, 5.0, np.log(1.2), 0.0, 150.0])
+    assert table.text == (1,)
+
+
+# Cards that the membrane runs
+
+#: E1 of the brittle one is negative beyond a strain of 0.06.
+LAWS = {
+    "table": HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.08, 0.1, 0.2]),
+    "linear": HypoelasticLaw.linear(500.0, 200.0, 20.0),
+    "brittle": HypoelasticLaw([0] * 3 + [20.0] + [0] * 3 + [220.0, 0, 0, -5000.0, 300.0]),
+}
+
+
+def test_cards_that_are_run(tmp_path):
+    (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
+    test = read(project_file(tmp_path, PUBLISHED, ("increments = 100", "increments = 10")))
+    cards = {name: MaterialCard(law, 0.81, name, "a test") for name, law in LAWS.items()}
+    runs = {}
+    for name, law in LAWS.items():
+        for direction, model in test.models(0.81).items():
+            try:
+                outcome = MembraneSolver().run(model, law)
+            except SolverFailure as failure:
+                outcome = failure
+            runs[name, direction] = CardRun(model, outcome)
+    found = report.simulate(test, cards, runs, Output(tmp_path / "sim", "one-"))
+    table, linear, brittle = found.numbers["cards"].values()
+    assert found.lines[0].startswith("table: RMS warp ") and "; sum " in found.lines[0]
+    directions = table["directions"]
+    for direction, strip in test.strips.items():
+        model, load = runs["table", direction].model, runs["table", direction].outcome.load
+        off = load - strip.polynomial(np.array(model.elongations))
+        assert directions[direction]["rms_N"] == pytest.approx(np.sqrt(np.mean(off**2)))
+        assert directions[direction]["shown_to_mm"] == pytest.approx(strip.elongation)
+    total = sum(n["rms_N"] for n in directions.values())
+    assert table["e_uniaxial_N"] == pytest.approx(total) and linear["e_uniaxial_N"] > 0
+    assert "failed" in brittle["directions"]["warp"] and brittle["e_uniaxial_N"] is None
+    assert brittle["directions"]["fill"]["rms_N"] > 0 and "warp failed" in found.lines[2]
+    loads = pd.read_csv(tmp_path / "sim/one-loads.csv").groupby("card")["direction"].unique()
+    assert set(loads["linear"]) == set(LENGTHS) and "warp" not in loads["brittle"]
+    names = {
+        "loads.csv",
+        "loads.png",
+        *(f"bias-{n}.{end}" for n in (1, 2) for end in ("png", "vtu")),
+    }
+    assert {f"one-{name}" for name in names} <= {p.name for p in (tmp_path / "sim").iterdir()}
+    # Within the card's range of small strains: curves end early, and there is no sum of errors.
+    cards, runs = ({k: v for k, v in some.items() if "table" in k} for some in (cards, runs))
+    found = report.simulate(test, cards, runs, Output(tmp_path / "sim"), True)
+    (numbers,) = found.numbers["cards"].values()
+    assert numbers["e_uniaxial_N"] is None
+    for direction, end in (("warp", 0.08), ("fill", 0.1)):
+        shown, start = numbers["directions"][direction]["shown_to_mm"], LENGTHS[direction][0]
+        step = (LENGTHS[direction][1] - start) / 10
+        assert shown <= start * np.expm1(end) < shown + step
+    assert 0 < numbers["directions"]["bias"]["shown_to_mm"] < 5

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.experiments.kinds import Expected
-from bubblefit.experiments.strips.data import Strip
-from bubblefit.experiments.strips.doubts import curves_of, doubts_of_strips
+from bubblefit.experiments.strips.data import Strip, curves_of, doubts_of_strips
 from bubblefit.readers.curves import LoadCurve, fit_load_polynomial
 
 GAUGE, WIDTH, THICKNESS = 20.0, 25.0, 0.8
@@ -15,12 +14,12 @@ MODULI = {"warp": 700.0, "fill": 300.0, "bias": 40.0}
 ENDS = {"warp": 3.0, "fill": 5.0, "bias": 10.0}
 
 
-def curve(direction: str, specimen: str = "1") -> LoadCurve:
+def curve(direction: str) -> LoadCurve:
     elongation = np.linspace(0.0, ENDS[direction], 60)
     strain = np.log1p(elongation / GAUGE)
     load = MODULI[direction] * WIDTH * THICKNESS * strain * (1 - 0.5 * strain)
-    rng = np.random.default_rng(5)
-    return LoadCurve(direction, specimen, elongation, load + rng.normal(0, 1.0, 60), None)
+    noise = np.random.default_rng(5).normal(0, 1.0, 60)
+    return LoadCurve(direction, "1", elongation, load + noise, None)
 
 
 def strip(one: LoadCurve, end: float | None = None) -> Strip:
@@ -30,25 +29,22 @@ def strip(one: LoadCurve, end: float | None = None) -> Strip:
 
 
 GOOD = {direction: curve(direction) for direction in MODULI}
+WARP, FILL = GOOD["warp"], GOOD["fill"]
+
+
+def doubts(strips, thickness=THICKNESS, expected=EXPECTED):
+    return list(doubts_of_strips(strips, WIDTH, thickness, expected))
 
 
 def names(curves, **ends):
-    strips = {d: strip(c, ends.get(d)) for d, c in curves.items()}
-    found = doubts_of_strips(strips, WIDTH, THICKNESS, EXPECTED)
-    return {doubt.name: doubt for doubt in found}
+    return {d.name: d for d in doubts({d: strip(c, ends.get(d)) for d, c in curves.items()})}
 
 
 def changed(direction: str, **parts):
     return {**GOOD, direction: replace(GOOD[direction], **parts)}
 
 
-def broken() -> LoadCurve:
-    load = GOOD["fill"].load.copy()
-    load[50:] *= 0.2
-    return replace(GOOD["fill"], load=load)
-
-
-WARP, FILL = GOOD["warp"], GOOD["fill"]
+BROKEN = changed("fill", load=FILL.load * np.where(np.arange(60) < 50, 1.0, 0.2))
 TRAPS = {
     "percent for mm": (
         changed("bias", elongation=100 * GOOD["bias"].elongation / GAUGE),
@@ -56,7 +52,7 @@ TRAPS = {
         ("elongation-unit", True, "not a strain"),
     ),
     "strain for mm": (
-        changed("fill", elongation=FILL.elongation / GAUGE / 1000, load=FILL.load),
+        changed("fill", elongation=FILL.elongation / GAUGE / 1000),
         {"fill": ENDS["fill"] / GAUGE / 1000},
         ("elongation-unit", True, "gauge lengths"),
     ),
@@ -67,12 +63,9 @@ TRAPS = {
     "preload": (
         changed("fill", load=FILL.load + 150.0), {}, ("preload", False, "fill, 1: the load"),
     ),
-    "rows after failure": ({**GOOD, "fill": broken()}, {}, ("after-failure", True, "falls from")),
+    "rows after failure": (BROKEN, {}, ("after-failure", True, "falls from")),
     "warp and fill swapped": (
-        {
-            "warp": replace(GOOD["fill"], direction="warp"),
-            "fill": replace(GOOD["warp"], direction="fill"),
-        },
+        {**GOOD, "warp": replace(FILL, direction="warp"), "fill": replace(WARP, direction="fill")},
         {"warp": ENDS["fill"], "fill": ENDS["warp"]},
         ("swapped", False, "swapped"),
     ),
@@ -83,83 +76,49 @@ TRAPS = {
 def test_a_trap_is_named(trap):
     curves, ends, (name, sure, words) = TRAPS[trap]
     found = names(curves, **ends)
-    assert name in found, (trap, list(found))
-    assert found[name].sure == sure and words in found[name].text, found[name].text
+    assert found[name].sure == sure and words in found[name].text, list(found)
     assert {d.name for d in found.values() if d.sure} <= {name, "load-unit"}
 
 
 def test_good_curves_raise_no_doubt():
     assert not names(GOOD)
+    # Rows after failure beyond the final length are none.
+    assert not names(BROKEN, fill=4.0)
+    # A curve known by its polynomial is looked at too.
+    whole = {d: replace(strip(c), curves=()) for d, c in GOOD.items()}
+    assert not doubts(whole)
+    assert {d.name for d in doubts(whole, 100 * THICKNESS)} == {"load-unit"}
 
 
-def test_rows_after_failure_beyond_the_final_length_are_no_doubt():
-    assert not names({**GOOD, "fill": broken()}, fill=4.0)
-
-
-def test_a_curve_known_by_its_polynomial_is_looked_at_too():
-    whole = {d: strip(c) for d, c in GOOD.items()}
-    assert not doubts_of_strips(
-        {d: replace(s, curves=()) for d, s in whole.items()}, WIDTH, THICKNESS, EXPECTED
-    )
-    found = doubts_of_strips(
-        {d: replace(s, curves=()) for d, s in whole.items()}, WIDTH, 100 * THICKNESS, EXPECTED
-    )
-    assert {d.name for d in found} == {"load-unit"}
-
-
-# Just below each limit and at it, and what is said to the last word
-
-
-def made(
-    elongation: list[float], load: list[float], end: float | None = None, gauge: float = 20.0
-) -> dict[str, str]:
-    """Names and words on one bias strip, which no modulus is held against."""
-    one = LoadCurve("bias", "B1", np.array(elongation), np.array(load), None)
-    length = gauge + (one.elongation[-1] if end is None else end)
-    found = doubts_of_strips(
-        {"bias": Strip("bias", gauge, length, None, (one,))}, WIDTH, THICKNESS, EXPECTED
-    )
-    return {doubt.name: doubt.text for doubt in found}
-
-
-@pytest.mark.parametrize(
-    ("gauge", "end", "doubt"), [(500.0, 1.0, 1), (500.0, 1.01, 0), (2.0, 2.99, 0), (2.0, 3.0, 1)]
-)
-def test_where_a_curve_ends(gauge, end, doubt):
-    words = (
-        f"bias, B1: the curve ends at an elongation of {end / gauge:.3g} gauge lengths: is it a "
-        "length in the unit that is said (not percent, not a strain), and is the gauge length "
-        "right?"
-    )
-    found = made([0.0, 0.5 * end, end], [0.0, 50.0, 100.0], gauge=gauge)
-    assert found == {"elongation-unit": words} if doubt else found == {}
-
-
-@pytest.mark.parametrize(("level", "doubt"), [(4.9, 0), (5.0, 1), (-5.0, 1), (-4.9, 0)])
-def test_a_load_where_nothing_is_elongated(level, doubt):
-    """The median of what lies within a hundredth of the elongation, on either side."""
-    words = (
-        f"bias, B1: the load is {level:.3g} N ({level / 100:.0%} of the largest) where the curve "
-        "begins: a preload, or a zero that was not set; begin the elongation where the load does"
-    )
-    found = made([-0.04, 0.0, 0.04, 2.0, 4.0], [90.0, level, -90.0, 60.0, 100.0])
-    assert found == {"preload": words} if doubt else found == {}
+A, P, F = "elongation-unit", "preload", "after-failure"
+#: Elongation, load; where the gauge ends; the doubt and its numbers.
+NEAR = [
+    *(([0.0, 0.5 * end, end], [0, 50, 100], gauge, None, name, f"{end / gauge:.3g} gauge lengths")
+      for gauge, end, name in ((500, 1.0, A), (500, 1.01, ""), (2, 2.99, ""), (2, 3.0, A))),
+    # The median of what lies within a hundredth of the elongation, on either side.
+    *(([-0.04, 0.0, 0.04, 2.0, 4.0], [90.0, level, -90.0, 60.0, 100.0], 20, None, name,
+       f"{level:.3g} N ({level / 100:.0%} of") for level, name in
+      ((4.9, ""), (5.0, P), (-5.0, P), (-4.9, ""))),
     # The curve begins where the strip is elongated already.
-    assert made([0.0401, 2.0, 4.0], [level, 60.0, 100.0]) == {}
-    assert made([0.0, 2.0, 4.0], [level - 200, -100.0, 0.0]) == {}
-
-
-@pytest.mark.parametrize(("low", "doubt"), [(70.0, 0), (69.9, 1)])
-def test_a_load_that_falls(low, doubt):
-    words = (
-        f"bias, B1: the load falls from 100 to {low:.3g} N at an elongation of 3 mm: rows after "
-        "failure; cut them off, or say a shorter final_length"
-    )
-    found = made([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, low, 20.0], end=3.0)
-    assert found == {"after-failure": words} if doubt else found == {}
+    ([0.0401, 2.0, 4.0], [5.0, 60.0, 100.0], 20, None, "", ""),
+    ([0.0, 2.0, 4.0], [-195.0, -100.0, 0.0], 20, None, "", ""),
+    *(([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, low, 20.0], 20, 3.0, name,
+       f"falls from 100 to {low:.3g} N at an elongation of 3 mm")
+      for low, name in ((70.0, ""), (69.9, F))),
     # In the first half of the way it is an early slip, and beyond the end nobody asks.
-    assert made([0.0, 1.0, 2.0, 4.0], [0.0, 100.0, low - 60, 200.0]) == {}
-    assert made([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, low - 60, 20.0], end=2.99) == {}
+    ([0.0, 1.0, 2.0, 4.0], [0.0, 100.0, 9.9, 200.0], 20, None, "", ""),
+    ([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, 9.9, 20.0], 20, 2.99, "", ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("elongation", "load", "gauge", "end", "name", "words"), NEAR)
+def test_just_below_each_limit_and_at_it(elongation, load, gauge, end, name, words):
+    """On one bias strip, which no modulus is held against."""
+    one = LoadCurve("bias", "B1", np.array(elongation), np.array(load, float), None)
+    length = gauge + (elongation[-1] if end is None else end)
+    found = doubts({"bias": Strip("bias", gauge, length, None, (one,))})
+    assert [d.name for d in found] == [name] * bool(name)
+    assert all(words in d.text for d in found)
 
 
 def line(direction: str, modulus: float) -> Strip:
@@ -181,15 +140,10 @@ def line(direction: str, modulus: float) -> Strip:
     ],
 )
 def test_a_modulus_far_from_its_bounds(direction, modulus, words):
-    found = doubts_of_strips({direction: line(direction, modulus)}, WIDTH, THICKNESS, EXPECTED)
-    text = (
-        f"{direction}, 1: load over strain is a modulus of about {words}: are load and elongation "
-        "in the units that are said, and are width and thickness right?"
-    )
-    assert [d.text for d in found] == [text] * bool(words)
-    assert not doubts_of_strips(
-        {direction: line(direction, modulus)}, WIDTH, THICKNESS, Expected({})
-    )
+    own = {direction: line(direction, modulus)}
+    found = doubts(own)
+    assert len(found) == bool(words) and all(words in d.text for d in found)
+    assert not doubts(own, expected=Expected({}))
 
 
 def test_the_modulus_is_taken_half_way():
@@ -199,28 +153,24 @@ def test_the_modulus_is_taken_half_way():
     middle = int(np.argmin(np.abs(np.log1p(good.elongation / GAUGE) - 0.5 * np.log(1.2))))
     load[middle - 1 : middle + 2] = good.load[middle - 1 : middle + 2]
     strip = replace(line("warp", 1.0), curves=(replace(good, load=load),))
-    assert not doubts_of_strips({"warp": strip}, WIDTH, THICKNESS, EXPECTED)
+    assert not doubts({"warp": strip})
     load[middle - 1] *= 100.0
-    assert doubts_of_strips({"warp": strip}, WIDTH, THICKNESS, EXPECTED)
+    assert doubts({"warp": strip})
 
 
 @pytest.mark.parametrize(("fill", "doubt"), [(459.0, 0), (461.0, 1)])
 def test_a_fill_that_is_stiffer_than_the_warp(fill, doubt):
     both = {"warp": line("warp", 400.0), "fill": line("fill", fill)}
-    words = (
-        f"the fill's modulus is about {fill:.3g} MPa, the warp's 400 MPa, and the bounds have the "
-        "warp stiffer: warp and fill seem to be swapped"
-    )
-    found = doubts_of_strips(both, WIDTH, THICKNESS, EXPECTED)
-    assert [(d.name, d.sure, d.text) for d in found] == [("swapped", False, words)] * doubt
-    assert not doubts_of_strips({"fill": both["fill"]}, WIDTH, THICKNESS, EXPECTED)
-    empty = {"warp": replace(both["warp"], curves=()), "fill": both["fill"]}
-    assert not doubts_of_strips(empty, WIDTH, THICKNESS, EXPECTED)
+    found = doubts(both)
+    assert [(d.name, d.sure) for d in found] == [("swapped", False)] * doubt
+    assert all(f"{fill:.3g} MPa, the warp's 400 MPa" in d.text for d in found)
+    assert not doubts({"fill": both["fill"]})
+    assert not doubts({**both, "warp": replace(both["warp"], curves=())})
 
 
 def test_a_polynomial_is_looked_at_in_fifty_places():
-    strip = replace(line("warp", 1.0), curves=(), polynomial=fit_load_polynomial(
-        np.linspace(0, 4, 9), 3.0 * np.linspace(0, 4, 9), 1))  # fmt: skip
+    u = np.linspace(0, 4, 9)
+    strip = replace(line("warp", 1.0), curves=(), polynomial=fit_load_polynomial(u, 3.0 * u, 1))
     ((name, elongation, load),) = curves_of(strip)
     assert (name, len(elongation), elongation[-1]) == ("", 50, 4.0)
     assert load == pytest.approx(3.0 * elongation, abs=1e-9)
