@@ -29,37 +29,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OrderScore:
-    """Scores of one order: n points, k coefficients, S the sum of squares left.
+    """Scores of one order of a load polynomial.
 
-    adjusted_r_squared : of S / (n - k) and (squares about the mean) / (n - 1). rmse : N, sqrt(S /
-    n). aic, bic : n ln(S / n) + 2 (k + 1) and n ln(S / n) + (k + 1) ln n. left_out : N, RMS error
-    at points, or whole specimens, that the fit did not see.
+    R^2 and rmse (N) are best for the highest order offered (thesis section 3.2): each contains the
+    ones below it. left_out : N, RMS error at points, or whole specimens, that the fit did not see.
     """
 
     order: int
     r_squared: float
-    adjusted_r_squared: float
     rmse: float
-    aic: float
-    bic: float
     left_out: float
-
-
-@dataclass(frozen=True)
-class OrderComparison:
-    """Scores by rising order, and the order that each rule chooses.
-
-    by_fit : lowest RMSE and highest R^2, the thesis' rule (section 3.2). Each order contains the
-    ones below it, so that it chooses the highest offered: the thesis' fourth was a choice of what
-    to offer.
-    """
-
-    scores: tuple[OrderScore, ...]
-    by_fit: int
-    by_adjusted_r_squared: int
-    by_aic: int
-    by_bic: int
-    by_left_out: int
 
 
 def compare_orders(
@@ -68,8 +47,8 @@ def compare_orders(
     orders: Sequence[int] = range(1, 9),
     through_origin: bool = True,
     specimens: Sequence[object] | None = None,
-) -> OrderComparison:
-    """Fit each order to the points (n,) mm and (n,) N and score it.
+) -> tuple[OrderScore, ...]:
+    """Fit each order to the points (n,) mm and (n,) N and return its scores, by rising order.
 
     specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
     specimen err together, so leaving out one of them flatters.
@@ -83,15 +62,7 @@ def compare_orders(
     groups = [
         np.array([i for i, name in enumerate(names) if name == one]) for one in dict.fromkeys(names)
     ]
-    scores = tuple(_score(u, f, order, through_origin, groups) for order in sorted(set(orders)))
-
-    def best(rule: str, sign: float = 1.0) -> int:
-        return scores[int(np.argmin([sign * getattr(s, rule) for s in scores]))].order
-
-    adjusted = best("adjusted_r_squared", -1.0)
-    return OrderComparison(
-        scores, best("rmse"), adjusted, best("aic"), best("bic"), best("left_out")
-    )
+    return tuple(_score(u, f, order, through_origin, groups) for order in sorted(set(orders)))
 
 
 def _score(
@@ -103,21 +74,10 @@ def _score(
     if n < k + 2:
         problem = f"comparing needs {k + 2} points, there are {n}; lower it"
         raise InputError(None, f"order {order}", problem)
-    # Below rounding a fit is exact, and the logarithm of nothing says nothing.
-    mean_square = max(fitted.rmse**2, 1e-30 * float((f**2).mean()))
-    likelihood = n * float(np.log(mean_square))
     orthonormal = np.linalg.qr(terms)[0]
     left = f - fitted(u)
     squares = sum(_left_out_squares(orthonormal[group], left[group]) for group in groups)
-    return OrderScore(
-        order,
-        fitted.r_squared,
-        1.0 - (1.0 - fitted.r_squared) * (n - 1) / (n - k),
-        fitted.rmse,
-        likelihood + 2 * (k + 1),
-        likelihood + float(np.log(n)) * (k + 1),
-        float(np.sqrt(squares / n)),
-    )
+    return OrderScore(order, fitted.r_squared, fitted.rmse, float(np.sqrt(squares / n)))
 
 
 def _left_out_squares(rows: Array, left: Array) -> float:

@@ -172,7 +172,7 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
         try:
             scores = compare_orders(
                 *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
-            ).scores
+            )
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
         orders, rms, left_out = (

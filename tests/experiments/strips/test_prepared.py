@@ -222,7 +222,7 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
         scores = compare_orders(
             *strip.points, range(1, 9), through_origin=through_origin,
             specimens=strip.specimen_of.tolist() if several else None,
-        ).scores  # fmt: skip
+        )  # fmt: skip
         assert (panel.direction, panel.orders, panel.chosen) == (direction, [*range(1, 9)], 3)
         assert panel.rmse == [s.rmse for s in scores]
         assert panel.left_out == [s.left_out for s in scores]
