@@ -35,8 +35,7 @@ CASES = {
 def bias(starts: int = 3) -> None:
     """Fit data of other meshes and load steps, and by polynomial surfaces; STARTS each.
 
-    Printed: e, the largest error of each modulus over the strain reached, that of G12 over half of
-    it, the errors with the mesh's part taken out, and how much of the truth lies in the bands.
+    Printed: e, largest errors of the moduli, without the mesh's part, and the truth in the bands.
     """
     base = known_project()
     (test,) = base.tests.values()
@@ -100,10 +99,8 @@ def noisy(
 def coverage(fields: int = 100, quads: int = 432) -> None:
     """Count how often the bands of fits to FIELDS noisy fields hold the truth.
 
-    Data of 7200 quads at the nodes of a disk of QUADS, noise alike over a facet. Printed, at the
-    strains up to 0.9 of what is reached: how often the truth lies in the band (95 %), in that of
-    the law without the mesh's error, within 1.96 sigma of noise alone; and the width of the second
-    over the scatter of the moduli.
+    Data of 7200 quads at the nodes of a disk of QUADS, noise alike over a facet; strains up to 0.9
+    of what is reached; the band (95 %), that without the mesh's error, and noise alone.
     """
     project = known_project()
     (test,) = project.tests.values()
@@ -156,9 +153,7 @@ def coverage(fields: int = 100, quads: int = 432) -> None:
 def discrepancy(fields: int = 100, quads: int = 192, *chosen: str) -> None:
     """Count in how many of FIELDS noisy fields a wrong form of law or model is noticed.
 
-    Data of 3200 quads at points 4 mm apart, noise alike over a facet, matched on a disk of QUADS.
-    Printed: how often the fit leaves what cannot be noise, medians of the ratio that decides and
-    of what is smooth (mm). CHOSEN: names of `CASES`.
+    Data of 3200 quads at points 4 mm apart, matched on a disk of QUADS. CHOSEN: names of `CASES`.
     """
     for words in chosen or CASES:
         symmetry, form, of_data, degrees = CASES[words]

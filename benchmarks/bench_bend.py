@@ -34,8 +34,7 @@ def calculix(
 ) -> None:  # fmt: skip
     """Compare both solvers; SIZE: mm of an element, CASE: DIAMETER/KPA, contact in MPa/mm.
 
-    Same model, mesh and law (Table 4.2, moduli held beyond 0.13), the membrane with both ends of
-    its band. Cost is CPU time on one core. With elements of 25 mm some ten minutes to 240 mm.
+    Same model, mesh and law (Table 4.2), the membrane both ends of its band; CPU time.
     `--constant-pressure`: CalculiX runs once, the membrane has gas.
     """
     cylinder.STIFFNESS = contact
@@ -115,10 +114,7 @@ def inflated(model: CylinderModel, history: History) -> tuple[float, float, floa
 
 
 def elements(sizes: str = "25,12", *cases: str) -> None:
-    """Predict the example's cylinders (DIAMETER/KPA) with elements of SIZES mm, the last finest.
-
-    Cards "uniaxial" and "bubble 1", to 240 mm; with 12 mm one to two minutes of CPU time each.
-    """
+    """Predict the example's cylinders (DIAMETER/KPA) with elements of SIZES mm, the last finest."""
     project = bf.read_project(BENDING)
     heads = ("cylinder, card", "mm", "quads", "N/mm", *(f"at {p:g} mm, N" for p in PLACES))
     print(f"| {' | '.join(heads)} | most off, % |\n|{'---|' * (len(heads) + 1)}")

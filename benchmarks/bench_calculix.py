@@ -146,8 +146,7 @@ def bias(increments: int, refined: int) -> UniaxialModel:
 def strips(finest: int = 2) -> None:
     """Compare the three strips, the bias strip on meshes refined up to FINEST times.
 
-    The bias strip in 20 increments is held against the membrane on the same mesh and on the one
-    refined three times. Card of Table 3.2, moduli held beyond the strains of the tests.
+    The bias strip in 20 increments: beside the same mesh, and one refined three times. Table 3.2.
     """
     print("differences in % of the end load, largest on the curve: from the membrane on the same\n"
           f"mesh, and on {300 * FINE**2} quads\nstrip element   quads incr.     same     fine"
@@ -216,8 +215,7 @@ def tolerances(models: str = "bubble") -> None:
 def collar(size: float = 60.0) -> None:
     """Bend a cylinder by collars and on supports of few and many faces; SIZE: mm of an element.
 
-    "By its faces": the collar begins 0.5 mm above the inflated cylinder by its faces, as in the
-    decks. "By its ring": by the ring that the faces are chords of. 150 mm at 140 kPa, Table 4.2.
+    The collar begins 0.5 mm above the cylinder by its faces, or by the ring of these.
     """
     model = inflated_cylinder(150.0, 0.14, THICKNESS, size, deflections=(10.0, 20.0))
     radius = 0.5 * model.collar.inner_diameter

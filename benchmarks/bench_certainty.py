@@ -120,10 +120,7 @@ def scatter(
 def designs(
     scale: Sequence[float], noise: Mapping[str, float], sets: int, seed: int
 ) -> list[tuple]:
-    """Return name, predicted and simulated figure of G12, sets without a fit, of every design.
-
-    seed : of the noise, which all designs share; 0: each its own.
-    """
+    """Return name, predicted and simulated figure of G12, sets without a fit, of every design."""
     present, make, offered = case(scale, noise)
     ends = np.minimum(present.reached, RANGE)
     asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns, ends)
@@ -143,10 +140,8 @@ def designs(
 def plan(sets: int = 250, repetitions: int = 10, ranked: int = 30) -> None:
     """Compare the predicted uncertainty of ten designs with the scatter of refits of noisy data.
 
-    The example's bubble on 48 quads is there; each design adds one test. SETS of noise on the
-    computed values are fitted by Gauss-Newton steps from the true law on; G12's scatter (RMS along
-    its strain) stands beside the predicted one. Then REPETITIONS with other laws and noise, RANKED
-    sets each: is the first in rank first by simulation?
+    The example's bubble on 48 quads and one more test; SETS of noise, fitted by Gauss-Newton steps.
+    Then REPETITIONS with other laws and noise, RANKED sets each: is the first in rank first?
     """
     print("design: 1 sigma of G12 predicted, simulated, ratio")
     rows = designs((1.0, 1.0, 1.0), NOISE, sets, 0)
@@ -180,9 +175,7 @@ def bootstrap(
 ) -> None:
     """Bootstrap the frames of the published test 1; print analyses and whether refits settle.
 
-    20 frames, full disk of ELEMENTS quads, constant moduli, flat sheet. Printed: analyses in all
-    and of one sample, 1 sigma of each modulus beside that of the fit, and by how much, in these, a
-    tenth of the samples moves when it gets ten times as many analyses.
+    20 frames, full disk of ELEMENTS quads, constant moduli; refits with ten times as many analyses.
     """
     project = read_project(EXAMPLES / "bubble-valmex7318" / "test1-linear.toml", Path(data))
     (test,) = project.tests.values()
@@ -207,8 +200,7 @@ def bootstrap(
 def strips(*, data: str = str(SHARED / "uniaxial")) -> None:
     """Compare the certainty of the published strips by specimens with that by every load.
 
-    By the published polynomials (of five specimens) and, where DATA has them, by the measured
-    points; cubics. Printed: independent loads of each direction, median 1 sigma of the moduli.
+    By the published polynomials and, where DATA has them, by the measured points; cubics.
     """
     example = EXAMPLES / "uniaxial-valmex7318"
     projects = {"published polynomials": read_project(example / "project.toml")}

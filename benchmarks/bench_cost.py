@@ -1,9 +1,8 @@
-"""Measure time, memory and size: analyses, growth with the mesh, import, reading, pages."""
+"""Measure time, memory and size: analyses, growth with the mesh, reading, pages."""
 
 from __future__ import annotations
 
 import resource
-import subprocess
 import sys
 import tempfile
 import time
@@ -32,16 +31,12 @@ from dic_exports import EXPORTS
 QUADS = (192, 450, 800, 1800, 3200, 7200, 20_000)
 #: Doubles of band storage beyond which the banded LU is not tried (half a gigabyte).
 MOST_BAND, AS_SHIPPED = 64_000_000, factorisation.LARGEST_BAND
-IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
 RADIUS = 100.0
 FIGURES = "figure img, svg.chart, svg.map, svg.solid"
 
 
 def analysis(repeats: int = 40) -> None:
-    """Time an analysis of the known solution and its derivatives, the least of REPEATS turns.
-
-    The variants take turns, so that a busy machine slows all alike.
-    """
+    """Time an analysis of the known solution and its derivatives, the least of REPEATS turns."""
     model, law = known_model_and_law()
     solver = MembraneSolver()
     # Warm starts come from a neighbour, as in a fit that is settling: 0.1 % away, with its slope.
@@ -70,10 +65,7 @@ def analysis(repeats: int = 40) -> None:
 
 
 def growth(largest: int = QUADS[-1]) -> None:
-    """Time quarter models of up to LARGEST quads, banded LU beside SuperLU, on one core.
-
-    The case of 200 quads is measured again beside every size, whatever else the machine does.
-    """
+    """Time quarter models of up to LARGEST quads, banded LU beside SuperLU, on one core."""
     base, law = known_model_and_law()
     print(f"{'quads':>6s}{'unknowns':>10s}{'band, s':>9s}{'SuperLU, s':>12s}"
           f"{'faster / 200 quads':>20s}{'shipped':>9s}{'apex, mm':>10s}")  # fmt: skip
@@ -99,10 +91,7 @@ def growth(largest: int = QUADS[-1]) -> None:
 
 
 def timed(model: BubbleModel, law: HypoelasticLaw, limit: int) -> tuple[float, float, str]:
-    """Return s of one cold analysis, its highest apex (mm) and the factorisation it used.
-
-    Geometry and sparsity are made before the clock starts, as a fit makes them once.
-    """
+    """Return s of one cold analysis, its highest apex (mm) and the factorisation it used."""
     factorisation.LARGEST_BAND = limit
     try:
         solver, done = MembraneSolver(), []
@@ -115,14 +104,6 @@ def timed(model: BubbleModel, law: HypoelasticLaw, limit: int) -> tuple[float, f
         factorisation.LARGEST_BAND = AS_SHIPPED
     apex = done[0].displacement[-1, model.mesh.node_sets["apex"][0], 2]
     return wall, float(apex), "band" if kind == "BandedTangent" else "SuperLU"
-
-
-def imports() -> None:
-    """Time imports, the best of five, each in a process of its own."""
-    for name in ("numpy", "meshio", "bubblefit", "bubblefit.cli.main"):
-        command = [sys.executable, "-c", IMPORT.format(name)]
-        said = [subprocess.run(command, capture_output=True, check=True).stdout for _ in range(5)]
-        print(f"import {name:20s} {1e3 * min(map(float, said)):6.0f} ms")
 
 
 def registration(points: int = 37_000, frames: int = 49) -> None:
@@ -164,10 +145,7 @@ def seen(points: int, frames: int) -> list[DisplacementField]:
 
 
 def readers(points: int = 37_000, frames: int = 49, *formats: str) -> None:
-    """Read one export of each of FORMATS as often as there are frames, and keep what was read.
-
-    Processor time, for wall clock means nothing beside other work; ratios are to the first.
-    """
+    """Read one export of each of FORMATS as often as there are frames; s of processor time."""
     random = np.random.default_rng(1)
     r, angle = 100 * np.sqrt(random.random(points)), 2 * np.pi * random.random(points)
     places = np.stack([r * np.cos(angle), r * np.sin(angle), 0.02 * r], axis=1)
@@ -210,4 +188,4 @@ def pages(*folders: str) -> None:
 
 
 if __name__ == "__main__":
-    start_on(analysis, growth, imports, registration, readers, pages)
+    start_on(analysis, growth, registration, readers, pages)

@@ -1,9 +1,7 @@
 """Kill fits, bendings and validations at random moments and resume each to its end.
 
-Kills the command's own process, one of its workers, or the CalculiX that runs. Then compares the
-result with that of a whole run, number by number, and looks for processes, scratch folders,
-half-written files and shared memory that are left. /dev/shm is this script's own where a mount of
-it is allowed. Exit code 1 where anything differs or is left.
+Kills the command, a worker, or CalculiX. Compares the result with that of a whole run, and looks
+for processes, scratch folders, half-written files and shared memory left. Exit code 1 if any.
 """
 
 from __future__ import annotations

@@ -79,8 +79,7 @@ def in_parts(parts: int, more: tuple[float, ...] = ()) -> np.ndarray:
 def increments(*, starts: int = 5) -> None:
     """Compare apex heights of Table 4.2's bubble with those of 350 increments; count Newton's work.
 
-    96 quads in the quarter. Then STARTS of the known-solution example (0 for none), Newton's work
-    counted. Exit code 1 where seven increments miss the goal.
+    Exit code 1 where seven increments miss the goal. STARTS of the example's counted; 0 for none.
     """
     solver, mesh = MembraneSolver(1e-10), disk_mesh(100.0, 400, "quarter")
     apex, exact, errors = mesh.node_sets["apex"][0], None, {}
@@ -136,9 +135,7 @@ def work_of_starts(starts: int) -> tuple[dict[str, int], float]:
 def rim() -> None:
     """Compare apex heights on coarse disks whose rim is on the circle, or of the circle's area.
 
-    A rim is a polygon inscribed in the circle, with too little area. Moved out, all nodes in
-    proportion, it has the circle's area (as bent cylinders have, meshes/tube.py). Errors in % of
-    the apex on the finest quarter disk, whose two rims hardly differ.
+    Errors in % of the apex on the finest quarter disk, whose two rims hardly differ.
     """
     finest = disk_mesh(100.0, 12_800, "quarter")
     exact = heights(finest)
@@ -183,11 +180,7 @@ def ratio_law(beta: np.ndarray) -> HypoelasticLaw:
 
 
 def ratio() -> None:
-    """Measure increments, a fit and left-out ratios of a law that goes with the load ratio.
-
-    A path nowhere in proportion with the ratio at start, mean or end of its increments; a bubble
-    of 108 quads; a fit of 48 quads to such a law's data; five computed ratios left out in turn.
-    """
+    """Measure increments, a fit and left-out ratios of a law that goes with the load ratio."""
     print("a path in two legs, error of the strain at its end, %: ratio at start, mean, end")
     exact = strain(20_000, 0.5)
     for parts in (1, 2, 4, 8, 16):
@@ -258,8 +251,7 @@ def exports() -> None:
 def constants(lowest: float = 0.0, highest: float = 5.0) -> None:
     """Print the published cards as a designer's constants between two loads, kN/m.
 
-    By least squares of the strains of eight paths, with the spread over all other choices of what
-    is evaluated, and the RMS of strain that straight lines leave.
+    With the spread over all other choices of what is evaluated, and the RMS that lines leave.
     """
     print(f"{lowest:g} to {highest:g} kN/m, G to a shear strain of 0.05; E and G in kN/m")
     for name, one in bf.read_project(BENDING, need_data=False).cards.items():

@@ -32,10 +32,7 @@ MODELS = {
 
 
 def profiles() -> None:
-    """Compare the bubble of Table 4.2 with Marc's profiles, read off a figure to about 5 %.
-
-    Marc's load steps are not known: coarse steps change the apex at low pressure by as much.
-    """
+    """Compare the bubble of Table 4.2 with Marc's profiles, read off a figure to about 5 %."""
     published = pd.read_csv(PROFILES, comment="#")
     model, law = known_model_and_law()
     history, place = MembraneSolver().run(model, law), model.mesh.points
@@ -61,9 +58,7 @@ def profiles() -> None:
 def stand_in(also: str = "") -> None:
     """Solve through Marc's deck and result file at several tolerances of the control block.
 
-    Printed: largest difference of a displacement from the membrane's over the largest of its
-    frame. `fit`: also the known solution on 48 elements, e after each run of Marc. No Marc runs:
-    the stand-in solves with the membrane itself.
+    Largest difference from the membrane, which the stand-in solves with. `fit`: also a fit.
     """
     _, law = known_model_and_law()
     print("| tolerance of the deck | " + " | ".join(MODELS) + " |\n" + "|---" * 4 + "|")

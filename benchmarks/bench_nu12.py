@@ -44,9 +44,8 @@ def free(project: Project) -> FitSetup:
 def bubble(sets: int = 10, quads: int = 800) -> None:
     """Fit SETS sets of noise on the known solution of QUADS, with strips and biaxial tests.
 
-    White noise of 0.02 and of 0.05 mm on the displacements, of 1 % of the largest load on strips,
-    of 0.01 % on the strains of biaxial paths; and none. Fits begin at 0.1. Printed: nu12, its
-    scatter, its sigma in the fits (median), its correlation with the moduli, and their sigma.
+    Noise of 0.02 and of 0.05 mm, 1 % of the largest load on strips, 0.01 % on biaxial strains;
+    and none. Printed: nu12, its scatter, sigma and correlation, and sigma of the moduli.
     """
     setup = free(known_project(quads))
     (test,) = setup.tests

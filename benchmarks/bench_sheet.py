@@ -36,8 +36,7 @@ MODULI, STEP = np.array([12.0, 12.0, 220.0, 196.0, 300.0, 228.0]), 0.01
 def surfaces(elements: int = 112, *ways: str, data: int = 0) -> None:
     """Fit a computed uneven test on ELEMENTS quads in each of WAYS of [bubble.sheet].
 
-    Height 4 mm without symmetry, slack 0.1 %, a rim that moves by 2 mm, 0.05 mm of noise. Six
-    points at each node of the fit's mesh, or about as many in all at the nodes of another, --data.
+    Six points at each node of the fit's mesh, or about as many at the nodes of another, --data.
     """
     repeats = max(1, round(6 * elements / data)) if data else 6
     with tempfile.TemporaryDirectory() as place:
@@ -76,9 +75,7 @@ def field(sheet: BubbleModel, moduli: np.ndarray) -> np.ndarray:
 def facets(*quads: str) -> None:
     """Estimate what moduli lose on QUADS quads where the measured sheet had 3,072, without noise.
 
-    The coarse models are read between their nodes as flat quads, and as fits read them
-    (`meshes/mesh.py`). What the moduli make of the difference follows from the
-    derivatives at the true law, by least squares, slack taken for known.
+    By derivatives at the true law; read as flat quads, and as fits read them (`meshes/mesh.py`).
     """
     sheet = Uneven(slack=0.0, rim=0.0, noise=0.0)
     fine = model(sheet, PRESSURES, 3072)

@@ -52,8 +52,7 @@ def objectives(records: Sequence[StartRecord]) -> np.ndarray:
 def methods(starts: int = 6, *names: str) -> None:
     """Compare optimisers (NAMES as in the first column) from the same random feasible starts.
 
-    The published study (DOT's method of feasible directions on Marc, finite differences, boolean
-    constraints): best 0.096, median 0.226, worst 3.2, 36 of 50 below 0.5.
+    Published (DOT and Marc, boolean): best 0.096, median 0.226, worst 3.2, 36 of 50 below 0.5.
     """
     setup = known_setup(known_project())
     print(f"{'method':13s}{'':26s}{'starts':>7s}{'best':>9s}{'median':>9s}{'worst':>9s}"
@@ -84,9 +83,7 @@ def seeds(count: int = 1, starts: int = 50) -> None:
 def places(starts: int = 12, seeds: int = 2) -> None:
     """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum.
 
-    All analyses over the number of starts whose objective is within 1 % of the least, or below
-    the tolerance; 48 quads. Proposals come from five random starts of another seed: of the same
-    data, and of data of another fabric (the known moduli times 1.3).
+    48 quads; within 1 % of the least. Proposals: from five starts on the same, or another, fabric.
     """
     setup = known_setup(known_project(ELEMENTS))
     problem = setup.problem()
@@ -141,8 +138,7 @@ def another(setup: FitSetup, problem: FitProblem) -> FitProblem:
 def coarse(starts: int = 50, *project: str) -> None:
     """Compare starts coarse to fine with starts on the full mesh: optima and processor time.
 
-    STARTS of the example, or of PROJECT (and the folder of its measured data). Every distinct
-    optimum of the full mesh is looked for among those of coarse to fine, as a fit does it.
+    STARTS of the example, or of PROJECT (and the folder of its measured data).
     """
     own = read_project(project[0], *map(Path, project[1:])) if project else known_project()
     setup = known_setup(own.with_fit(starts=starts))

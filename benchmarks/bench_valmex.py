@@ -119,9 +119,7 @@ def residuals(starts: int = 2, *tests: str, data: str = DATA) -> None:
 def symmetry(*, data: str = DATA) -> None:
     """Print how far the tests are from any doubly symmetric model, which is the fits' floor.
 
-    Such a model has one value for a point and its mirror images; the nearest in mean |dx| + |dy| +
-    |dz| is their median. Beside it the mean difference of dz between mirror images, and dz in the
-    middle of the first picture.
+    The nearest such field in mean |dx| + |dy| + |dz| is the median of mirror images; also of dz.
     """
     folder = measured(data)
     print("test  floor, mm  left and right, mm  top and bottom, mm  first picture, mm")
@@ -165,8 +163,7 @@ def sheets(
 ) -> None:  # fmt: skip
     """Fit each test with a surface z0 of few modes, without the strips and with them.
 
-    Moduli quadratic in the strain (with the strips splines), eleven pressures, thickness
-    incompressible; z0 is held against the three points where it was measured.
+    Eleven pressures; z0 is held against the three points where it was measured.
     """
     folder = measured(data)
     for strips in [False] * (not with_strips) + [True] * (not without_strips):
@@ -209,11 +206,8 @@ def left_out(
 ) -> None:  # fmt: skip
     """Leave each test out of the fit in turn and predict it by the law of the others.
 
-    Printed: mean |dx| + |dy| + |dz| of each test as predicted and as the fit to all three leaves
-    it. Objective `mm`: the sum of RMS errors in millimetres, as earlier work (1.86 mm predicted)
-    had it; `relative`: relative RMS errors, as `bubblefit validate`. The sheet of the test left
-    out is fitted to it. --strips: the published strips are in every fit, and the objective is
-    relative. --frames few: eleven of the twenty.
+    Mean |dx| + |dy| + |dz|. Objective `mm`: the sum of RMS errors; `relative`: as `validate`.
+    --strips: in every fit, the objective relative. --frames few: eleven of the twenty.
     """
     folder = measured(data)
     names = {f"test {test}": test for test in PUBLISHED}

@@ -1,11 +1,7 @@
 """List the modules that a bubble test passes, from its project file to the report.
 
-Runs the example with a known solution, coarse, one start, in one process, and notes each module of
-bubblefit in which a function is called, in the order in which they are first entered. Compiled
-functions (the kernel) are counted by the modules that call them. docs/reference/walk.md tells the
-same as a story.
-
-    python benchmarks/bench_walk.py [--list]
+Of the example with a known solution, coarse, one start, one process: each module in which a
+function is called, in the order of their first calls (docs/reference/walk.md). --list: all.
 """
 
 from __future__ import annotations

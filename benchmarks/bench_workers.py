@@ -52,10 +52,8 @@ def local_cluster(workers: int, threads: int = 1) -> Iterator[str]:
 def licences(jobs: int = 200) -> None:
     """Run JOBS of a program of which four may run at once; kill a worker while it runs.
 
-    Three processes, each with two of its own, and a cluster of three workers share the licences.
-    The program writes down how many copies run (tests/counted_program.py). Once all lock the same
-    files; once every process locks files of its own, so that only the scheduler counts; with none
-    counted more than four would run. Exit code 1 where a line is not as it has to be.
+    Three processes and a cluster of three workers share the licences: by locks of files, by leases
+    of the scheduler, and uncounted. Exit code 1 where a line is not as it has to be.
     """
     print("| counted by | at once, at most | results | lost | twice | programs begun again |")
     print("|---" * 6 + "|")
@@ -157,10 +155,7 @@ def cluster(workers: int, threads: int = 1) -> Iterator[Executor]:
 def cost(starts: int = 8) -> None:
     """Measure what a run costs on one and two workers, here and of a Dask cluster.
 
-    Efficiency is the time of the runs alone over workers times the time from first to last. The
-    runs sleep, so that what is lost is what bubblefit and Dask take. Then STARTS of the example,
-    and from their seconds, on paper, 1,000 starts on 100 workers, handed out one after the other
-    by one client as fast as it serves many workers here.
+    The runs sleep; then STARTS of the example; then, on paper, 1,000 starts on 100 workers.
     """
     print(
         "| runs of | workers | processes here | ms a run | Dask | ms a run |\n" + "|---" * 6 + "|"

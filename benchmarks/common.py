@@ -92,8 +92,7 @@ def seconds(run: Callable[[], object]) -> float:
 def start_on(*parts: Callable[..., Any]) -> None:
     """Run the part that the command line names, with its arguments; without a name all of them.
 
-    Parameters of a part are optional arguments in their order, keyword-only ones and flags are
-    options; their defaults give the types. A script of one part has no names.
+    Parameters are optional arguments in their order, keyword-only ones and flags are options.
     """
     parser = argparse.ArgumentParser(
         description=parts[0].__globals__["__doc__"],

@@ -22,11 +22,8 @@ RANGE = (0.13, 0.13, 0.13)
 class Uneven:
     """What is wrong with the sheet, and with the measurement.
 
-    height : mm, scale of the surface in the reference picture (no symmetry).
-    slack : share, of the stress-free length in both directions.
-    rim : mm, largest motion of the rim, at the last pressure.
-    noise : mm, standard deviation of every measured number, z included.
-    repeats : measured points at every node of the mesh.
+    height, rim : mm, scale of the surface, largest motion of the rim. slack : share of the
+    stress-free length. noise : mm, of every number. repeats : points at every node.
     """
 
     height: float = 4.0
@@ -72,11 +69,7 @@ def model(what: Uneven, pressures: Sequence[float], elements: int) -> BubbleMode
 def write_test(
     folder: Path, what: Uneven, pressures: Sequence[float], elements: int
 ) -> BubbleModel:
-    """Compute the test, write a file of the mesh's nodes a pressure, and return the model.
-
-    Between its nodes a mesh is a polyhedron, and its rim a polygon: on another coarse mesh that
-    would differ by far more than the noise.
-    """
+    """Compute the test, write a file of the mesh's nodes a pressure, and return the model."""
     truth = model(what, pressures, elements)
     history = MembraneSolver().run(truth, law())
     random, nodes = np.random.default_rng(7), truth.mesh.points

@@ -1,11 +1,9 @@
-"""Published constants of a glass/PTFE fabric beside ours, from a file of its test that you have.
+"""Compare published constants of a glass/PTFE fabric with ours, from a file of its test.
 
-Usage: biaxial_t2.py FILE. FILE: a table of ratio, n_w, n_f, eps_w, eps_f (kN/m, %) of test T2 of
-Uhlemann, Stranghoener, Schmidt and Saxe, "Effects on elastic constants of technical membranes
-applying the evaluation methods of MSAJ/M-02-1995", Structural Membranes 2011. Its curves are not
-part of this repository. Printed: E_x t, E_y t (kN/m), nu_xy, nu_yx and S by five choices of what is
-evaluated from 2 to 30 kN/m, published and ours; exit code 1 where an E is off by more than 4 % or a
-nu by more than 0.02.
+Usage: biaxial_t2.py FILE: ratio, n_w, n_f, eps_w, eps_f (kN/m, %) of test T2 of Uhlemann et al.,
+"Effects on elastic constants of technical membranes applying the evaluation methods of
+MSAJ/M-02-1995", Structural Membranes 2011, which is not part of this repository. Exit code 1 where
+an E (kN/m) is off by more than 4 % or a nu by more than 0.02, by five choices, 2 to 30 kN/m.
 """
 
 from __future__ import annotations

@@ -1,11 +1,7 @@
-"""The published bubble's profiles with pressure that follows the surface and with dead pressure.
+"""Compare the published bubble's profiles with pressure that follows the surface, and dead.
 
-    python benchmarks/reproduction/dead_pressure.py
-
-Prints the first table of docs/validation/published-bubble.md (Table 4.2, 800 quads, 14 increments):
-ours against Marc's published cuts, in per cent; then u_y of other variants of law and load, none of
-which explains Marc's. `dead()` is what the other scripts here take: the
-membrane's kernel compiled once more with a load that is vertical, on the undeformed area.
+Prints the first table of docs/validation/published-bubble.md (Table 4.2, 800 quads, 14 increments),
+then u_y of other variants of law and load, none of which explains Marc's.
 """
 
 from __future__ import annotations

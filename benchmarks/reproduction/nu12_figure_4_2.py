@@ -1,11 +1,7 @@
-"""The thesis' Fig. 4.2: largest displacement at 300 kPa for five nu12, over the mean of the five.
+"""Compare the thesis' Fig. 4.2: largest displacement at 300 kPa for five nu12, over their mean.
 
-Prints the published ratios beside ours, and exits 1 where they are further off than known (`MOST`,
-`STEEPER`): the same curve, but steeper, because Marc's pressure did not follow the surface
-(docs/validation/published-bubble.md). Then the same with dead pressure, and both with
-incompressible thickness: the table of docs/how-to/studies.md.
-
-    python benchmarks/reproduction/nu12_figure_4_2.py
+Exits 1 where the ratios are further off than known (`MOST`, `STEEPER`): Marc's pressure did not
+follow the surface. Then with dead pressure and incompressible: docs/how-to/studies.md.
 """
 
 from __future__ import annotations

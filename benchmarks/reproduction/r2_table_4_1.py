@@ -1,11 +1,7 @@
-"""The thesis' Table 4.1: how well polynomial surfaces follow the known bubble (R², Eq. 4.4).
+"""Compare the thesis' Table 4.1: surfaces that follow the known bubble (R², Eq. 4.4).
 
-    python benchmarks/reproduction/r2_table_4_1.py
-
-Prints the second table of docs/validation/published-bubble.md: surfaces of degree 4 over the full
-disk, through the 841 nodes, with pressure that follows the surface and with dead pressure; then
-surfaces over a half and a quarter, other degrees, other meshes, and what an odd cubic leaves of
-u_y along the fill axis at 22 kPa.
+Prints the second table of docs/validation/published-bubble.md, both pressures; then parts of the
+disk, other degrees and meshes, and what an odd cubic leaves of u_y along the fill axis at 22 kPa.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
 """Compare the thesis' Table 3.2 with its own load polynomials, reading by reading.
 
-The thesis reports e_uniaxial = 50.1 N for these coefficients. Columns: RMS errors in N of Eqs 3.4
-to 3.6 and their sum; published polynomials from examples/uniaxial-valmex7318/curves.csv.
-
-    python benchmarks/reproduction/strips_table_3_2.py
+The thesis reports e_uniaxial = 50.1 N for these coefficients. RMS errors in N of Eqs 3.4 to 3.6.
 """
 
 from __future__ import annotations
