@@ -8,6 +8,7 @@ an E (kN/m) is off by more than 4 % or a nu by more than 0.02, by five choices, 
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -52,9 +53,9 @@ def compared(
 
 
 def main() -> None:
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    rows = compared(lines_of_file(Path(sys.argv[1])))
+    parser = argparse.ArgumentParser(description=(__doc__ or "").replace("%", "%%"))
+    parser.add_argument("file", type=Path)
+    rows = compared(lines_of_file(parser.parse_args().file))
     for name, published, ours, near in rows:
         for who, values in (("published", published), ("ours", ours)):
             e_x, e_y, nu_xy, nu_yx, squares = values

@@ -6,6 +6,7 @@ follow the surface. Then with dead pressure and incompressible: docs/how-to/stud
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -81,4 +82,5 @@ def show(what: str, values: Iterable[float], words: str = "") -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     sys.exit(main())

@@ -6,6 +6,8 @@ disk, other degrees and meshes, and what an odd cubic leaves of u_y along the fi
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
@@ -77,4 +79,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     main()

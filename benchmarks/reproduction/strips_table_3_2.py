@@ -5,6 +5,7 @@ The thesis reports e_uniaxial = 50.1 N for these coefficients. RMS errors in N o
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,4 +54,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     main()
