@@ -91,11 +91,9 @@ Point = tuple[float, float]  # deflection in mm and load in N
 class BendingMeasures:
     """Numbers of one run that ended; None where unknown.
 
-    stiffness : N/mm. loads : N by place. knee, limit, wrinkles : (deflection, load) where the slope
-    has halved, of the largest load before a fall, and where wrinkles appear. straightness : R^2 of
-    a line before buckling, and its largest deviation over the load. body_strain : largest (eps1,
-    eps2) on inflation away from seam and caps; anywhere_strain : on tube and seam. pressure_rise :
-    kPa. reached : mm.
+    stiffness : N/mm. loads : N by place. knee, limit, wrinkles : where the slope has halved, of the
+    largest load before a fall, where wrinkles appear. straightness : see `straightness`.
+    body_strain, anywhere_strain : see `inflation_strain`. pressure_rise : kPa. reached : mm.
     """
 
     stiffness: float | None

@@ -190,17 +190,13 @@ MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 @dataclass(frozen=True, eq=False)
 class Pull:
-    """One card on one strip: the number of increments shown, and their RMS error (N)."""
+    """One card on one strip: elongations (mm), those shown, and their RMS error (N)."""
 
     model: UniaxialModel
     history: History
+    elongation: Array
     shown: int
     rms: float | None
-
-    @property
-    def elongation(self) -> Array:
-        """Return the elongation of the gauge at every increment, mm."""
-        return np.array(self.model.elongations)
 
 
 #: By (card, direction).
@@ -239,7 +235,7 @@ def _pull(
     if polynomial is not None and shown:
         error = history.load[:shown] - polynomial(u[:shown])
         rms = float(np.sqrt(np.mean(error**2)))
-    return Pull(run.model, history, shown, rms)
+    return Pull(run.model, history, u, shown, rms)
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
