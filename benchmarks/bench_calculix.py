@@ -12,7 +12,7 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
 from bubblefit.runs.starts import run_start
-from bubblefit.solvers import rigid
+from bubblefit.solvers import prescribed
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -224,14 +224,14 @@ def collar(size: float = 60.0) -> None:
         near = points[(points[:, 1] > 0) & (points[:, 2] <= 0.5 * model.collar.length)]
         return float((np.sqrt(radius**2 - near[:, 0] ** 2) - near[:, 1]).min())
 
-    ours, best = rigid.way_down, None
+    ours, best = prescribed.way_down, None
     print("| support | collar | fillet | placed by | 10 mm, N | 20 mm, N | off round, % |")
     print("|---" * 7 + "|")
     for support, around, fillet, placed in BODIES:
-        rigid.SUPPORT_COUNTS = (support, rigid.SUPPORT_COUNTS[1])
-        rigid.COLLAR_COUNTS = (around, rigid.COLLAR_COUNTS[1])
-        rigid.FILLET_COUNT = fillet
-        rigid.way_down = ours if placed == "faces" else way_of_ring
+        prescribed.SUPPORT_COUNTS = (support, prescribed.SUPPORT_COUNTS[1])
+        prescribed.COLLAR_COUNTS = (around, prescribed.COLLAR_COUNTS[1])
+        prescribed.FILLET_COUNT = fillet
+        prescribed.way_down = ours if placed == "faces" else way_of_ring
         load = CalculixSolver().run(model, LAW_4_2).load[1:]
         best = load if best is None else best
         off = " ".join(f"{value:+.2f}" for value in 100 * (load / best - 1))
