@@ -37,10 +37,7 @@ def shown(chart):
 
 
 def caught(patch, module, *names):
-    """Calls of a module's declarations of charts that it saves: the file, then the arguments.
-
-    Nothing is drawn.
-    """
+    """Calls of a module's charts that it saves, without drawing: the file, then the arguments."""
     calls = []
     for name in names:
         patch.setattr(f"{module.__name__}.{name}", lambda *args, **_: args)
@@ -49,10 +46,7 @@ def caught(patch, module, *names):
 
 
 def check_convergence(charts, table, what, rms=None):
-    """The charts of one model show what convergence.csv has: changes over size, and the cost.
-
-    rms : "rms_N" of the result, where the model has a load curve.
-    """
+    """Charts of a model show convergence.csv, and "rms_N" of the result where it has a load curve."""
     (model,) = set(table.model)
     changes, cost = charts.charts
     size = {"elements": "mean edge, mm", "increments": "step, share of the load"}[what]

@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -54,16 +55,14 @@ def test_cuts(points):
         way = (("x, mm", "warp"), ("y, mm", "fill"))[axis]
         assert shown(chart) == (way[0], "height z, mm", f"Cut along the {way[1]}")
     assert legend(alone) == NAMES and both.caption == "words"
-
-
-@pytest.mark.parametrize(("lift", "bottom"), [(5.0, 0.0), (-50.0, -52.0)])
-def test_cuts_stand_on_the_sheet(lift, bottom):
+    # The axis begins with height zero, or below where a frame hangs lower; some are drawn.
     many = cut_charts("b", np.linspace(0.01, 0.3, 20), FULL, np.array([cap(FULL, 9.0)] * 20))
     assert len(many.charts[0].series) == bubbles.MOST == 8 and "Of 20 pressures 8" in many.caption
-    hung = cut_charts("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
-    for chart in hung.charts:
-        low = axis_ends(chart)[1][0]
-        assert low == 0.0 if bottom == 0.0 else low < -50.0
+    for lift, bottom in ((5.0, 0.0), (-50.0, -50.0)):
+        hung = cut_charts("p", [0.022], FULL, [cap(FULL, 40.0) + np.array([0.0, 0.0, lift])])
+        for chart in hung.charts:
+            low = axis_ends(chart)[1][0]
+            assert low == 0.0 if bottom == 0.0 else low < bottom
 
 
 def test_heights_are_drawn_against_each_other():
@@ -222,13 +221,12 @@ def test_five_nodes_on_the_axis_are_its_profile(on, taken):
     assert np.interp(0.0, cut.position, cut.height) == pytest.approx(30.0, rel=0.01)
 
 
-@pytest.mark.parametrize("cut", [node_cut, point_cut])
-def test_heights_at_rest_do_not_count(cut):
+def test_heights_at_rest_do_not_count():
     draw = np.random.default_rng(2)
     flat = draw.uniform(-50, 50, (200, 2))
     moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
     raised = np.column_stack([flat, 600.0 + 40.0 * draw.normal(size=200)])
-    for axis in (0, 1):
+    for cut, axis in product((node_cut, point_cut), (0, 1)):
         one, other = cut(flat, moved, axis), cut(raised, moved, axis)
         assert len(one.position) > 3
         np.testing.assert_array_equal(one.position, other.position)
@@ -346,6 +344,13 @@ def test_the_side_is_the_half_that_is_seen():
         np.testing.assert_array_equal(lines(cut, name)[0].T, ring)
     (ring,) = lines(cut, "collar")
     assert np.hypot(ring[0], ring[1] - 10.0) == pytest.approx(106.0, rel=1e-4)
+    # Wrinkles have one colour.
+    for last, ends in ((-0.4, (-0.03, 0.03)), (0.0, (0.0, 0.03))):
+        strain = np.array([0.01, 0.02, 0.03, last, 0.0, 0.0])
+        charts = beam_charts(POINTS, QUADS, strain, OUTLINE, RING, BODIES)
+        assert scale_ends(charts.charts[0]) == pytest.approx(ends)
+    charts = beam_charts(POINTS, QUADS, 0 * strain, OUTLINE, RING, BODIES)
+    assert scale_ends(charts.charts[0]) == pytest.approx((0.0, 1.0))
 
 
 def test_what_is_nearer_hides_what_is_behind():
@@ -375,17 +380,6 @@ def test_the_lowest_and_the_highest(supports, collar, rises, ends):
     before = OUTLINE + np.array([0.0, max(rises, 0.0)])
     whole = beam_charts(now, QUADS, STRAIN, before, RING, bodies).charts[0]
     assert axis_ends(whole)[1] == pytest.approx((ends[0] - 20.0, ends[1] + 20.0))
-
-
-@pytest.mark.parametrize(
-    ("strain", "ends"),
-    [([0.01, 0.02, 0.03, -0.4, 0.0, 0.0], (-0.03, 0.03)),
-     ([0.01, 0.02, 0.03, 0.0, 0.0, 0.0], (0.0, 0.03)),
-     ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (0.0, 1.0))],
-)  # fmt: skip
-def test_colours_of_wrinkles(strain, ends):
-    charts = beam_charts(POINTS, QUADS, np.array(strain), OUTLINE, RING, BODIES)
-    assert scale_ends(charts.charts[0]) == pytest.approx(ends)
 
 
 U = np.linspace(0.0, 4.0, 41)
@@ -443,13 +437,13 @@ def test_without_a_polynomial_the_points_are_the_target():
     assert [s.name for s in left.series] == [*(f"specimen {i}" for i in range(6)), "", ""]
     assert len(right.series) == 1
     assert shown(left) == ("elongation of the gauge, mm", "load, N", "warp")
-
-
-@pytest.mark.parametrize("least", [40.0, -40.0])
-def test_loads_stand_on_zero_and_all_are_seen(least):
-    pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
-    low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
-    assert (low == 0.0 if least > 0 else low < least) and high > 200.0
+    for least in (
+        40.0,
+        -40.0,
+    ):  # the axis begins at no load, or below where a machine recorded less
+        pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
+        low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
+        assert (low == 0.0 if least > 0 else low < least) and high > 200.0
 
 
 def test_measured_loads(shared_data):
@@ -497,15 +491,11 @@ def test_deformed_strip():
     assert (lower[1].min(), lower[1].max()) == pytest.approx((-4.0 - 0.06 * 8.0, -4.0))
     assert np.ptp(upper[0]) == pytest.approx(max(body.x) - min(body.x))
     assert chart.equal and chart.scale == "shear strain γ12" and chart.title == "bias"
-
-
-@pytest.mark.parametrize(
-    ("ends", "limits"),
-    [((-0.2, 0.6), (-0.6, 0.6)), ((-0.001, 0.6), (-0.001, 0.6)), ((0.0, 0.0), (0.0, 1.0))],
-)
-def test_the_scale_of_shear(ends, limits):
-    (chart,) = draw_strip(np.linspace(*ends, 32), grips=False).charts
-    assert scale_ends(chart) == pytest.approx(limits) and "grips" not in named(chart)
+    for ends, limits in (
+        ((-0.2, 0.6), (-0.6, 0.6)), ((-0.001, 0.6), (-0.001, 0.6)), ((0.0, 0.0), (0.0, 1.0))
+    ):  # fmt: skip
+        (chart,) = draw_strip(np.linspace(*ends, 32), grips=False).charts
+        assert scale_ends(chart) == pytest.approx(limits) and "grips" not in named(chart)
 
 
 def test_orders():

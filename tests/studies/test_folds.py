@@ -108,35 +108,19 @@ def test_the_best_start_of_a_fold_counts(monkeypatch):
         assert compare._fold(setup_of(), 4, masks, 1) == FoldError(4, None, {})
 
 
-THREE = """
-[fabric]
-name = "made"
-thickness = 0.8
-[law]
-form = "trilinear"
-strain_range = [0.14, 0.18, 0.1]
-[law.bounds]
-E1 = [0.02, 2.0]
-E2 = [0.02, 1.0]
-G12 = [0.005, 0.2]
-[[strips]]
-increments = 4
-match = "points"
-objective = "OBJECTIVE"
-warp = { gauge_length = 20 }
-fill = { gauge_length = 20 }
-[strips.data]
-files = ["points.csv"]
-[fit]
-seed = 3
-jobs = 1
-"""
+#: mm at the last point of specimens a, b and c.
 ENDS = (2.9, 2.8, 3.0)
 LEFT_OUT = 2
 
 
 def three_specimens(folder, factor=1.0, objective="N"):
     """Three specimens a direction; the loads of the last are bent up by a factor at their end."""
+    own = f'increments = 4\nobjective = "{objective}"'
+    path = constant_strips(
+        folder, ('form = "constant"\nnu12 = 0.0', 'form = "trilinear"'), ("starts = 2", "jobs = 1"),
+        ("[0.12, 0.14, 0.1]", "[0.14, 0.18, 0.1]"), (", final_length = 22.9", ""),
+        (", final_length = 22.9", ""), ("increments = 8", own),
+    )  # fmt: skip
     lines = ["direction,specimen,elongation (mm),load (N)"]
     for direction, stiff in (("warp", 400.0), ("fill", 250.0)):
         for number, end in enumerate(ENDS):
@@ -147,10 +131,9 @@ def three_specimens(folder, factor=1.0, objective="N"):
                 load *= 1 + (factor - 1) * (u / end) ** 3
             points = zip(u, load.tolist(), strict=True)
             lines += [f"{direction},{'abc'[number]},{a:.4f},{b!r}" for a, b in points]
-    (folder / "points.csv").write_text("\n".join(lines) + "\n")
-    (folder / "project.toml").write_text(THREE.replace("OBJECTIVE", objective))
-    project = read_project(folder / "project.toml")
-    return prepare_fit(project, list(project.tests.values()))
+    (folder / "one.csv").write_text("\n".join(lines) + "\n")
+    project = read_project(path)
+    return prepare_fit(project, project.chosen("one", fitted=True))
 
 
 def without_the_last(setup):
