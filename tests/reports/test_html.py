@@ -13,19 +13,9 @@ import pytest
 from bubblefit.errors import InputError, OutputError
 from bubblefit.files import replacing
 from bubblefit.meshes.mesh import Mesh
+from bubblefit.reports import content
 from bubblefit.reports.charts import Chart, Charts, dots, line
-from bubblefit.reports.content import (
-    Download,
-    Facts,
-    Listing,
-    Picture,
-    Report,
-    Section,
-    Table,
-    Words,
-    read_page_data,
-    round_trip,
-)  # fmt: skip
+from bubblefit.reports.content import Picture, Report, Section, Table, read_page_data, round_trip
 from bubblefit.reports.html import number, percent, write_page, write_report
 from bubblefit.reports.maps import Shade, Solid, maps_of, pack, write_vtu
 from PIL import Image
@@ -58,9 +48,9 @@ def full_report():
             Section("Nothing", []),
             Section("Tables", [Table("Surfaces", ["kPa", "R²"], [[22, 0.99971]], "Table 4.1")]),
             Section("More", [
-                Words(["said <so>"]), Words(["mind"], marked=True, warning=True),
-                Facts([("mass", 1.0)], "Weights"), Listing("a < b"),
-                Download("card.toml", "a = 'é'\n", "Save it"),
+                content.Words(["said <so>"]), content.Words(["mind"], marked=True, warning=True),
+                content.Facts([("mass", 1.0)], "Weights"), content.Listing("a < b"),
+                content.Download("card.toml", "a = 'é'\n", "Save it"),
             ]),
         ],
         [("result.json", "everything")], {"bubblefit": "0.1.0"},
