@@ -264,7 +264,7 @@ def test_calculix_text_holds_the_constants_and_the_source(name):
     assert (files[".c"], files[".law"]) == (SOURCE.read_text(), law_text(LAWS[name]))
 
 
-def test_ccx_runs_the_exported_card(ccx, tmp_path):
+def test_ccx_runs_the_exported_card(ccx, tmp_path, monkeypatch):
     files = export("calculix").files
     for name, suffix in (("FILE.c", ".c"), ("card.inp", ".inp"), ("any name.law", ".law")):
         (tmp_path / name).write_text(files[suffix])
@@ -273,6 +273,8 @@ def test_ccx_runs_the_exported_card(ccx, tmp_path):
     subprocess.run([*needs.c_compiler(), *command], cwd=tmp_path, check=True)
     gradient, increments = np.eye(3), 10
     gradient[:2, :2] = [[1.06, 0.03], [0.05, 1.04]]
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
     deck = patch_deck("S8R", LAWS["cubic"], gradient, increments, 0.0, "")
     start, stop = deck.index("*MATERIAL"), deck.index("*SHELL SECTION")
     deck = f"{deck[:start]}*INCLUDE, INPUT=card.inp\n{deck[stop:]}"
