@@ -6,6 +6,7 @@ function is called, in the order of their first calls (docs/reference/walk.md). 
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -83,11 +84,14 @@ def walk() -> dict[str, list[str]]:
 
 def main() -> None:
     """Print steps with their numbers of modules; with --list their names."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--list", action="store_true")
+    given = parser.parse_args()
     walk()  # imports everything: what they run is no part of the walk
     steps = walk()
     for name, modules in steps.items():
         print(f"{name:20s} {len(modules):3d}")
-        if "--list" in sys.argv[1:]:
+        if given.list:
             for module in modules:
                 print(f"    {module}")
     print(f"{'modules in all':20s} {sum(map(len, steps.values())):3d}")
