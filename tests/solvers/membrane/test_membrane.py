@@ -130,6 +130,19 @@ def test_increments_converge_with_second_order():
     assert np.log2(seven / halved) > 1.5
 
 
+def test_newton_is_quadratic_near_the_answer():
+    solver = MembraneSolver(1e-11)
+    history = solver.run(quarter_bubble(), LAW)
+    m, v, norms = solver._prepared[1], history.path[-1].copy(), []
+    for _ in range(6):  # a little more pressure than the state that was accepted
+        norms.append(m.unbalance(v, 1.02 * PRESSURES[-1], True))
+        m.tangent.factor()
+        v.reshape(-1)[m.free] -= m.tangent.solve(m.residual[m.free])
+    norms = np.array([n for n in norms if n > 1e-13])
+    orders = np.log(norms[2:] / norms[1:-1]) / np.log(norms[1:-1] / norms[:-2])
+    assert orders.max() > 1.8
+
+
 @BOTH
 @pytest.mark.parametrize("pressure", [0.0, 0.3])
 def test_kernel_tangent_against_differences_of_the_residual(thickness_change, pressure):
