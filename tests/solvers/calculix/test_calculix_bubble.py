@@ -25,7 +25,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...commands import bubblefit
+from ...commands import in_process as bubblefit
 from ...fortran_build import LAWS
 from ...projects import BUBBLE, changed
 from ...published_laws import TABLE_4_2

@@ -13,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.run_cache import VARIABLE, RunCache
 
-from ...commands import bubblefit
+from ...commands import in_process as bubblefit
 from ...programs import program
 from .test_calculix_bubble import LINEAR, PROJECT
 

@@ -22,7 +22,8 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 
 from ... import needs
-from ...commands import bubblefit, interrupted
+from ...commands import in_process as bubblefit
+from ...commands import interrupted
 from ...projects import BUBBLE
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
