@@ -17,16 +17,15 @@ from ..errors import InputError, OutputError
 from ..errors import lines as note_lines
 from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
-from ..experiments.biaxial.report import write_tables
+from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest
-from ..experiments.kinds import Output
 from ..experiments.strips.gauge import (
     GaugeTable,
     PairedLoads,
     loads_at_frames,
     virtual_strain_gauge,
 )
-from ..files import __version__, replacing, write_notes
+from ..files import __version__, replacing
 from ..materials.designers import Options
 from ..project.project import read_project
 from ..readers.fields import Sphere, fit_sphere, points_of
@@ -34,9 +33,10 @@ from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_
 from ..readers.sections import LENGTH_UNITS
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
+from ..reports.run_pages import write_constants
 from ..reports.vega import save
 from ..runs.fit import check
-from ..runs.folder import Store
+from ..runs.folder import Record, Store, data_rows, this_run
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .terminal import FILE, command, group, show, written_to
@@ -330,17 +330,18 @@ def biaxial_command(**options: Any) -> None:
     form to the same tests, and `bubblefit export` turns it into such constants.
     """
     read = read_project(options["project"], given.data_folders(options["data"]))
-    chosen = read.chosen(list(options["tests"]) or "biaxial", fitted=True)
+    named = read.chosen(list(options["tests"]) or "biaxial", fitted=True)
+    chosen = [test for test in named if isinstance(test, BiaxialTest)]
     ratios = tuple(map(plain_ratio, options["ratios"]))
     unloaded = options["paths"] == "10"  # whether their strains are used
     asked = Options(unloaded, options["reciprocal"], options["minimise"], ratios)
-    evaluations = [evaluate_test(test, asked) for test in chosen if isinstance(test, BiaxialTest)]
+    evaluations = [evaluate_test(test, asked) for test in chosen]
     folder = given.result_folder(options, "biaxial")
-    folder.mkdir(parents=True, exist_ok=True)
-    for one in evaluations:
-        write_tables(one, folder, Output.of(folder, one.test, len(evaluations) > 1).prefix)
+    text = None if read.written is None else read.written.text
+    data = data_rows((test.name, PreparedBiaxial(test)) for test in chosen)
+    record = Record(read.path, text, None, data, {}, [this_run(given.command_line())])
+    write_constants(read.title, evaluations, record, folder)
     notes = [note for one in evaluations for note in one.notes]
-    write_notes(folder, notes)
     tests = {one.test: numbers_of(one) for one in evaluations}
     result = {"command": "biaxial", "title": read.title, "version": __version__, "tests": tests}
     Store(folder).finish(result)

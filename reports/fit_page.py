@@ -527,7 +527,8 @@ def record_tables(record: Record) -> list[Table]:
             ["machine", ", ".join(f"{value}" for value in machine.values())],
             ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
         ]
-    rows.append(["solver", _solver(record.solver)])
+    if record.solver:
+        rows.append(["solver", _solver(record.solver)])
     if not record.data:
         rows.append(["data files", NO_FILES])
     note = f"All of it, with the text of the project: {PROVENANCE}."

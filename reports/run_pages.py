@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
+from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
 from ..files import __version__, json_text, replacing, write_notes, write_text
 from ..runs.fit import Check
-from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Store
+from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Record, Store
 from ..runs.predictions import Predictions
 from ..runs.starts import HISTORY, STARTS, RunningFiles
 from .content import (
@@ -167,6 +168,51 @@ def _check_summary(check: Check) -> str:
     if doubts:
         return f"A fit would begin, and carry {doubts} of the doubts below with it."
     return "The data are fit to be fitted."
+
+
+def write_constants(
+    title: str, evaluations: Sequence[BiaxialEvaluation], record: Record, folder: Path
+) -> Path:
+    """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    several, exhibits, notes = len(evaluations) > 1, {}, []
+    for one in evaluations:
+        out = Output.of(folder, one.test, several)
+        exhibits[one.test] = report_of("biaxial").show_constants(one, out)
+        notes += one.notes
+
+    def every(which: str) -> list[Part]:
+        heads = {name: [Facts((), name)] if several else [] for name in exhibits}
+        return [p for name, e in exhibits.items() for p in (*heads[name], *getattr(e, which))]
+
+    write_notes(folder, notes)
+    record.write(folder)
+    summary = []
+    for one in evaluations:
+        c, ends = one.chosen.constants, one.spread
+        parts = [
+            f"E {yarn} {value:.4g} kN/m ({low:.4g} to {high:.4g} by what is evaluated)"
+            for yarn, value in (("warp", c.warp), ("fill", c.fill))
+            for low, high in [ends[f"E {yarn}"]]
+        ]
+        nu = f"nu_warp {c.nu_warp:.3g}, nu_fill {c.nu_fill:.3g}"
+        summary.append(f"{f'{one.test}: ' if several else ''}{', '.join([*parts, nu])}.")
+    sections = [
+        Section("The constants", every("tables")),
+        Section("Measured beside the constants", every("parts")),
+        Section("What else was evaluated", every("record")),
+        Section("The record", record_tables(record)),
+        Section("How to cite", citation()),
+    ]
+    files = [*(file for e in exhibits.values() for file in e.files), (NOTES, NOTES_ARE),
+             (RESULT, "all numbers of this page, for programs"), *record.files]  # fmt: skip
+    report = Report(
+        title=f"{title}: constants of biaxial tests", summary=" ".join(summary),
+        facts=[("ratios", ", ".join(line.ratio for line in one.lines)) for one in evaluations],
+        warnings=[note.line for note in notes], sections=sections, files=files,
+        versions={"bubblefit": __version__},
+    )  # fmt: skip
+    return write_report(folder, report)
 
 
 UNFINISHED = (

@@ -204,17 +204,65 @@ def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
     return pd.DataFrame(table)
 
 
+def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
+    """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
+
+    Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
+    Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither.
+    """
+    evaluated = {
+        (path.table.path.name, path.cycle.phase): (path, line)
+        for path, line in zip(found.paths, found.lines, strict=True)
+    }
+    table = []
+    for k in found.kept:
+        path, line = evaluated.get((k.file, k.phase), (None, None))
+        row: dict[str, object] = {"file": k.file, "ratio": k.ratio, "load_cycles": k.cycles}
+        row["cycle_evaluated"] = "" if path is None else str(path.cycle.number)
+        ends = path.load[[0, -1]] if path is not None else np.full((2, 2), np.nan)
+        stiff, nu = np.full(2, np.nan), np.full(2, np.nan)
+        if line is not None:
+            for own, unloaded in enumerate(line.unloaded):
+                if not unloaded and line.strain[own] > 0:
+                    stiff[own] = line.load[own] / line.strain[own]
+                if unloaded and line.strain[1 - own] > 0:
+                    nu[own] = -line.strain[own] / line.strain[1 - own]
+        kept = np.full(2, np.nan) if k.after is None else PERCENT * k.after
+        table.append({**row, **_standard(ends, stiff, nu, kept)})
+    c, nothing = found.chosen.constants, np.full((2, 2), np.nan)
+    row = {"file": "", "ratio": "all", "load_cycles": sum(k.cycles for k in found.kept)}
+    together = np.array([c.warp, c.fill]), np.array([c.nu_warp, c.nu_fill])
+    table.append({**row, "cycle_evaluated": "", **_standard(nothing, *together, nothing[0])})
+    return pd.DataFrame(table)
+
+
+def _standard(ends: Array, stiff: Array, nu: Array, kept: Array) -> dict[str, float]:
+    pairs = {"from_kN_per_m": ends[0], "to_kN_per_m": ends[1], "stiffness_kN_per_m": stiff,
+             "poisson": nu, "strain_kept_percent": kept}  # fmt: skip
+    return {
+        f"{yarn}_{name}": float(pair[i])
+        for name, pair in pairs.items()
+        for i, yarn in enumerate(("warp", "fill"))
+    }
+
+
+#: File of the table after EN 17117-1.
+STANDARD = "en-17117"
+
+
 def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     """Return all tables by name."""
-    return {"constants": option_table(found), "lines": line_table(found), "kept": kept_table(found)}
+    return {"constants": option_table(found), STANDARD: standard_table(found),
+            "lines": line_table(found), "kept": kept_table(found)}  # fmt: skip
 
 
 def lines_of(found: BiaxialEvaluation) -> list[str]:
     """Return the results as lines for the terminal."""
     c = found.chosen.constants
     said = [
-        f"{found.test}: {in_words(found.chosen.options)}; {found.chosen.paths} strain paths of "
-        f"ratios {', '.join(line.ratio for line in found.lines)}",
+        f"{found.test}: {in_words(found.chosen.options)};",
+        f"  {found.chosen.paths} strain paths of ratios "
+        f"{', '.join(line.ratio for line in found.lines)}",
         f"  E warp {c.warp:.4g} kN/m, E fill {c.fill:.4g} kN/m, nu_warp {c.nu_warp:.3g}, nu_fill "
         f"{c.nu_fill:.3g}; S = {found.chosen.squares:.4g} %^2 at {POINTS} points a path",
     ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from ...errors import Note, SolverFailure
 from ...files import replacing
 from ...materials.card import MaterialCard
+from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
@@ -21,12 +21,19 @@ from ...reports.vega import save
 from .. import kinds
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from .data import BiaxialPath
-from .evaluation import BiaxialEvaluation, tables_of
+from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
 from .prepared import PERCENT, FittedPath, PreparedBiaxial
 from .test import BiaxialTest
 
 Array = NDArray[np.float64]
 YARNS = ("warp", "fill")
+#: Of the tables of `bubblefit biaxial`.
+CONTENT = {
+    "constants": "constants by every choice, of first and last cycles",
+    STANDARD: "ratios, load cycles, stiffness and strain kept, after EN 17117-1",
+    "lines": "regression lines of every ratio",
+    "kept": "strain kept before and after each ratio",
+}
 
 
 def misfit_table(paths: Sequence[FittedPath]) -> Table:
@@ -253,12 +260,45 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> list[Path]:
-    """Write constants.csv, lines.csv, kept.csv and constants.png; return their names."""
-    written = []
-    for name, table in tables_of(found).items():
-        written.append(folder / f"{prefix}{name}.csv")
-        with replacing(written[-1]) as path:
+#: Columns of the table after EN 17117-1, in words.
+STANDARD_HEADER = (
+    "file", "ratio", "load cycles", "cycle evaluated", "from, warp, kN/m", "fill, kN/m",
+    "to, warp, kN/m", "fill, kN/m", "stiffness, warp, kN/m", "fill, kN/m",
+    "Poisson's ratio nu_warp", "nu_fill", "strain kept, warp, %", "fill, %",
+)  # fmt: skip
+
+
+def constants_table(found: BiaxialEvaluation) -> Table:
+    """Return each constant with its ends over all choices, of first and of last cycles."""
+    chosen = row_of(found.chosen)
+    named = {
+        name: name.removesuffix("_kN_per_m").replace("_", " ")
+        for name in chosen
+        if name.startswith(("E_", "nu_", "A_"))
+    }
+    every = pd.DataFrame([chosen, *map(row_of, found.others)])
+    ends = [None if one is None else row_of(one) for one in (found.first, found.last)]
+    rows: list[list[object]] = [
+        [words, "kN/m" if key.endswith("_m") else "–", chosen[key], float(every[key].min()),
+         float(every[key].max()), *(end and end[key] for end in ends)]
+        for key, words in named.items()
+    ]  # fmt: skip
+    header = ["constant", "unit", "value", "least of all choices", "largest", "of first cycles",
+              "of last cycles"]  # fmt: skip
+    note = (
+        f"Evaluated: {in_words(found.chosen.options)}, {found.chosen.paths} strain paths; the "
+        f"ends are over {1 + len(found.others)} choices of what is evaluated. E and nu: inverse "
+        f"form, A: direct form. {CONVENTION}. A biaxial test says nothing of the shear stiffness."
+    )
+    return Table("Constants per width", header, rows, note, text=(1,))
+
+
+def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
+    """Write all tables as CSV, and constants.png; return the constants for the page."""
+    files, tables = [], tables_of(found)
+    for name, table in tables.items():
+        files.append((out.name(f"{name}.csv"), CONTENT[name]))
+        with replacing(out.path(f"{name}.csv")) as path:
             table.to_csv(path, index=False, float_format="%.9g")
     panels = []
     for measured in found.paths:
@@ -266,5 +306,23 @@ def write_tables(found: BiaxialEvaluation, folder: Path, prefix: str = "") -> li
         strain = PERCENT * found.chosen.constants.strain(load - load[0])
         curves, seen = (("constants", measured.larger, strain),), PERCENT * measured.since
         panels.append(BiaxialPanel(measured.ratio, measured.larger, seen, curves))
-    written.append(save(folder / f"{prefix}constants.png", biaxial_charts("ratios", panels)))
-    return written
+    caption = "Strain over the larger load: measured, and by the constants"
+    charts = biaxial_charts(f"{found.test} constants", panels, caption)
+    save(out.path("constants.png"), charts)
+    files.append((out.name("constants.png"), "picture of the ratios"))
+    note = (
+        "Stiffness: change of a yarn's load over that of its strain, along the cycle evaluated; "
+        "its Poisson's ratio where it is unloaded. Strain kept: after the load cycles, at the "
+        "loads of the first row. Last row: the constants that serve all ratios."
+    )
+    rows = tables[STANDARD].to_numpy(dtype=object).tolist()
+    standard = Table("Report after EN 17117-1", STANDARD_HEADER, rows, note, text=(1, 3))
+    rows = [
+        [in_words(one.options), one.paths, *(getattr(one.constants, n) for n in NAMES), one.squares]
+        for one in (found.chosen, *found.others)
+    ]
+    header = ["what", "paths", "E warp, kN/m", "E fill, kN/m", "nu_warp", "nu_fill", "squares, %²"]
+    choice = Table("Every choice", header, rows, "The first is the one chosen.")
+    return Exhibit(
+        tables=[constants_table(found), standard], files=files, parts=[charts], record=[choice]
+    )
