@@ -14,15 +14,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import bubblefit as bf
 import nbformat
+import numpy as np
 import pytest
 import yaml
 from bubblefit.cli.fits import fit_command
 from nbclient import NotebookClient
 
 from .. import needs
-from ..places import EXAMPLES
+from ..places import EXAMPLES, ROOT
 from ..programs import program
+from ..scripts import script
 
 BATCH = EXAMPLES / "batch"
 
@@ -180,3 +183,25 @@ def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["objective"] < 1e-3 and not done.stderr
     assert (out / "material.toml").is_file() and len(list(folder.iterdir())) == 1
+
+
+def test_three_platforms_run_tests_that_exist():
+    job = yaml.safe_load((BATCH / "platforms.yml").read_text())["jobs"]["quick"]
+    assert job["strategy"]["matrix"]["os"] == ["ubuntu-latest", "macos-latest", "windows-latest"]
+    steps = [step["run"] for step in job["steps"] if "run" in step]
+    extra = re.search(r"\[(\w+)\]", steps[0])[1]
+    assert f"\n{extra} = [" in (ROOT / "pyproject.toml").read_text()
+    paths = [word for word in steps[1].split() if word.startswith("tests/")]
+    assert len(paths) == 6 and all((ROOT / path).exists() for path in paths)
+
+
+@pytest.mark.slow
+def test_public_strips_give_the_moduli_of_their_authors(tmp_path):
+    """E1 25.4 and G12 2.99 N/mm published for the same curves; E2 is explained in the document."""
+    write = script("docs/make_own_strips.py").write
+    fit = bf.fit(bf.read_project(write(tmp_path / "nylon", needs.measured_data())), starts=1)
+    table = fit.moduli()
+    for modulus, expected, within in (("E1", 25.4, 0.02), ("G12", 2.99, 0.03), ("E2", 61.8, 0.02)):
+        curve = table[table.modulus == modulus]
+        found = 0.17 * np.interp(0.01, curve.strain, curve.MPa)
+        assert found == pytest.approx(expected, rel=within), modulus
