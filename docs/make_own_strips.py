@@ -25,7 +25,7 @@ CHANGES = (
 
 def write(folder: Path, data: Path = DATA) -> Path:
     """Write the project that `init --own` writes, with the changes of the document; its path."""
-    arguments = ["init", folder, "--own", "--strips", "1", "--bubble", "0", "--thickness", "0.17"]
+    arguments = ["init", str(folder), "--own", "--strips", "1", "--bubble", "0", "--thickness", "0.17"]
     subprocess.run([sys.executable, "-m", "bubblefit", *arguments], check=True)
     with open(data / "strips_directions" / "strips.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
@@ -44,7 +44,7 @@ def write(folder: Path, data: Path = DATA) -> Path:
 
 
 def main() -> None:
-    project = write(Path(sys.argv[1]), *map(Path, sys.argv[2:]))
+    project = str(write(Path(sys.argv[1]), *map(Path, sys.argv[2:])))
     for command in (["check", project], ["fit", project, "--starts", "3", "--jobs", "2"]):
         subprocess.run([sys.executable, "-m", "bubblefit", *command], check=True)
 
