@@ -25,7 +25,17 @@ CHANGES = (
 
 def write(folder: Path, data: Path = DATA) -> Path:
     """Write the project that `init --own` writes, with the changes of the document; its path."""
-    arguments = ["init", str(folder), "--own", "--strips", "1", "--bubble", "0", "--thickness", "0.17"]
+    arguments = [
+        "init",
+        str(folder),
+        "--own",
+        "--strips",
+        "1",
+        "--bubble",
+        "0",
+        "--thickness",
+        "0.17",
+    ]
     subprocess.run([sys.executable, "-m", "bubblefit", *arguments], check=True)
     with open(data / "strips_directions" / "strips.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
