@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ..errors import SolverFailure
 from ..materials.law import HypoelasticLaw
@@ -96,6 +95,8 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
     levels = np.array(model.elongations)
     steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
+    from scipy.interpolate import CubicSpline  # heavy: where it is used
+
     inside = CubicSpline(gauge, pull)(np.minimum(levels, gauge[-1]))
     found = inside + steep * np.maximum(levels - gauge[-1], 0.0)
     return _onward(found)
@@ -123,6 +124,8 @@ def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: s
     if not (np.diff(gauge) > 0).all():
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
     whole = np.concatenate([np.zeros((1, *values.shape[1:])), values])
+    from scipy.interpolate import CubicSpline  # heavy: where it is used
+
     return np.asarray(CubicSpline(gauge, whole)(levels))
 
 

@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial import cKDTree
 
 from ...errors import InputError
@@ -254,6 +253,8 @@ def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
         return field.displacement
     # C1 interpolation: the data mesh is curved between its nodes, linear would cut corners.
     whole = mirrored(field)
+    from scipy.interpolate import CloughTocher2DInterpolator  # heavy: where it is used
+
     between = CloughTocher2DInterpolator(whole.points, whole.displacement)(nodes)
     # Chords of the data's rim can leave a rim node of ours outside: it does not move anyway.
     outside = ~np.isfinite(between).all(axis=1)

@@ -17,7 +17,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from ...errors import InputError
 from ...meshes.disk import Outline
@@ -273,6 +272,8 @@ def rim_of_motion(
         return np.concatenate(parts)
 
     count = 3 if free else 2
+    from scipy.optimize import least_squares  # heavy: where it is used
+
     best = least_squares(left, guess[:count], x_scale=[semi_axes[0], semi_axes[0], 60.0][:count])
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import QhullError, cKDTree
 
 from ...errors import InputError
@@ -239,5 +238,7 @@ def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
     near = tree.query(nodes)[0] <= FAR * apart
     if near.any():
         with suppress(QhullError):  # all places on one line: there is nothing between them
+            from scipy.interpolate import LinearNDInterpolator  # heavy: where it is used
+
             found[near] = LinearNDInterpolator(places, values)(nodes[near])
     return found
