@@ -17,6 +17,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.stats import ttest_1samp
 
 from ..complaints import complaint
 from .cases import CUBIC, LAW, RANGE, levenberg_marquardt
@@ -309,6 +310,14 @@ def test_specimens_that_scatter_are_seldom_told(specimens):
         assert one is not None and one.specimens == specimens
         told += one.significant
     assert told / sets <= 0.03
+
+
+def test_of_three_specimens_it_is_the_square_of_students_t():
+    """Beside the slope there is one shape to be tested, the load at no elongation."""
+    off = scattered(3, np.random.default_rng(4))
+    one, starts = found(off), [np.polyfit(PLACES, own, 1)[1] for own in off]
+    assert one.ratio == pytest.approx(ttest_1samp(starts, 0.0).statistic ** 2, rel=1e-9)
+    assert one.largest == pytest.approx(98.50, abs=0.01)
 
 
 def test_a_wrong_form_is_told():

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective
-from bubblefit.inference import methods
+from bubblefit.inference import linear, methods
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import (
     NOT_DEFINITE,
     SECOND_ORDER,
     TOO_LITTLE,
+    Limit,
     Linear,
     Second,
     definite,
@@ -387,6 +388,21 @@ def test_curvature_is_that_of_the_objective(wrong):
         np.testing.assert_allclose(back[:, k], expected, atol=0.02 * np.abs(back).max())
 
 
+def test_the_other_side_tells_the_same_curvature(wrong, monkeypatch):
+    fit, best, noise = wrong
+    for name in ("LEAST_STEP", "LARGEST_STEP"):
+        monkeypatch.setattr(linear, name, 1e-4)
+    up, evaluate, sides = second_of(fit, best, noise).added, fit.evaluate, [True]
+
+    def down_alone(*given):
+        sides[0] = not sides[0]
+        return evaluate(*given) if sides[0] else None
+
+    monkeypatch.setattr(fit, "evaluate", down_alone)
+    down = second_of(fit, best, noise).added
+    assert down == pytest.approx(up, abs=0.02 * np.abs(up).max())
+
+
 def test_which_order_a_fit_is_of(wrong, monkeypatch):
     fit, best, _ = wrong
     reached = np.full(3, 0.08)
@@ -429,6 +445,9 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
     monkeypatch.setattr(budget, "second_of", lambda *_: pytest.fail("looked at"))
     law = fit.unknowns.law(LAW, y)
     assert budget._certainty(fit, quiet, law, np.full(3, 0.08), None).order is None
+    # Or the error of the mesh is all that is left.
+    limit = Limit(np.zeros_like(y), quiet.residual, np.zeros_like(best.residual))
+    assert budget._certainty(fit, best, law, np.full(3, 0.08), limit).order is None
 
 
 class Thicker:

@@ -128,6 +128,7 @@ def refused(first: Path, setup: FitSetup) -> str:
     ("old", "new", "words"),
     [
         ("nu12 = 0.24", "nu12 = 0.25", "law.nu12 = 0.24, now 0.25"),
+        ('modulus = "MPa"', 'modulus = "GPa"', 'units.modulus = "MPa", now "GPa"'),
         ("thickness = 0.8", "thickness = 0.9", "fabric.thickness = 0.8, now 0.9"),
         ("[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.12]", "law.strain_range[2] = 0.1, now 0.12"),
         ("fill = [0.03, 0.06]", "fill = [0.03, 0.07]", "law.breaks.fill[1] = 0.06, now 0.07"),

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, OutputError, SolverFailure
+from bubblefit.experiments.registry import kinds
 from bubblefit.inference.assessment import uncertainty_from
 from bubblefit.inference.likelihood import BOUND, THRESHOLD, Side
 from bubblefit.inference.noise import Noise
@@ -191,7 +192,9 @@ def test_the_command(tmp_path):
         assert values == pytest.approx(own[column], rel=1e-5)
     assert low.name == high.name != fit.name
     assert (folder / "bootstrap.png").stat().st_size > 10_000
-    assert len(pd.read_csv(folder / "coefficients.csv")) == 3
+    unknowns = pd.read_csv(folder / "coefficients.csv")
+    of_fit = (unknowns["sigma_of_fit"] / unknowns["value"]).to_list()
+    assert [*said["sigma_relative_of_fit"].values()] == pytest.approx(of_fit[::-1], rel=1e-6)
 
 
 PLANNED_ENDS = (0.1, 0.1, 0.05)
@@ -240,11 +243,15 @@ def test_strips_of_constant_moduli(project, few, monkeypatch):
     assert values == sorted(values) and by_warp.criterion.startswith("1 sigma of E1,")
     assert by_warp.following is not None and by_warp.following.summary["E1"] < values[0]
     # The card's valid range, but no further than the law; without one, the strains of the tests.
-    monkeypatch.setattr(bubbles, "ANGLES", ())
+    monkeypatch.setattr(plan_module, "kinds", lambda: {"strips": kinds()["strips"]})
     limited = replace(CARD, law=replace(CARD.law, strain_range=np.array([0.09, 0.2, 0.03])))
     np.testing.assert_allclose(plan(project, limited).ends, [0.09, 0.14, 0.03])
     reached = plan(project, CARD).ends
     np.testing.assert_allclose(reached[:2], np.log([22.9 / 20] * 2), rtol=1e-3)
+    # After three more specimens along the warp three more again.
+    again = plan(project, CARD, strain=PLANNED_ENDS, rank="E1").following
+    assert again.name == "warp strip" and again.specimens == 3
+    assert again.summary["E1"] == pytest.approx((sum(each) + 2 * added) ** -0.5 / 330, rel=2e-3)
 
 
 KNOWN = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.1, 0.1, 0.08])

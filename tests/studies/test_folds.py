@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import InputError, NoFeasibleStart, Note, OutputError, SolverFailure
-from bubblefit.experiments.kinds import Weighting
+from bubblefit.experiments.kinds import BEYOND_CARD, Weighting
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
@@ -232,6 +232,9 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
 
     warp, fill = judged()
     assert (warp.test, fill.test) == ("one: warp", "one: fill")
+    # Beyond the strain of the other test, 2.5 / 20, the law is not known.
+    (beyond,) = warp.notes
+    assert beyond.kind == BEYOND_CARD and f"0.135 is beyond {np.log(1.125):.3f}" in beyond
     loads = np.concatenate([20 * e * STRAIN for e in (300, 360)])
     rms = float(np.sqrt(np.mean((20 * 370 * np.tile(STRAIN, 2) - loads) ** 2)))
     assert warp.rms == {"one: warp": pytest.approx(rms, rel=1e-3)}

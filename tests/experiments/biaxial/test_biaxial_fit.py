@@ -332,6 +332,10 @@ def test_traps_are_named(tmp_path, trap):
     found = doubts(tmp_path, rows)
     for name, (sure, words) in wanted.items():
         assert found[name].sure == sure and words in found[name].text, found
+    if trap == "loads of a fiftieth":
+        (_, first, _, low, _), (_, last, _, high, _) = rows[0], rows[29]
+        modulus = (last - first) / (0.01 * (high - low)) / THICKNESS
+        assert f"is about {modulus:.3g} MPa" in found["modulus"].text
     if trap in ("another ratio", "yarns of the strains swapped"):
         assert set(found) == set(wanted)
 

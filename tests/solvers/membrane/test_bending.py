@@ -257,6 +257,17 @@ def test_a_strip_that_is_pulled_wrinkles_where_it_is_narrowed(along, narrower):
     assert he == pytest.approx([free, along, 0.0], rel=1e-12, abs=1e-14)
 
 
+def test_a_wrinkle_is_the_strain_of_the_fabric_less_that_of_the_surface():
+    """A tube wider by 2 % and shorter by 3 %: what is left to its wrinkles is pushed together."""
+    membrane = closed_model.prepare(beam(), LINEAR, 1e-9, Wall(0.01, 0.0))
+    membrane.unbalance(membrane.reference * [0.02, 0.02, -0.03], 0.0, False)
+    folded = membrane.wrinkle[..., 0] != 0.0  # the tube, not its ends
+    along = membrane.strain_new[folded, 0] - np.log(0.97)
+    assert along.min() > 0.02 and folded.sum() > 700
+    assert membrane.wrinkle[folded, 0] == pytest.approx(along, rel=1e-6)
+    assert membrane.wrinkle_work(0 * membrane.wrinkle) > 0
+
+
 def test_bent_tube_wrinkles_as_published():
     tube, taut = PlaneEnds(32, 1e-4), PlaneEnds(32, None)
     for times in (1.5, 2.5, 4.0):
