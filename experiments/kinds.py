@@ -87,11 +87,15 @@ Refined = Literal["elements", "increments"]
 
 @dataclass(frozen=True)
 class Fabric:
-    """The one fabric of all tests of a project; thickness in mm before the test."""
+    """The one fabric of all tests of a project; thickness in mm before the test.
+
+    lab : who tested it, for the page.
+    """
 
     name: str
     thickness: float
     thickness_change: ThicknessChange = "constant"
+    lab: str = ""
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ class FabricSection(Section):
     name: str = ""
     thickness: Positive
     thickness_change: Literal["constant", "incompressible"] = "constant"
+    lab: str = ""
 
 
 class UnitsSection(Section):

@@ -26,13 +26,19 @@ from .maps import Maps, Solid
 
 @dataclass(frozen=True)
 class Table:
-    """A table; numbers get four significant digits; text : columns of words, beside the first."""
+    """A table; numbers get four significant digits; text : columns of words, beside the first.
+
+    side : stands beside its neighbours where there is room. closed : opened by a click, and when
+    printed.
+    """
 
     title: str
     header: Sequence[str]
     rows: Sequence[Sequence[object]]
     note: str = ""
     text: Sequence[int] = ()
+    side: bool = False
+    closed: bool = False
     part: Literal["table"] = "table"
 
 
@@ -100,9 +106,9 @@ class Section:
 class Report:
     """The content of a page, in its order; empty parts are left out.
 
-    title : of the project. summary : a sentence or two on the quality of the result. facts : for
-    the head of the page. warnings : what a reader must know before using the numbers. files : name
-    and content of the files of the output folder. versions : of the programs, by name.
+    title : of the project. about : date, fabric and laboratory. summary : a sentence or two on the
+    result. facts : for the head of the page. warnings : what a reader must know before using the
+    numbers. files : name and content of the files of the output folder. versions : by program.
     """
 
     title: str
@@ -112,6 +118,7 @@ class Report:
     sections: Sequence[Section] = ()
     files: Sequence[tuple[str, str]] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
+    about: Sequence[tuple[str, object]] = ()
 
     @property
     def parts(self) -> Iterator[Part]:
@@ -136,6 +143,7 @@ class Exhibit:
     figures, files : a file below the output folder, and its caption or content.
     parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
     record : tables of how it was measured, for the record at the end of the page.
+    summary : the result in a sentence.
     """
 
     facts: Sequence[tuple[str, object]] = ()
@@ -144,6 +152,7 @@ class Exhibit:
     files: Sequence[tuple[str, str]] = ()
     parts: Sequence[Part] = ()
     record: Sequence[Table] = ()
+    summary: str = ""
 
     def all_parts(self, title: str = "") -> list[Part]:
         """Return the parts for the body of the page, in order, below a title unless that is ""."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from datetime import date
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,9 @@ from ..inference.posterior import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
-from ..runs.result import STRAINS, Fit, answer_at, coefficients_of
+from ..runs.result import USABLE, Fit, answers, coefficients_of, next_step, reaches
 from .charts import Charts
 from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
@@ -137,8 +139,8 @@ def _checked(fit: Fit) -> list[str]:
 
 
 def warnings_of(fit: Fit) -> Words:
-    """Return every note of the fit, or that there is none."""
-    lines = [note.line for note in fit.notes]
+    """Return every note of the fit, the weightiest first, or that there is none."""
+    lines = [note.line for note in sorted(fit.notes, key=lambda note: -note.kind.weight)]
     return Words(lines, marked=True, warning=True) if lines else Words([NO_WARNING])
 
 
@@ -211,7 +213,7 @@ def starts_table(fit: Fit) -> Table:
         [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(records, start=1)
     ]
     header = ["rank", "start", "objective", "analyses", "how it ended"]
-    return Table("Starts, best first", header, rows, text=(4,))
+    return Table("Starts, best first", header, rows, text=(4,), closed=True)
 
 
 def bounds_table(fit: Fit) -> Table:
@@ -224,7 +226,7 @@ def bounds_table(fit: Fit) -> Table:
     ]  # fmt: skip
     header = ["coefficient", f"value, {fit.project.scales.modulus_unit}", "lower bound",
               "upper bound"]  # fmt: skip
-    return Table("Coefficients of the law", header, rows)
+    return Table("Coefficients of the law", header, rows, closed=True)
 
 
 #: Names of the moduli in words.
@@ -235,16 +237,8 @@ WORDS: Mapping[str, str] = {
 }
 #: Between words that stay on one line.
 SPACE = "\u00a0"
-#: The strain of the summary.
-FIRST = 0.01
-
-
-def modulus_at(fit: Fit, name: str, strain: float) -> tuple[float, float, float] | None:
-    """Return MPa and the ends of the band, NaN where unknown; None beyond the valid strains."""
-    if strain > fit.best.valid[COMPONENTS[name]]:
-        return None
-    found = answer_at(fit, name, strain)
-    return (found.value, *((np.nan, np.nan) if found.band is None else found.band))
+#: Strains that end below this one are none: no test reached them.
+LEAST_STRAIN = 1e-4
 
 
 def band_words(value: float, lower: float, upper: float) -> str:
@@ -259,28 +253,29 @@ def _short(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 99.5 else f"{value:.3g}"
 
 
-def answer_table(fit: Fit) -> Table:
-    """Return a row a modulus and unit, a column a strain that one of them reaches."""
-    far = max(float(fit.best.valid[c]) for c in COMPONENTS.values())
-    strains = [strain for strain in STRAINS if strain <= far]
-    rows: list[list[object]] = []
+def answer_tables(fit: Fit) -> list[Part]:
+    """Return a table a modulus, a row a strain up to its own end, and what they are."""
+    tables: list[Part] = []
     for name, words in WORDS.items():
-        found = [modulus_at(fit, name, strain) for strain in strains]
-        end = percent(float(fit.best.valid[COMPONENTS[name]]))
-        for unit, scale in (("MPa", 1.0), ("kN/m", fit.thickness)):
-            cells = [None if m is None else band_words(*(scale * v for v in m)) for m in found]
-            rows.append([words, unit, *cells, end])
-    header = ["", "unit", *(f"at {100 * strain:g} %" for strain in strains), "known up to"]
-    note = (
-        "Tangent moduli at logarithmic strains along their own direction (shear: γ12). In brackets "
-        f"the {percent(LEVEL)} band, noise and mesh together. kN/m: MPa times the thickness of "
-        f"{fit.thickness:.4g} mm. Beyond the last column's strain no test reached: the card keeps "
-        "the modulus that it has there."
-    )
+        rows: list[list[object]] = []
+        for one in answers(fit):
+            if one.modulus == name and not 0.0 < one.strain < LEAST_STRAIN:
+                ends = one.band or (np.nan, np.nan)
+                cells = [
+                    band_words(*(scale * v for v in (one.value, *ends)))
+                    for scale in (1.0, fit.thickness)
+                ]
+                rows.append([f"{100 * one.strain:.2g} %{', its end' * one.end}", *cells])
+        tables.append(Table(words, ["strain", "MPa", "kN/m"], rows, side=True))
     sure = fit.best.certainty
-    if sure is None or not sure.band:
-        note = note.replace(f"In brackets the {percent(LEVEL)} band, noise and mesh together. ", "")
-    return Table("Moduli", header, rows, note, text=(1,))
+    band = f"In brackets the {percent(LEVEL)} band, noise and mesh together. "
+    note = (
+        "Tangent moduli at logarithmic strains along their own direction (shear: γ12). "
+        f"{band if sure is not None and sure.band else ''}kN/m: MPa times the thickness of "
+        f"{fit.thickness:.4g} mm. Beyond the last strain of a table no test reached: the card "
+        "keeps the modulus that it has there."
+    )
+    return [*tables, Words([note])]
 
 
 def reached_table(fit: Fit) -> Table:
@@ -295,17 +290,36 @@ def reached_table(fit: Fit) -> Table:
     return Table("Where they end", header, rows, note)
 
 
-def answer_words(fit: Fit) -> str:
-    """Return the moduli in a sentence, at a small strain that every one reaches."""
-    least = min(float(fit.best.valid[c]) for c in COMPONENTS.values())
-    at = FIRST if least >= FIRST else 0.0
-    said = []
-    for name, words in WORDS.items():
-        found = modulus_at(fit, name, at)
-        assert found is not None
-        plain = words.rpartition(",")[0]
-        said.append(f"{plain} {band_words(*found)} MPa")
-    return f"At {100 * at:g} % strain: {'; '.join(said)}."
+def verdict_words(fit: Fit) -> str:
+    """Return in one sentence where the moduli are usable, what is not known, and what is next."""
+    found = reaches(fit)
+    usable = [f"{n} {_span(r.usable, r.end)}" for n, r in found.items()]
+    unknown = [f"{n} {_span(r.unknown, r.end)}" for n, r in found.items() if r.unknown]
+    return (
+        f"Usable to within {percent(USABLE)} ({percent(LEVEL)} band): {', '.join(usable)}; "
+        f"not known: {', '.join(unknown) or 'nothing'}; next: {next_step(fit)}."
+    )
+
+
+def _span(span: tuple[float, float] | None, end: float) -> str:
+    """Return strains in words; end : of the fitted strains."""
+    if span is None:
+        return "nowhere"
+    if end < LEAST_STRAIN:
+        return "at any strain"
+    low, high = (f"{100 * v:.2g}{SPACE}%" for v in span)
+    return f"from {low} to {high}" if span[0] > 0.0 else f"up to {high}"
+
+
+def about_of(project: Project, record: Record | None) -> list[tuple[str, object]]:
+    """Return date, fabric and laboratory of results."""
+    begun = record.runs[-1].get("date", "") if record is not None and record.runs else ""
+    fabric = project.fabric
+    return [
+        ("date", begun[:10] or str(date.today())),
+        ("fabric", f"{project.title}, {fabric.thickness:.4g} mm"),
+        *([("laboratory", fabric.lab)] if fabric.lab else []),
+    ]
 
 
 BIBTEX = """@software{{bubblefit,
@@ -382,20 +396,19 @@ def _page(fit: Fit, folder: Path) -> Report:
     card = (folder / CARD).read_text(encoding="utf-8")
     return Report(
         title=fit.project.title,
-        summary=answer_words(fit),
+        summary=verdict_words(fit),
+        about=about_of(fit.project, fit.record),
         sections=[
-            Section("The answer", [
-                answer_table(fit), Download(CARD, card, SAVE_CARD), reached_table(fit),
-            ]),
+            Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
             Section("Can it be trusted?", [
-                Words([_said_by_tests(fit), *_checked(fit)]), warnings_of(fit), misfit_table(fit),
+                warnings_of(fit), Words([_said_by_tests(fit), *_checked(fit)]), misfit_table(fit),
                 *known_solution_table(
                     result.get("moduli_error", {}), result.get("moduli_error_range", {})
                 ),
-                Facts(assumed(fit)),
+                Facts(assumed(fit)), reached_table(fit),
             ]),
             Section("The moduli over strain", [_moduli(fit, folder)]),
-            Section("Measured beside modelled", [
+            Section(_beside_model(fit), [
                 part for name, exhibit in exhibits.items()
                 for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
             ]),
@@ -412,6 +425,12 @@ def _page(fit: Fit, folder: Path) -> Report:
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
         versions=result["versions"],
     )  # fmt: skip
+
+
+def _beside_model(fit: Fit) -> str:
+    """Return the title above data and model: what was computed is not measured."""
+    known = all(prepared.known is not None for prepared in fit.setup.tests)
+    return f"{'Known' if known else 'Measured'} beside modelled"
 
 
 def _optima(fit: Fit, folder: Path) -> Charts:
@@ -507,7 +526,8 @@ def correlation_table(
         [*(row[column] for column in columns), *(two_digits(row[name]) for name in names)]
         for _, row in found.iterrows()
     ]
-    return Table(title, ["unknown", "value", "1 sigma", *own.values(), *names], rows, note, text)
+    header = ["unknown", "value", "1 sigma", *own.values(), *names]
+    return Table(title, header, rows, note, text, closed=True)
 
 
 RECORD_TITLE = "The record"

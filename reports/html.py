@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -26,7 +27,7 @@ from ..errors import percent as percent
 from ..files import TEMPLATES, environment, replacing
 from . import maps, vega
 from .charts import Charts
-from .content import Report, round_trip, write_page_data
+from .content import Report, Table, round_trip, write_page_data
 
 PAGE = "report.html"
 #: In the order in which they are read.
@@ -60,7 +61,8 @@ def page_text(folder: Path, report: Report, today: date | None = None) -> str:
         "number": number, "percent": percent, "chart_views": chart_views, "drawn": vega.figure,
         "map_views": maps.map_views, "maps_data": maps.maps_data, "as_script": as_script,
         "solid_svg": maps.solid_svg, "solid_data": maps.solid_data, "data_link": data_link,
-        "data_uri": lambda file: data_uri(folder, file),
+        "data_uri": lambda file: data_uri(folder, file), "folds": folds, "long": long,
+        "tied": lambda text: TIED.sub("\u00a0", text),
     }  # fmt: skip
     style = (TEMPLATES / "report" / "page.css").read_text(encoding="utf-8") + vega.dark_style()
     moving = any(part.part in ("charts", "maps") for part in report.parts)
@@ -139,6 +141,43 @@ def number(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     return f"{value:.4g}" if isfinite(value) else "–"
+
+
+#: A space between a number and its unit.
+TIED = re.compile(r"(?<=\d) (?=(?:%|[kMG]?Pa|mm|k?N|kN/m|N/mm|degrees|times)\b|%)")
+#: Letters of a cell that stay on one line, and of a row that paper and screen hold.
+UNBROKEN, WIDEST_ROW = 26, 96
+
+
+def long(value: object) -> bool:
+    """Return whether a cell may be broken between its words."""
+    return len(number(value)) > UNBROKEN
+
+
+def folds(table: Table) -> list[list[int]]:
+    """Return the columns of a table in rows that are narrow enough, each with those that name it.
+
+    Columns that name a row are the first and those of words right after it.
+    """
+
+    def letters(column: int) -> int:
+        words = [*str(table.header[column]).split(), *(
+            own for row in table.rows for text in [number(row[column])]
+            for own in (text.split() if long(text) else [text])
+        )]  # fmt: skip
+        return max((min(len(word), UNBROKEN) for word in words), default=0) + 2
+
+    count = len(table.header)
+    names = next((k for k in range(1, count) if k not in table.text), count)
+    wide = [letters(k) for k in range(count)]
+    if sum(wide) <= WIDEST_ROW or 2 * sum(wide[:names]) > WIDEST_ROW:
+        return [list(range(count))]
+    parts: list[list[int]] = [[]]
+    for k in range(names, count):
+        if parts[-1] and sum(wide[j] for j in (*range(names), *parts[-1], k)) > WIDEST_ROW:
+            parts.append([])
+        parts[-1].append(k)
+    return [[*range(names), *part] for part in parts]
 
 
 #: Programs that print pages, in the order in which they are looked for.

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..files import replacing, write_text
 from ..meshes.mesh import Mesh
 from .charts import Array, Chart, Shades, dots, ends_of
-from .vega import COLOURS, view
+from .vega import COLOURS, PALETTE, view
 
 #: Steps between the least and the largest value; one more stands for what is not there.
 STEPS = 65534
@@ -71,10 +71,10 @@ def pack(values: ArrayLike) -> Packed:
     return Packed(array.shape, least, step, data)
 
 
-#: Maps of a row, and their colours.
-BESIDE: Mapping[str, Shades] = {
-    "measured": "from least", "modelled": "from least", "modelled − measured": "about zero",
-}  # fmt: skip
+#: Colours of the maps of a row: data, model and their difference.
+BESIDE: tuple[Shades, ...] = ("from least", "from least", "about zero")
+#: Share of the largest value below which a difference is one of rounding.
+ROUNDING = 1e-6
 #: Pixels of a map, and of which a colour bar is four fifths.
 SIDE = 150.0
 #: Places that are drawn of one load; of more, every second, third ... is.
@@ -124,7 +124,10 @@ class Shade:
 
 @dataclass(frozen=True)
 class Solid:
-    """A surface of quads to turn: points (loads, nodes, 3) mm, faces (m, 4) of node numbers."""
+    """A surface of quads to turn: points (loads, nodes, 3) mm, faces (m, 4) of node numbers.
+
+    warp : (k, 3) mm, an arrow along the warp, as one line.
+    """
 
     name: str
     loads: Sequence[str]
@@ -134,15 +137,28 @@ class Solid:
     shades: Sequence[Shade]
     caption: str
     alt: str = ""
+    warp: Packed | None = None
     part: Literal["solid"] = "solid"
+
+
+def warp_arrow(points: ArrayLike) -> Packed:
+    """Return an arrow along x beside points (n, 3) mm, in their lowest plane."""
+    every = np.asarray(points, dtype=float).reshape(-1, 3)
+    radius, low = float(np.abs(every[:, 0]).max()), float(every[:, 2].min())
+    shape = ((1.05, 0), (1.3, 0), (1.23, 0.04), (1.3, 0), (1.23, -0.04))
+    return pack([(x * radius, y * radius, low) for x, y in shape])
 
 
 def maps_of(
     name: str, slider: str, loads: Sequence[str], places: Sequence[Array],
     rows: Sequence[tuple[str, str, Sequence[Array], Sequence[Array], Sequence[Array]]],
-    labels: tuple[str, str], caption: str, alt: str,
+    labels: tuple[str, str], caption: str, alt: str, source: str = "measured",
 ) -> Maps:  # fmt: skip
-    """Return maps of measured, modelled and difference (n,), a row with a unit a quantity."""
+    """Return maps of data, model and difference (n,), a row with a unit a quantity.
+
+    source : the name of the data.
+    """
+    names = source, "modelled", f"modelled − {source}"
     every = [max(1, -(-len(own) // MOST_PLACES)) for own in places]
 
     def thin(parts: Sequence[ArrayLike]) -> Array:
@@ -153,7 +169,7 @@ def maps_of(
     panels = [
         Panel(f"{title}, {what}", unit, pack(thin(values)), number, shades)
         for number, (title, unit, *three) in enumerate(rows)
-        for (what, shades), values in zip(BESIDE.items(), three, strict=True)
+        for what, shades, values in zip(names, BESIDE, three, strict=True)
     ]
     counts = [len(own[::k]) for own, k in zip(places, every, strict=True)]
     if max(every) > 1:
@@ -169,9 +185,14 @@ def frame_of(maps: Maps, values: Array, load: int) -> Array:
 
 def row_ends(maps: Maps, panel: Panel, load: int) -> tuple[float, float]:
     """Return the ends of the colours, the same for maps of a row with the same shades."""
-    alike = [p for p in maps.panels if p.row == panel.row and p.shades == panel.shades]
-    every = np.concatenate([frame_of(maps, p.values.values, load) for p in alike])
-    return ends_of(every, panel.shades)
+    row = [p for p in maps.panels if p.row == panel.row]
+    shown = {id(p): frame_of(maps, p.values.values, load) for p in row}
+    every = np.concatenate([shown[id(p)] for p in row if p.shades == panel.shades])
+    low, high = ends_of(every, panel.shades)
+    if panel.shades == "about zero":
+        least = ROUNDING * max(float(np.nanmax(np.abs(own), initial=0.0)) for own in shown.values())
+        low, high = min(low, -least), max(high, least)
+    return low, high
 
 
 def map_chart(maps: Maps, panel: Panel, load: int) -> Chart:
@@ -209,8 +230,8 @@ def solid_data(solid: Solid) -> dict[str, Any]:
     """Return values and first view of a surface, for the page's script."""
     every = solid.points.values
     return asdict(solid) | {
-        "colours": COLOURS, "scale": scale_of(every), "middle": middle_of(every).tolist(),
-        "centre": CENTRE, "turn": TURN, "raise": RAISE,
+        "colours": COLOURS, "scale": scale_of(every, solid.warp),
+        "middle": middle_of(every).tolist(), "centre": CENTRE, "turn": TURN, "raise": RAISE,
     }  # fmt: skip
 
 
@@ -230,7 +251,8 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
     every = solid.points.values
     faces = np.rint(solid.faces.values).astype(int)
     flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
-    flat = flat * scale_of(every) * (1.0, -1.0) + CENTRE
+    scale = scale_of(every, solid.warp)
+    flat = flat * scale * (1.0, -1.0) + CENTRE
     own = solid.shades[shade]
     low, high = ends_of(own.values.values, own.shades)
     number = classes(own.values.values[load], low, high)
@@ -243,7 +265,16 @@ def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
         d = "L".join(f"{x:.1f} {y:.1f}" for x, y in flat[faces[k]])
         fill = colours[number[k]] if number[k] >= 0 else "#999"
         parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
-    parts.append(f'</g><g class="scale" transform="translate({WIDTH - BAR + 8:g} {2 * MARGIN:g})">')
+    parts.append("</g>")
+    if solid.warp is not None:
+        arrow, _ = seen(solid.warp.values - middle_of(every), TURN, RAISE)
+        line = [f"{x:.1f} {y:.1f}" for x, y in arrow * scale * (1.0, -1.0) + CENTRE]
+        x, y = line[1].split()
+        parts.append(
+            f'<g class="warp"><path d="M{"L".join(line)}" fill="none" stroke="{PALETTE[1]}" '
+            f'stroke-width="2"/><text x="{x}" y="{y}" dx="6" dy="4">warp</text></g>'
+        )
+    parts.append(f'<g class="scale" transform="translate({WIDTH - BAR + 8:g} {2 * MARGIN:g})">')
     parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
     return Markup("".join(parts))  # noqa: S704 - titles and units are escaped
 
@@ -254,9 +285,10 @@ def middle_of(points: Array) -> Array:
     return np.asarray(0.5 * (flat.min(axis=0) + flat.max(axis=0)))
 
 
-def scale_of(points: Array) -> float:
-    """Return the scale at which the surface fits however it is turned."""
+def scale_of(points: Array, warp: Packed | None = None) -> float:
+    """Return the scale at which surface and arrow fit however they are turned."""
     flat = points.reshape(-1, 3)
+    flat = flat if warp is None else np.concatenate([flat, warp.values])
     radius = float(np.linalg.norm(flat - middle_of(points), axis=1).max()) or 1.0
     return (min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / radius
 

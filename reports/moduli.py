@@ -23,6 +23,8 @@ SAME, DECADES = 1e-10, 7
 NOT_DETERMINED = 1000.0
 #: Percent; nothing is known better than this, and a zero has to stand somewhere.
 SMALLEST = 1e-3
+#: Times what the curves need, to which an axis is stretched for a band.
+MOST = 3.0
 #: Of the percentiles of a bootstrap, which are two curves.
 SAMPLES = "percentiles of the samples"
 
@@ -61,13 +63,22 @@ def moduli_charts(
         if truth is not None:
             series.append(line("known", given[m], truth[m], colour=1, dashes=1))
             drawn.append(truth[m].max())
-        # By the curves alone: a band may be as wide as it likes, and is then cut off.
-        top, (first, *_, last) = 1.12 * float(max(drawn)), fits[0, m]
+        first, *_, last = fits[0, m]
+        top, cut = _top(1.12 * float(max(drawn)), () if own is None else own[1])
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[0, m, -1]:.3g}"
-        charts.append(Chart(title, label, MODULUS, series, alt, from_zero=True, top=top))
+        charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
         charts += [_deviation(m, given[m], fits[:, m], truth[m], names) for m in range(3)]
     return Charts("moduli", charts, caption, columns=3)
+
+
+def _top(curves: float, upper: ArrayLike) -> tuple[float, str]:
+    """Return the end of the axis, and words where the band goes beyond `MOST` of the curves'."""
+    band = np.asarray(upper, dtype=float)
+    high = float(band[np.isfinite(band)].max(initial=0.0))
+    if high <= MOST * curves:
+        return max(curves, 1.04 * high), ""
+    return MOST * curves, f": its band goes to {high:.3g} MPa"
 
 
 def _look(rank: int, count: int, names: Sequence[str] | None) -> dict[str, Any]:
@@ -154,7 +165,7 @@ def bootstrap_charts(
             line(SAMPLES, x, low, colour=1, dashes=1),
             line(SAMPLES, x, high, colour=1, dashes=1),
         ]
-        top = 1.08 * max(float(best[name].max()), float(high.max()))
+        top, cut = _top(1.08 * max(float(best[name].max()), float(high.max())), fit[name][1])
         alt = f"{title}: at rest {best[name][0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        charts.append(Chart(title, label, MODULUS, series, alt, from_zero=True, top=top))
+        charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     return Charts("bootstrap", charts, caption)

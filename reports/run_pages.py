@@ -29,7 +29,7 @@ from .content import (
     Words,
     read_page_data,
 )
-from .fit_page import citation, record_tables
+from .fit_page import about_of, citation, record_tables
 from .html import percent, write_report
 
 RUNS_TABLE = "runs.csv"
@@ -57,7 +57,8 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     each, result = predictions.each, predictions.result
     ended = [predictions.ended(i) for i in range(len(each))]
     finished = sum(not (run.record.failure or run.record.early) for run in each)
-    summary = f"{finished} of {len(each)} runs finished."
+    summary = " ".join(e.summary for e in exhibits.values() if e.summary)
+    summary += f"{' ' if summary else ''}{finished} of {len(each)} runs finished."
     noted = sum(bool(run.notes) for run in each)
     if noted:
         summary += f" {noted} have notes."
@@ -70,6 +71,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
     return Report(
         title=predictions.project.title,
         summary=summary,
+        about=about_of(predictions.project, predictions.record),
         facts=[
             ("tests", len(result["tests"])),
             ("cards", len(result["cards"])),
@@ -140,6 +142,7 @@ def write_check(check: Check, folder: Path) -> Path:
     ]
     report = Report(
         title=f"{check.setup.project.title}: a look at the data", summary=_check_summary(check),
+        about=about_of(check.setup.project, None),
         facts=facts,
         warnings=[
             words

@@ -19,6 +19,7 @@ from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 from zlib import crc32
 
@@ -61,8 +62,8 @@ DASHES: tuple[list[float], ...] = ([], [6, 3], [1.5, 2.5], [7, 2.5, 1.5, 2.5])
 WIDE, NARROW, TALL = 386, 266, 210
 #: Charts in a row from which on they are narrow.
 THREE = 3
-#: Pixels of a letter, and of the sample in front of a legend's entry.
-LETTER, SAMPLE = 6.2, 34
+#: Pixels of a letter, of one of a title, and of the sample in front of a legend's entry.
+LETTER, BOLD, SAMPLE = 6.2, 7.4, 34
 #: Dots of a chart of nothing else: up to so many are drawn large.
 FEW = 60
 #: Characters that XML, and so SVG, cannot hold.
@@ -286,14 +287,15 @@ def panel(chart: Chart, width: float = WIDE, legend: bool = True, dot: float | N
         "axes": [_x_axis(chart, width), _axis("left", "y", chart.y_label, height, chart.log_y)],
     }  # fmt: skip
     if chart.title:
-        spec["title"] = {"text": chart.title, "limit": width + 40, "offset": 6}
+        lines = wrap(chart.title, int((width + 30) / BOLD))
+        spec["title"] = {"text": lines if len(lines) > 1 else chart.title, "offset": 6}
     if any(s.values for s in chart.series):
         spec["signals"].append({"name": "ends", "value": scale_ends(chart)})
         colours = {"type": "quantize", "domain": {"signal": "ends"}, "range": COLOURS[chart.shades]}
         spec["scales"].append({"name": "shade", **colours})
         spec["legends"].append(
             {"fill": "shade", "type": "gradient", "orient": "right", "title": chart.scale,
-             "gradientLength": min(height, 160), "format": ".3~g", "offset": 8,
+             "gradientLength": min(height, 160), "format": ".3~g", "offset": 18,
              "labelOverlap": "greedy", "labelSeparation": 6}
         )  # fmt: skip
     if chart.level is not None:

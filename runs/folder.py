@@ -472,8 +472,8 @@ def this_run(command_line: Sequence[str] | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-#: Settings of a test that change no result.
-NAMES = ("name", "folder")
+#: Settings of fabric and tests that change no result.
+NAMES = ("name", "folder", "lab")
 
 
 def solver_facts(name: str, identity: str) -> dict[str, str]:

@@ -320,6 +320,64 @@ def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
     return Answer(name, strain, value, per_width, at(sure.total[name]), band, end)
 
 
+#: Relative half width of the 95 % band up to which a modulus is to be used, and from which it is
+#: not known.
+USABLE, NOT_KNOWN = 0.2, 1.0
+#: Share of the strains below which a stretch of them is none.
+SHORT = 0.05
+#: Weight from which a note speaks against the moduli themselves.
+AGAINST = 10.0
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The longest stretches of strain, up to `end`, at which a modulus is usable or not known."""
+
+    usable: Span | None
+    unknown: Span | None
+    end: float
+
+
+def reaches(fit: Fit) -> dict[str, Reach]:
+    """Return where each modulus is usable, and where it is not known, by its 95 % band."""
+    found, sure = {}, fit.best.certainty
+    for name, component in COMPONENTS.items():
+        end = float(fit.best.valid[component])
+        if sure is None or name not in sure.band:
+            found[name] = Reach(None, (0.0, end), end)
+            continue
+        strain, (lower, upper) = sure.strain[name], sure.band[name]
+        value = fit.law.modulus(name, strain)
+        off = np.maximum(upper - value, value - lower) / value
+        spans = (_longest(strain, chosen) for chosen in (off <= USABLE, off >= NOT_KNOWN))
+        found[name] = Reach(*spans, end)
+    return found
+
+
+def _longest(strain: Array, chosen: Array) -> Span | None:
+    """Return the ends of the longest run of chosen strains; None where it is hardly one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
+    longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
+    return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
+
+
+def next_step(fit: Fit) -> str:
+    """Return what brings the fit furthest, in words that follow "next:"."""
+    if any(note.kind.weight >= AGAINST for note in fit.notes):
+        return "settle the first warning"
+    short = [
+        name for name, r in reaches(fit).items()
+        if r.usable is None or r.usable[0] > 0.0 or r.usable[1] < NEAR * r.end
+    ]  # fmt: skip
+    if "G12" in short and not any("bias" in c.name for c in fit.problem.comparisons):
+        return "add strips at 45 degrees (bias), which shear the fabric"
+    if short:
+        return f"rank the tests that narrow {' and '.join(short)} (bubblefit plan)"
+    return "predict a test that was not fitted (bubblefit validate)"
+
+
 #: Columns before the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 
@@ -402,6 +460,12 @@ def result_of(fit: Fit) -> dict[str, Any]:
                 name: {**asdict(d), "told": d.significant} for name, d in sure.discrepancy.items()
             },
         }  # fmt: skip
+    result["verdict"] = {
+        "within": USABLE, "next": next_step(fit),
+        "moduli": {
+            name: {"usable": r.usable, "not_known": r.unknown} for name, r in reaches(fit).items()
+        },
+    }  # fmt: skip
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
     if fit.record is not None:

@@ -68,6 +68,7 @@ STRIPS = """
 [fabric]
 name = "made"
 thickness = 0.8
+lab = "L 7"
 [units]
 modulus = "GPa"
 [law]

@@ -27,7 +27,17 @@ from ...readers.fields import DisplacementField, write_surfaces
 from ...reports import bubbles
 from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
-from ...reports.maps import Maps, Shade, Solid, maps_of, pack, write_pvd, write_vtu
+from ...reports.maps import (
+    ROUNDING,
+    Maps,
+    Shade,
+    Solid,
+    maps_of,
+    pack,
+    warp_arrow,
+    write_pvd,
+    write_vtu,
+)
 from ...reports.vega import save
 from ...solvers.base import History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
@@ -260,11 +270,17 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     )
 
 
+def _source(prepared: PreparedBubble) -> str:
+    """Return the name of the data: only what a camera saw is measured."""
+    return "measured" if prepared.known is None else "known"
+
+
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return the residuals of dx, dy and dz over the measured height."""
     objective = objective_of(fitted)
     left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
-    targets = objective.targets
+    targets, source = objective.targets, _source(prepared)
+    rounding = ROUNDING * max(float(np.abs(t.displacement).max()) for t in targets)
     numbers, charts = bubbles.chosen(len(targets)), []
     for axis, name in enumerate(DIRECTIONS):
         series = []
@@ -276,11 +292,13 @@ def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
             )
         rms = float(np.sqrt(np.mean(np.concatenate([own[:, axis] for own in left]) ** 2)))
         title = f"{name}: RMS {rms:.2g} mm"
-        alt = f"modelled less measured {name} over the measured height, {rms:.2g} mm RMS"
-        axes = "measured dz, mm", "modelled − measured, mm"
-        charts.append(Chart(title, *axes, series, alt, level=0.0))
+        alt = f"modelled less {source} {name} over the {source} height, {rms:.2g} mm RMS"
+        axes = f"{source} dz, mm", f"modelled − {source}, mm"
+        most = max(float(np.abs(own[:, axis]).max()) for own in left)
+        ends = (-rounding, rounding) if most < rounding else None
+        charts.append(Chart(title, *axes, series, alt, level=0.0, y_range=ends))
     own, unseen = prepared.test.name, bubbles.left_out(len(targets))
-    caption = f"{own}: what is left, over the measured height.{unseen}"
+    caption = f"{own}: what is left, over the {source} height.{unseen}"
     return Charts(f"{own} residual", charts, caption)
 
 
@@ -305,7 +323,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     return maps_of(
         f"{name} maps", "pressure", [bubbles.kilo(t.pressure) for t in targets],
         [target.at(nodes) for target in targets], rows, LABELS, caption,
-        f"maps of dx, dy and dz of {name}",
+        f"maps of dx, dy and dz of {name}", _source(prepared),
     )  # fmt: skip
 
 
@@ -317,6 +335,8 @@ def bubble_solid(
     mesh, sheets = model.mesh, list(inflated_sheets(model, fitted.histories[0], fitted.law))
     signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
     residual = np.tile(np.array([_sizes(own, mesh.quads) for own in left]), len(signs))
+    largest = max(float(np.abs(sheet.displacement).max()) for sheet in sheets)
+    residual[residual < ROUNDING * largest] = 0.0
     shades = [Shade("residual, length", "mm", pack(residual))]
     fields = (
         (STRAIN_LABELS, "1", np.array([sheet.strain for sheet in sheets])),
@@ -335,12 +355,14 @@ def bubble_solid(
     caption = (
         f"{test.name}: the modelled bubble; drag it, or use the arrow keys, to turn it. Strain is "
         "logarithmic, stress Cauchy stress, both in the middle of each element; the residual "
-        "is the distance of modelled and measured, grey where nothing was measured."
+        f"is the distance of modelled and {_source(prepared)}, grey where there are no data. The "
+        "arrow is the warp."
     )
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
         f"{test.name} bubble", [bubbles.kilo(sheet.pressure) for sheet in sheets], "pressure",
         pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
+        warp_arrow(np.concatenate(around, axis=1)),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure, marks
+from ...materials.card import BAND
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
@@ -308,6 +309,30 @@ class CylinderOutcome:
         places = self.runs[number].test.reading.places
         known = loads_at(self.bent[number].deflection, self.spreads[number], places)
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
+
+    def measured(self, number: int, name: str) -> tuple[float, float, float] | None:
+        """Return the stiffness (N/mm), or the load at the knee (N), with the ends of its band.
+
+        The band holds both walls, and what the card leaves open of the load at that deflection.
+        """
+        own = self.measures.get(number)
+        value = None if own is None else getattr(own, name)
+        if own is None or value is None:
+            return None
+        over = self.runs[number].test.reading.slope_over
+        at, size = (over, value) if name == "stiffness" else value
+        sigma = 0.0
+        if number in self.spreads:
+            known = loads_at(self.bent[number].deflection, self.spreads[number], {"": at})[""]
+            sigma = known if known is not None and np.isfinite(known) else 0.0
+        off = BAND * sigma / (over if name == "stiffness" else 1.0)
+        ends = [size - off, size + off]
+        if (other := self.other_end(number)) is not None:
+            far = next(self.measures[i] for i, bent in self.bent.items() if bent is other)
+            if (beside := getattr(far, name)) is not None:
+                end = beside if name == "stiffness" else beside[1]
+                ends += [end - off, end + off]
+        return size, min(ends), max(ends)
 
     @property
     def unsure(self) -> Sequence[str]:

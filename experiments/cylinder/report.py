@@ -268,6 +268,8 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
     return lines
 
 
+#: Predictions that the page sums up in its first sentence.
+SENTENCES = 4
 #: Letters of a cell that is not broken.
 SHORT = 30
 CURVES = "load_deflection.csv"
@@ -280,7 +282,15 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     figures = draw_figures(outcome, out)
     files = [*_write_tables(outcome, tests, out), *write_beams(outcome, out)]
     tables = [_runs(outcome, tests), *_errors(outcome)]
-    parts: list[Part] = [Words(how_sure(outcome, tests)), *load_charts(outcome)]
+    first = openings(outcome)
+    parts: list[Part] = [first, *load_charts(outcome), Words(how_sure(outcome, tests))]
+    lines = [
+        f"{', '.join(map(str, row[:2]))}: stiffness {stiff}{_in(band)} N/mm, knee "
+        + (f"at {load}{_in(loads)} N and {at} mm" if load else "not reached")
+        for row in first.rows
+        for stiff, band, load, loads, at in [row[2:]]
+        if len(first.rows) <= SENTENCES and stiff
+    ]
     shared = (
         ("length, mm", {t.length for t in tests}),
         ("span, mm", {t.supports.span for t in tests}),
@@ -288,7 +298,38 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
         ("seam width, mm", {t.seam_width for t in tests}),
     )
     facts = [(label, float(values.pop())) for label, values in shared if len(values) == 1]
-    return Exhibit(facts, figures, tables, files, parts)
+    summary = f"{'; '.join(lines)}." if lines else ""
+    return Exhibit(facts, figures, tables, files, parts, summary=summary)
+
+
+def _in(band: object) -> str:
+    return f" ({band})" if band else ""
+
+
+def openings(outcome: CylinderOutcome) -> Table:
+    """Return stiffness and knee of every prediction, each with its band by card and wall."""
+    rows: list[list[object]] = []
+    for i, run in enumerate(outcome.runs):
+        if not run.predicted:
+            continue
+        stiffness, knee = outcome.measured(i, "stiffness"), outcome.measured(i, "knee")
+        at = None if (m := outcome.measures.get(i)) is None or m.knee is None else m.knee[0]
+        cells = [f"{stiffness[0]:.3g}" if stiffness else None, _to(stiffness, ".3g")]
+        cells += [f"{knee[0]:.0f}" if knee else None, _to(knee, ".0f")]
+        rows.append(_unbroken([run.test.name, run.card, *cells, at and f"{at:.0f}"]))
+    header = ["test", "card", "stiffness, N/mm", "its band", "load at the knee, N", "its band",
+              "deflection there, mm"]  # fmt: skip
+    sides = [f"{100 * LEVEL:g} % by what the card leaves open"] if outcome.spreads else []
+    sides += [f"from {' to '.join(end.name for end in outcome.band)}"] if outcome.band else []
+    note = f"Bands: {', '.join(sides) or 'not known'}; none where it is narrower than the digits. "
+    note += "The knee is where the slope has fallen to half."
+    return Table("Stiffness and knee", header, rows, note, text=(1,))
+
+
+def _to(found: tuple[float, float, float] | None, form: str) -> str | None:
+    """Return the ends of a band, where it has a width."""
+    low, high = ("", "") if found is None else (f"{end:{form}}" for end in found[1:])
+    return None if low == high else f"{low} to {high}"
 
 
 def _write_tables(

@@ -44,6 +44,10 @@ def test_ends_of_the_axes():
     assert chart([dots("", [1, 2], [1, 2])], x_names=("a", "b"))[0] == (0.5, 2.5)
     part = chart([line("", [0, 9], [0, 9])], x_range=(1, 2), y_range=(3, 4))
     assert part == ((1, 2), (3, 4))
+    title = "E1, along the warp: best: at most 1.2e-08 % of the modulus that is known"
+    lines = panel(Chart(title, "x", "y", [banded]), vega.NARROW)["title"]["text"]
+    assert " ".join(lines) == title and len(lines) == 2  # whole, and not cut by dots
+    assert max(map(len, lines)) * vega.BOLD <= vega.NARROW + 40
     flat = Chart("", "x, mm", "y, mm", [line("", [0, 100], [0, 25])], equal=True)
     width, height = (signal["value"] for signal in panel(flat)["signals"][:2])
     (x0, x1), (y0, y1) = axis_ends(flat)
@@ -146,6 +150,16 @@ def test_maps_of_a_row_share_their_colours():
     found = maps_at(places, np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0]))
     for own, ends in zip(found.panels, ((0, 4), (0, 4), (-2, 2)), strict=True):
         assert maps.row_ends(found, own, 0) == pytest.approx(ends)
+    # Of rounding alone no map is red or blue: the ends are a millionth of the largest value.
+    even = np.array([0.0, 20.0, 40.0])
+    found = maps_at(places, even, even + np.array([0.0, 1e-11, -3e-11]))
+    low, high = maps.row_ends(found, found.panels[2], 0)
+    assert (low, high) == pytest.approx((-4e-5, 4e-5), rel=1e-3)
+    assert set(maps.classes(np.array([1e-11, -3e-11]), low, high)) == {maps.CLASSES // 2}
+    rows = [("d", "mm", [even], [even], [0 * even])]
+    known = maps.maps_of("m", "p", ["1"], [places], rows, ("x", "y"), "", "", "known")
+    assert [p.name for p in known.panels] == ["d, known", "d, modelled", "d, modelled − known"]
+    found = maps_at(places, np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0]))
     numbers = maps.classes(np.array([-2.0, 0.0, 2.0, np.nan]), -2, 2)
     assert numbers.tolist() == [0, 6, maps.CLASSES - 1, -1]
     chart = maps.map_chart(found, found.panels[2], 0)

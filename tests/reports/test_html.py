@@ -16,7 +16,7 @@ from bubblefit.meshes.mesh import Mesh
 from bubblefit.reports import content
 from bubblefit.reports.charts import Chart, Charts, dots, line
 from bubblefit.reports.content import Picture, Report, Section, Table, read_page_data, round_trip
-from bubblefit.reports.html import number, percent, write_page, write_report
+from bubblefit.reports.html import folds, number, percent, write_page, write_report
 from bubblefit.reports.maps import Shade, Solid, maps_of, pack, write_vtu
 from PIL import Image
 
@@ -95,7 +95,7 @@ def test_the_page(full, tmp_path):
         text = (page / "report.html").read_text(encoding="utf-8")
         tags.feed(text)
         assert tags.open == []
-        assert all(link.startswith("data:") for link in tags.links)
+        assert all(link.startswith(("data:", "#")) for link in tags.links)
         outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
         assert "@import" not in outside and not re.search(r"url\((?!#)", outside)
         assert len(text) < 5_000_000
@@ -163,6 +163,21 @@ def test_data_are_strict_json(full, tmp_path):
     again = write_page(full, read_page_data(full), tmp_path / "again.html").read_bytes()
     assert again == (full / "report.html").read_bytes()
     assert read_page_data(full) == round_trip(full_report())
+
+
+@pytest.mark.parametrize(
+    ("columns", "text", "parts"),
+    [
+        (8, (), [[0, 1, 2, 3, 4, 5, 6, 7]]),
+        (24, (), [[0, *range(1, 10)], [0, *range(10, 19)], [0, *range(19, 24)]]),
+        # Columns of words right after the first name a row too; others do not.
+        (24, (1, 9), [[0, 1, *range(2, 10)], [0, 1, *range(10, 18)], [0, 1, *range(18, 24)]]),
+    ],
+)
+def test_a_wide_table_is_folded_and_keeps_every_column(columns, text, parts):
+    rows = [[f"row {k}", *[-0.12345] * (columns - 1)] for k in range(2)]  # 7 letters a number
+    assert folds(Table("t", ["name", *["c"] * (columns - 1)], rows, text=text)) == parts
+    assert folds(Table("t", ["name", "said"], [["a", "words " * 99]], text=(1,))) == [[0, 1]]
 
 
 def test_vtu_holds_the_deformed_mesh(tmp_path):

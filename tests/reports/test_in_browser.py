@@ -1,10 +1,12 @@
 """A page in a browser, alone in a folder and without a network: everything there, and it moves."""
 
 import shutil
+from dataclasses import replace
 
 import pytest
-from bubblefit.reports.content import Report, Section
+from bubblefit.reports.content import Report, Section, Table, Words
 from bubblefit.reports.html import print_page, write_report
+from bubblefit.reports.maps import warp_arrow
 from bubblefit.reports.studies import plan_charts
 
 from .. import needs
@@ -128,6 +130,88 @@ def test_a_chart_tells_its_values_and_zooms(opened):
     assert drawing.startswith("<svg") and "var(" not in drawing and "strain" in drawing
     rows = table.splitlines()
     assert rows[0] == "series,strain,MPa,lower,upper" and rows[1] == "best <1>,0,300,250,350"
+
+
+BROKEN = """[...document.querySelectorAll('td:not(.long)')].filter((cell) => {
+  const range = document.createRange();
+  range.selectNodeContents(cell);
+  return new Set([...range.getClientRects()].map((own) => Math.round(own.top))).size > 1;
+}).length"""
+#: By how much tables are wider than their place, how many are, and the height of their bars.
+BEYOND = """[...document.querySelectorAll('.scroll')].map((own) =>
+  [own.scrollWidth - own.clientWidth,
+   parseFloat(getComputedStyle(own, '::-webkit-scrollbar').height),
+   getComputedStyle(own).overflowX])"""
+#: Pixels of A4 between its margins.
+PAPER = 672
+
+
+def test_tables_keep_their_columns_and_numbers_their_line(opened, tmp_path):
+    value = "91.9\u00a0(30.3\u00a0to\u00a0418)"
+    sides = [
+        Table(f"modulus {k}", ["strain", "MPa", "kN/m"], [["5 %", value, value]] * 6, side=True)
+        for k in range(3)
+    ]
+    names = [f"beta_{k}" for k in range(14)]
+    wide = Table("Sure", ["unknown", "value", *names], [[n, *[-0.99] * 15] for n in names],
+                 closed=True)  # fmt: skip
+    words = Table("Notes", ["test", "note"], [["150 mm, 140 kPa", "a note of words " * 20]])
+    sections = [
+        Section("The answer", sides), Section("Trust", [Words(["mind"], True, True), words]),
+        Section("How", [wide]),
+    ]  # fmt: skip
+    about = [("date", "2026-11-23"), ("fabric", "F, 0.8 mm"), ("laboratory", "L")]
+    opened.requests.clear()
+    opened.open(write_report(tmp_path, Report("T", "Usable.", sections=sections, about=about)))
+    order = opened.run(
+        "[...document.querySelectorAll('h1, dt, .summary, .contents a, h2')]"
+        ".map(own => own.textContent)"
+    )
+    titles = ["The answer", "Trust", "How"]
+    assert order == ["T", "date", "fabric", "laboratory", "Usable.", *titles, *titles]
+    assert opened.run("document.querySelector('details').open") is False
+    opened.run("document.querySelector('details').open = true")
+    for width, fits in ((1280, True), (390, False)):
+        size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 500}
+        opened.call("Emulation.setDeviceMetricsOverride", **size)
+        tables = opened.run(BEYOND)
+        assert len(tables) == 3 + 1 + 2 and opened.run(BROKEN) == 0
+        assert opened.run("document.documentElement.scrollWidth") <= width
+        assert all(over <= 0 for over, *_ in (tables if fits else tables[:4]))
+        assert all(bar >= 8 and how == "auto" for _, bar, how in tables)
+    opened.run("document.querySelector('details').open = false")
+    size = {"width": PAPER, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+    opened.call("Emulation.setDeviceMetricsOverride", **size)
+    opened.call("Emulation.setEmulatedMedia", media="print")
+    right = opened.run(
+        "[...document.querySelectorAll('table')].filter(own => own.checkVisibility())"
+        ".map(own => own.getBoundingClientRect().right)"
+    )
+    broken = opened.run(BROKEN)
+    opened.call("Emulation.setEmulatedMedia", media="")
+    opened.call("Emulation.clearDeviceMetricsOverride")
+    assert broken == 0 and len(right) == 6
+    assert max(right) <= PAPER
+
+
+def test_the_bubble_shows_its_warp(opened, tmp_path):
+    whole = full_report()
+    solid = whole.sections[1].parts[1]
+    solid = replace(solid, warp=warp_arrow(solid.points.values))
+    opened.requests.clear()
+    opened.open(write_report(tmp_path, Report("T", sections=[Section("Fields", [solid])])))
+    at = "document.querySelector('.warp path').getAttribute('d')"
+    assert opened.run("document.querySelector('.warp text').textContent") == "warp"
+    first = opened.run(at)
+    opened.press("svg.solid", "ArrowLeft")
+    assert opened.run(at) != first
+    opened.press("svg.solid", "0")
+    assert opened.run(at) == first
+    x, y, wide, tall = opened.box("svg.solid")
+    for _ in range(2):
+        left, top, across, up = opened.box(".warp path")
+        assert x < left and left + across < x + wide and y < top and top + up < y + tall
+        opened.press("svg.solid", "ArrowRight")
 
 
 def test_a_pdf(page, tmp_path):

@@ -163,6 +163,12 @@ def test_named_laws_with_their_own_ranges():
         strains, fit = np.tile([0.0, 0.1], (3, 1)), np.full((1, 3, 2), 1000.0)
         chart = moduli_charts(strains, fit, np.full((3, 2), known)).charts[0]
         assert axis_ends(chart)[1] == pytest.approx((0.0, 1.12 * max(1000.0, known)))
+    # A band is seen whole up to three times the curve; where one goes on, the title says how far.
+    for upper, top, said in ((1050.0, 1120.0, False), (2000.0, 2080.0, False), (9e3, 3360.0, True)):
+        ends = np.array([fit[0] - 900.0, np.full((3, 2), upper)])
+        chart = moduli_charts(strains, fit, band=ends).charts[0]
+        assert axis_ends(chart)[1][1] == pytest.approx(top)
+        assert ("9e+03 MPa" in chart.title) is said
     with pytest.raises(ValueError, match="1 names for 2 fits"):
         moduli_charts(*both, names=["a"])
     with pytest.raises(ValueError, match="same strains"):

@@ -17,6 +17,7 @@ import pytest
 from bubblefit.cli.fits import lines_of
 from bubblefit.errors import Note, NoteKind, foremost, marks, rows
 from bubblefit.experiments.cylinder import report as cylinders
+from bubblefit.experiments.kinds import UNSTABLE
 from bubblefit.experiments.strips import report as strips_report
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.unknowns import LawBounds
@@ -40,7 +41,7 @@ from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import versions, write_table
 from bubblefit.runs.predictions import Predictions, RunEvent, predict
-from bubblefit.runs.result import COMPARED, TABLES, TOGETHER, notes_of_fit
+from bubblefit.runs.result import COMPARED, TABLES, TOGETHER, next_step, notes_of_fit, reaches
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP
@@ -167,7 +168,9 @@ def test_two_tests(together, written):
     ]  # fmt: skip
     assert found.versions == versions()
     (warned,) = [p for p in found.parts if isinstance(p, Words) and p.warning]
-    assert warned.lines == [note.line for note in fit.notes]
+    weights = [note.kind.weight for note in fit.notes]
+    assert sorted(warned.lines) == sorted(note.line for note in fit.notes)
+    assert warned.lines[0] == fit.notes[int(np.argmax(weights))].line
     ended, texts = [r.objective for r in fit.best.records], captions(found)
     assert list(texts) == ["moduli", "one loads", "two loads", "pinned", "optima"]
     for value in (fit.objective, float(np.median(ended)), max(ended)):
@@ -176,20 +179,73 @@ def test_two_tests(together, written):
 
 def test_the_answer_in_words(together, written, tmp_path):
     fit, (found, _) = together, written
-    warp, per_width, fill, _, shear, _ = titled(found, "Moduli").rows
+    warp, fill, shear = (titled(found, WORDS[name]).rows for name in ("E1", "E2", "G12"))
     own, (lower, upper) = fit.law.beta[11], fit.best.certainty.band["E1"][:, 0]
     words = band_words(own, lower, upper)
     assert words == f"{own:.0f} ({lower:.0f} to {upper:.0f})".replace(" ", "\u00a0")
-    assert warp == [WORDS["E1"], "MPa", *[words] * 5, "12 %"]
-    assert per_width[1:3] == ["kN/m", band_words(0.8 * own, 0.8 * lower, 0.8 * upper)]
-    assert fill[6] is not None and fill[7] == "14 %"
+    per_width = band_words(0.8 * own, 0.8 * lower, 0.8 * upper)
+    strains = ["0 %", "1 %", "2 %", "5 %", "10 %", "12 %, its end"]
+    assert warp == [[strain, words, per_width] for strain in strains]
+    assert fill[-1][0] == "14 %, its end" and len(fill) == 6
     # No test shears: nothing is said beyond rest.
-    assert shear[3:7] == [None] * 4
+    assert [row[0] for row in shear] == ["0 %"]
+    assert [section.title for section in found.sections][:2] == ["The answer", "Can it be trusted?"]
+    assert isinstance(found.sections[1].parts[0], Words) and found.sections[1].parts[0].warning
+    assert [label for label, _ in found.about] == ["date", "fabric", "laboratory"]
+    assert found.about[0][1] == fit.record.runs[-1]["date"][:10] and found.about[2][1] == "L 7"
     (card,) = [part for part in found.parts if isinstance(part, Download)]
     inside = tmp_path / card.file
     inside.write_text(card.text)
     assert card.file == "material.toml"
     assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
+
+
+def test_the_verdict_by_its_numbers(together, written):
+    fit, (found, _) = together, written
+    verdict, sure = fit.result["verdict"]["moduli"], fit.best.certainty
+    for name, own in verdict.items():
+        lower, upper = sure.band[name][:, 0]
+        off = max(upper / fit.law.modulus(name, 0.0), 2 - lower / fit.law.modulus(name, 0.0)) - 1
+        end = float(fit.best.valid[COMPONENTS[name]])
+        assert own["usable"] == (pytest.approx((0.0, end)) if off <= 0.2 else None)
+        assert own["not_known"] == (pytest.approx((0.0, end)) if off >= 1.0 else None)
+    assert [own["not_known"] is None for own in verdict.values()] == [True, True, False]
+    assert fit.result["verdict"]["within"] == 0.2 and "G12 nowhere" in found.summary
+    assert found.summary.count(".") == 1 and fit.result["verdict"]["next"] in found.summary
+
+
+@pytest.mark.parametrize(
+    ("off", "usable", "unknown", "said"),
+    [
+        (lambda x: 0.1 + 0 * x, (0.0, 0.1), None, "E1 up to 10\u00a0%"),
+        (lambda x: 11 * x, (0.0, 0.018), (0.091, 0.1), "E1 from 9.1\u00a0% to 10\u00a0%"),
+        (lambda x: 2.0 - 19 * x, (0.095, 0.1), (0.0, 0.052), "E1 up to 5.2\u00a0%"),
+        # A crossing is no stretch of strains.
+        (lambda x: abs(x - 0.05) * 100 + 0.19, None, (0.0, 0.041), "E1 nowhere"),
+    ],
+)  # fmt: skip
+def test_where_a_modulus_is_usable(off, usable, unknown, said):
+    strain = np.linspace(0, 0.1, 101)
+    names, law = ("E1", "E2", "G12"), HypoelasticLaw.linear(600.0, 120.0, 15.0)
+    band = {n: law.modulus(n, strain) * np.array([1 - off(strain), 1 + off(strain)]) for n in names}
+    sure = SimpleNamespace(strain=dict.fromkeys(names, strain), band=band)
+    best = SimpleNamespace(valid=np.full(3, 0.1), certainty=sure)
+    fit: Any = SimpleNamespace(law=law, best=best, notes=[])
+    fit.problem = SimpleNamespace(comparisons=[SimpleNamespace(name="bubble")])
+    found = reaches(fit)["E1"]
+    assert found.usable == (usable and pytest.approx(usable, abs=6e-4))
+    assert found.unknown == (unknown and pytest.approx(unknown, abs=1.1e-3))
+    assert said in page.verdict_words(fit)
+    steps = [next_step(fit)]
+    for name in ("strips: bias", "bubble"):
+        fit.problem = SimpleNamespace(comparisons=[SimpleNamespace(name=name)])
+        steps.append(next_step(fit))
+        fit.notes = [Note(UNSTABLE, "u")]
+    whole = usable == (0.0, 0.1)
+    assert [("bias" in s, "plan" in s, "validate" in s, "first" in s) for s in steps] == [
+        (not whole, False, whole, False), (False, not whole, whole, False),
+        (False, False, False, True),
+    ]  # fmt: skip
 
 
 def test_what_is_determined_in_closed_form(together, written):
@@ -258,8 +314,10 @@ def test_starts_that_failed_other_programs_and_no_certainty(together, told, tmp_
     assert pairs["of them from the cache"] == 3
     assert told["optima_chart"][0] == pytest.approx([one.objective, np.nan], nan_ok=True)
     assert np.isnan(fit.starts()["objective"][1]) and fit.starts()["seconds"][0] == one.wall_s
-    answer = titled(found, "Moduli")
-    assert answer.rows[0][2] == f"{fit.law.beta[11]:.3g}" and "brackets" not in answer.note
+    assert titled(found, WORDS["E1"]).rows[0][1] == f"{fit.law.beta[11]:.3g}"
+    assert not any(
+        "brackets" in line for p in found.parts if isinstance(p, Words) for line in p.lines
+    )
     assert told["moduli_charts"][3] is None
     assert "pinned_charts" not in told and "uncertainty" not in fit.result
     assert fit.moduli()["sigma_relative"].isna().all()
@@ -490,6 +548,7 @@ def test_everything_of_two_tests(together):
             "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
             "mesh_error": "told", "second_order": None, "smooth_beyond_noise": {},
         },
+        "verdict": fit.result["verdict"],
         "noise_given": {}, "weights": {"one": 1.0, "two": 3.0},
     }  # fmt: skip
 

@@ -175,7 +175,8 @@ def test_an_early_end_is_a_result_with_its_reason(tmp_path, seen):
     assert pd.read_csv(tmp_path / "out" / "runs.csv")["ended"][0] == reason
     (found,) = seen
     assert len(found.warnings) == 2 and all(reason in line for line in found.warnings)
-    assert [table.title for table in found.tables] == ["Runs"]
+    assert [table.title for table in found.tables] == ["Stiffness and knee", "Runs"]
+    assert found.summary.replace("\u00a0", " ").startswith("150 mm, 90 kPa, soft: stiffness ")
     assert quiet.worst is None and not quiet.failed() and not quiet.silent()
 
 
@@ -219,7 +220,8 @@ def test_failures_errors_and_notes(tmp_path, seen):
     assert len(found.warnings) == 2 and all("failed: made to" in line for line in found.warnings)
     sure = next(part for part in found.parts if isinstance(part, Words))
     assert len(sure.lines) == 6 and sum("Assumed" in line for line in sure.lines) == 5
-    assert [table.title for table in found.tables] == ["Runs", "Against measured loads", "Notes"]
+    titles = ["Stiffness and knee", "Runs", "Against measured loads", "Notes"]
+    assert [table.title for table in found.tables] == titles
     assert [row[:3] for row in found.tables[-1].rows] == [
         ["150 mm, 90 kPa", "stiff", "of the solver"], ["150 mm, 90 kPa", "stiff", "snap"],
         ["high", "stiff", "of the solver"],

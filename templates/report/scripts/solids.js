@@ -9,6 +9,7 @@ const enlivenSolid = async (figure, data) => {
   const { said, button } = toolbar(figure.querySelector(".one"));
   svg.setAttribute("tabindex", "0");
   const [loads, nodes] = data.points.shape, faces = data.faces.shape[0];
+  const arrow = data.warp ? await unpack(data.warp) : [], warp = svg.querySelector(".warp");
   const paths = [...group.children], order = Array.from({ length: faces }, (_, k) => k);
   const eye = { turn: data.turn, raise: data.raise, scale: data.scale };
   const ends = data.shades.map((shade, k) => endsOf(shades[k], shade.shades));
@@ -20,12 +21,22 @@ const enlivenSolid = async (figure, data) => {
     const a = eye.turn * Math.PI / 180, b = eye.raise * Math.PI / 180;
     const [ca, sa, cb, sb] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
     const at = [], near = [];
-    for (let k = 0; k < nodes; k++) {
-      const [x, y, z] = [0, 1, 2].map((i) => points[3 * (load * nodes + k) + i] - data.middle[i]);
+    const seen = (every, k) => {
+      const [x, y, z] = [0, 1, 2].map((i) => every[3 * k + i] - data.middle[i]);
       const away = -sa * x + ca * y;
-      at.push(`${(data.centre[0] + eye.scale * (ca * x + sa * y)).toFixed(1)} ` +
-        `${(data.centre[1] - eye.scale * (z * cb + away * sb)).toFixed(1)}`);
-      near.push(z * sb - away * cb);
+      return [(data.centre[0] + eye.scale * (ca * x + sa * y)).toFixed(1),
+        (data.centre[1] - eye.scale * (z * cb + away * sb)).toFixed(1), z * sb - away * cb];
+    };
+    for (let k = 0; k < nodes; k++) {
+      const [across, up, nearness] = seen(points, load * nodes + k);
+      at.push(`${across} ${up}`);
+      near.push(nearness);
+    }
+    if (warp) {
+      const ends = [0, 1, 2, 3, 4].map((k) => seen(arrow, k));
+      warp.children[0].setAttribute("d", `M${ends.map((p) => `${p[0]} ${p[1]}`).join("L")}`);
+      warp.children[1].setAttribute("x", ends[1][0]);
+      warp.children[1].setAttribute("y", ends[1][1]);
     }
     const depth = order.map((_, f) =>
       [0, 1, 2, 3].reduce((sum, i) => sum + near[corners[4 * f + i]], 0));

@@ -370,6 +370,7 @@ def test_every_row_says_which_wall(banded, tmp_path, undrawn):
     shown = report.show_outcome(banded, Output(tmp_path))
     runs, errors = shown.tables
     assert runs.header[:4] == ["test", "card", "wall", "stiffness, N/mm"]
+    assert [table.title for table in shown.tables] == ["Runs", "Against measured loads"]
     names = [["soft", "slack"], ["soft", "rigid wall"], ["hard", "slack"], ["hard", "rigid wall"]]
     assert [unbroken(row[1:3]) for row in runs.rows] == names
     assert all(len(row) == len(runs.header) for row in runs.rows)
@@ -386,6 +387,27 @@ def test_every_row_says_which_wall(banded, tmp_path, undrawn):
     for row, (card, wall) in zip(rows, names, strict=True):
         assert row.startswith(f"150/90  {card}  {wall}  ")
     assert rows[3].endswith("failed: killed")
+
+
+def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undrawn):
+    """1 sigma of 8 N at 20 mm and 4 N at the knee; the rigid wall is 5 N/mm and 300 N."""
+    sigma = np.interp(WAY, [0.0, 40.0, 61.0, 80.0], [0.0, 16.0, 4.0, 4.0])
+    rigid = replace(MEASURES, stiffness=5.0, knee=(50.0, 300.0))
+    banded.__dict__["measures"] = {0: MEASURES, 1: rigid, 2: replace(MEASURES, knee=None)}
+    banded.__dict__["spreads"] = {0: sigma}
+    off = 1.96 * np.array([8.0 / 20.0, np.interp(61.0, WAY, sigma)])
+    found = banded.measured(0, "stiffness"), banded.measured(0, "knee")
+    assert found[0] == pytest.approx((4.256, 4.256 - off[0], 5.0 + off[0]))
+    assert found[1] == pytest.approx((251.0, 251.0 - off[1], 300.0 + off[1]))
+    assert banded.measured(2, "knee") is None and banded.measured(3, "stiffness") is None
+    shown = report.show_outcome(banded, Output(tmp_path))
+    first = shown.parts[0]
+    assert first.title == "Stiffness and knee" and len(first.rows) == 2
+    low, high = 4.256 - off[0], 5.0 + off[0]
+    assert unbroken(first.rows[0][2:4]) == ["4.26", f"{low:.3g} to {high:.3g}"]
+    assert unbroken(first.rows[1][2:]) == ["4.26", None, None, None, None]
+    assert "stiffness 4.26" in shown.summary.split(";")[0]
+    assert "251" in shown.summary.split(";")[0] and "61 mm" in shown.summary
 
 
 def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
