@@ -350,8 +350,8 @@ def reaches(fit: Fit) -> dict[str, Reach]:
         strain, (lower, upper) = sure.strain[name], sure.band[name]
         value = fit.law.modulus(name, strain)
         off = np.maximum(upper - value, value - lower) / value
-        spans = (_longest(strain, chosen) for chosen in (off <= USABLE, off >= NOT_KNOWN))
-        found[name] = Reach(*spans, end)
+        usable, unknown = _longest(strain, off <= USABLE), _longest(strain, off >= NOT_KNOWN)
+        found[name] = Reach(usable, unknown, end)
     return found
 
 
