@@ -4,13 +4,8 @@ Written from docs/reference/marc-deck.md and what public sources show of Marc. I
 with the adapter that writes the decks, on purpose: a mistake there must not cancel out here.
 """
 
-from __future__ import annotations
-
 import re
 from collections import deque, namedtuple
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +30,7 @@ ALWAYS = {*PARAMETERS} - {"follow for", "shell sect", "state vars", "cavity"}
 class DeckError(Exception):
     """Marc would not run this deck."""
 
-    def __init__(self, problem: str, line: int = 0, number: int = DATA_ERROR) -> None:
+    def __init__(self, problem, line=0, number=DATA_ERROR):
         self.problem, self.line, self.number = problem, line, number
         super().__init__(f"{problem} (line {line})" if line else problem)
 
@@ -53,7 +48,7 @@ Control = namedtuple("Control", "residual correction iterations")
 LoadCase = namedtuple("LoadCase", "title line conditions control increments step")
 
 
-def level(table: Table, at: Any) -> Any:
+def level(table, at):
     return np.interp(at, table.x, table.y)
 
 
@@ -63,7 +58,7 @@ class Content:
     law : "nlelast" (multipliers, and numbers of tables, of E1, E2, nu12, G12) or "hypoelastic".
     """
 
-    def __init__(self, size: dict[str, Any], has: list[str]) -> None:
+    def __init__(self, size, has):
         (self.title,), self.parameters, self.has = size["title"], has, list[str]()
         self.elements, self.nodes, self.type = size["sizing"] + size["elements"]
         self.states = sum(size.get("state vars", []))
@@ -87,7 +82,7 @@ class Deck:
     `name` one of at most 32 at the end; `r*3` is three of them.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         text = path.read_bytes()
         if not text.isascii() or b"\t" in text:
             raise DeckError("a tab, or a byte that is not ASCII")
@@ -98,30 +93,30 @@ class Deck:
         self.lines = deque((n, line) for n, line in lines if not line.startswith("$"))
         self.number, self.text = 0, ""
 
-    def fail(self, problem: str) -> DeckError:
+    def fail(self, problem):
         return DeckError(problem, self.number)
 
     @property
-    def coming(self) -> str:
+    def coming(self):
         return self.lines[0][1] if self.lines else ""
 
-    def next(self) -> str:
+    def next(self):
         if not self.lines:
             raise self.fail("the file ends here, and a block is not finished")
         self.number, self.text = self.lines.popleft()
         return self.text
 
-    def row(self, layout: str) -> list[Any]:
+    def row(self, layout):
         self.next()
         return self.fields(layout)
 
-    def rows(self, block: str, count: int, layout: str) -> Iterator[list[Any]]:
+    def rows(self, block, count, layout):
         for i in range(count):
             if self.coming[:1].isalpha():
                 raise self.fail(f"{block} ends after {i} of {count}")
             yield self.row(layout)
 
-    def fields(self, layout: str) -> list[Any]:
+    def fields(self, layout):
         found, end = [], 0
         for kind, times in re.findall(r"(\S+?)(?:\*(\d+))?(?= |$)", layout):
             for _ in range(int(times or 1)):
@@ -141,7 +136,7 @@ class Deck:
         return found
 
     @staticmethod
-    def _value(kind: str, text: str, width: int) -> Any:
+    def _value(kind, text, width):
         """Return what a field holds; None where that is not of its kind."""
         if kind[0] == "t":
             return text.rstrip()
@@ -157,12 +152,12 @@ class Deck:
             return None
         return float(f"{match[1]}e{match[2] or match[3] or 0}")
 
-    def members(self, where: str, members: list[int], most: int) -> None:
+    def members(self, where, members, most):
         if len(set(members)) < len(members) or not 1 <= min(members) <= max(members) <= most:
             raise self.fail(f"{where} has a member twice, or one that does not exist: {members}")
 
 
-def read_deck(path: Path) -> Content:
+def read_deck(path):
     deck = Deck(path)
     content = _parameters(deck)
     while (word := deck.next()[:20].rstrip()) != "end option":
@@ -176,8 +171,8 @@ def read_deck(path: Path) -> Content:
     return content
 
 
-def _parameters(deck: Deck) -> Content:
-    found: dict[str, Any] = {}
+def _parameters(deck):
+    found = {}
     while (word := deck.next()[:10].rstrip()) != "end":
         if word in found or word not in PARAMETERS:
             raise deck.fail(f"unknown parameter, or twice: {deck.text.strip()!r}")
@@ -195,7 +190,7 @@ def _parameters(deck: Deck) -> Content:
     return Content(found, list(found))
 
 
-def _block(deck: Deck, content: Content, word: str) -> None:
+def _block(deck, content, word):
     p, more = content, {"define": "t20 t20 name", "table": "name", "loadcase": "name"}
     head = deck.fields(f"t20 {'11' if word == 'optimize' else more.get(word, '')}")[1:]
     match word:
@@ -308,9 +303,9 @@ def _block(deck: Deck, content: Content, word: str) -> None:
             raise deck.fail(f"unknown model option {deck.text.strip()!r}")
 
 
-def set_members(deck: Deck) -> list[int]:
+def set_members(deck):
     """Return numbers and runs `a to b`, at most eight a line; a line that goes on ends in c."""
-    members: list[int] = []
+    members = []
     more = True
     while more:
         more = deck.next().split()[-1:] == ["c"]
@@ -322,14 +317,14 @@ def set_members(deck: Deck) -> list[int]:
     return members
 
 
-def _names(deck: Deck) -> list[str]:
+def _names(deck):
     names = [deck.row("name")[0] for _ in range(*deck.row("i"))]
     if len(set(names)) < len(names):
         raise deck.fail("a condition twice in a load case")
     return names
 
 
-def _each_condition(deck: Deck, content: Content, head: str) -> Iterator[tuple[str, int]]:
+def _each_condition(deck, content, head):
     deck.row("")
     while deck.coming[:1] == " ":
         (name,) = deck.row(head)
@@ -338,8 +333,8 @@ def _each_condition(deck: Deck, content: Content, head: str) -> Iterator[tuple[s
         yield name, deck.number
 
 
-def _case(deck: Deck) -> LoadCase:
-    found: dict[str, Any] = {"title": ""}
+def _case(deck):
+    found = {"title": ""}
     while (word := deck.next()[:20].rstrip()) != "continue":
         word = "title" if word.startswith("title ") else word
         if found.get(word):
@@ -369,7 +364,7 @@ def _case(deck: Deck) -> LoadCase:
     return LoadCase(found["title"], *found["loadcase"], *rest)
 
 
-def _check(content: Content) -> None:
+def _check(content):
     """Raise DeckError for what no block can know alone, and Marc stops at."""
     for word in ("solver", "connectivity", "coordinates", "geometry", "loadcase", "post"):
         if word not in content.has:
@@ -391,7 +386,7 @@ def _check(content: Content) -> None:
     _check_elements(content)
 
 
-def _check_references(content: Content) -> None:
+def _check_references(content):
     on = [content.law_on, *(f[0] for f in content.frames), *(t[1] for t in content.thickness)]
     on += [body.on for body in content.bodies if not body.rigid]
     uses = [("element", name, content.law) for name in on + [content.gas_on] * bool(content.gas)]
@@ -408,13 +403,13 @@ def _check_references(content: Content) -> None:
             raise DeckError(f"{where}: there is no table {number} of variable type {variable}")
 
 
-def _check_load_cases(content: Content) -> None:
+def _check_load_cases(content):
     """Raise DeckError unless named conditions are there, and two hold a degree of freedom alike."""
     named = [("before end option", 0, content.initial)]
     for title, line, names in named + [(c.title, c.line, c.conditions) for c in content.cases]:
         if unknown := {*names} - {*content.conditions}:
             raise DeckError(f"load case {title!r} names {unknown}, which is not defined", line)
-        said: dict[tuple[int, int], tuple[float, int]] = {}
+        said = {}
         for name in names:
             c = content.conditions[name]
             if line == 0 and (c.kind != "fixed" or any(c.values)):
@@ -426,7 +421,7 @@ def _check_load_cases(content: Content) -> None:
                         raise DeckError(f"{problem}, one of them by {name!r}", c.line)
 
 
-def _check_elements(content: Content) -> None:
+def _check_elements(content):
     """Raise DeckError unless each has one thickness, frame and material, and lies flat in both."""
     sets = content.sets["element"]
     for what, names in (

@@ -1,23 +1,16 @@
 """Run a job as run_marc does: `python -m marc_stand_in.job -j NAME -v no -b no ...`.
 
-The deck NAME.dat becomes .sts, .out, .log and .t19, written while the job runs. `run_marc` beside
-this file is the program; this folder's parent is on the path.
-
 `MARC_STAND_IN_FAULT`, or the file `fault` in the folder `MARC_STAND_IN_FOLDER`, names one of
 `FAULTS`, and after an @ the runs with that fault, counted from 1: `3015@2,3`; all runs without.
 Every run adds a line to the file `runs` of that folder (job, fault), by which runs are counted.
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import os
-import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,18 +18,14 @@ from bubblefit.errors import BubblefitError
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from marc_files import STS_HEAD, sts_line, t19_frame, t19_head
 
-from .convergence import State, control_of, converging
-from .deck import Array, Content, DeckError, read_deck
+from .deck import DeckError, read_deck
 from .laws import NotCompiled, compiled, law_of_subroutine, law_of_tables
-from .models import model_of, schedule_of
+from .models import State, control_of, converging, model_of, schedule_of
 
-#: No smaller step half-way, also with return code 0; a good end with return code 1; nothing begins,
-#: and files of an earlier job are there (folder `stale`); half-way no disk, no process, or nothing
-#: more, in a child either; half of the .t19; an element inside out; 3004 half-way; an increment
-#: twice; no file at all; a compiler that does not take the subroutine.
+#: Half-way no smaller step, no process, no disk, or nothing more, in a child either; 3004 half-way;
+#: half of the .t19; an element inside out; nothing begins without a licence.
 FAULTS = (
-    "none", "3015", "code0", "code1", "licence", "stale", "disk full", "killed", "hanging",
-    "truncated", "inside out", "early", "repeated", "silent", "not compiled",
+    "none", "3015", "killed", "disk full", "hanging", "early", "truncated", "inside out", "licence"
 )  # fmt: skip
 #: Exit numbers: a good end; no equilibrium; a subroutine that does not compile (run_marc's own).
 NORMAL, NO_SMALLER_STEP, NOT_COMPILED = 3004, 3015, 3
@@ -46,7 +35,7 @@ class Ended(Exception):
     """The job is over before its last increment, with this exit number."""
 
 
-def command_of(arguments: Sequence[str]) -> argparse.Namespace:
+def command_of(arguments):
     """Return job, folder, user and background of run_marc's options, current and older ones."""
     counts = [str(n) for n in range(1, 1000)]
     parser = argparse.ArgumentParser("run_marc", allow_abbrev=False, add_help=False)
@@ -54,23 +43,17 @@ def command_of(arguments: Sequence[str]) -> argparse.Namespace:
     # Without -b no run_marc returns at once and Marc goes on in the background.
     parser.add_argument("-b", choices=("no", "n"), required=True)
     parser.add_argument("-v", choices=("yes", "no", "y", "n"))
-    parser.add_argument("-dir", dest="folder", type=Path, default=Path("."))
     parser.add_argument("-u", dest="user", type=Path)
     for option in ("-nte", "-nts", "-nps", "-nprocd", "-nthread"):
         parser.add_argument(option, choices=counts, metavar="COUNT")
-    for option in ("-save", "-prog", "-q"):
-        parser.add_argument(option)
     found = parser.parse_args(arguments)
     found.job = found.job.removesuffix(".dat")
-    if not (found.folder / f"{found.job}.dat").exists():
+    if not (Path(f"{found.job}.dat")).exists():
         parser.exit(1, f"run_marc: {found.job}.dat: no such file\n")
-    if found.user:
-        user = found.folder / found.user
-        found.user = user if user.suffix else user.with_suffix(".f")
     return found
 
 
-def fault_of(job: str) -> str:
+def fault_of(job):
     folder = Path(os.environ.get("MARC_STAND_IN_FOLDER", os.devnull))
     said = os.environ.get("MARC_STAND_IN_FAULT", "")
     if not said and (folder / "fault").exists():
@@ -86,23 +69,15 @@ def fault_of(job: str) -> str:
     return kind
 
 
-def run(command: argparse.Namespace) -> tuple[int, str]:
+def run(command):
     fault = fault_of(command.job)
-    if fault == "silent":
-        return 0, ""
-    if fault == "stale":
-        for left in (Path(os.environ["MARC_STAND_IN_FOLDER"]) / "stale").iterdir():
-            shutil.copy2(left, command.folder / left.name)
-        return 1, "could not obtain license for MARC"
-    files = Files(command.folder, command.job)
+    files = Files(command.job)
     if fault == "licence":
         # From what users quote of Marc's output; there is no exit number in the .sts.
         files.error("could not obtain license: license server is down or has none free")
         return 1, "could not obtain license for MARC"
     try:
-        if command.user is not None and fault == "not compiled":
-            raise NotCompiled("hypela2.f:1: Error: told to fail")
-        content = read_deck(command.folder / f"{command.job}.dat")
+        content = read_deck(Path(f"{command.job}.dat"))
         solve(content, command, files, fault)
         number = NORMAL
     except DeckError as error:
@@ -111,7 +86,7 @@ def run(command: argparse.Namespace) -> tuple[int, str]:
         number = error.number
     except NotCompiled as error:
         files.write("log", f"{error}\n")
-        (command.folder / f"{command.job}.sts").unlink()
+        Path(f"{command.job}.sts").unlink()
         return NOT_COMPILED, f"{error}\n compile or link error\n Exit number {NOT_COMPILED}"
     except OSError as error:
         files.error(f"write error: {error.strerror}")
@@ -123,30 +98,29 @@ def run(command: argparse.Namespace) -> tuple[int, str]:
     files.write("sts", f"\n Job ends with exit number :    {number}\n")
     files.write("out", f"\n marc exit number {number}\n")
     files.write("log", f" Exit number {number}\n")
-    code = {"code0": 0, "code1": 1}.get(fault, 0 if number == NORMAL else number % 256 or 1)
-    return code, f" Exit number {number}"
+    return 0 if number == NORMAL else number % 256 or 1, f" Exit number {number}"
 
 
 class Files:
     """What a job writes; every line is on disk at once."""
 
-    def __init__(self, folder: Path, name: str) -> None:
+    def __init__(self, name):
         ends = ("sts", "out", "log", "t19")
-        self.open = {e: (folder / f"{name}.{e}").open("w", encoding="ascii") for e in ends}
+        self.open = {e: Path(f"{name}.{e}").open("w", encoding="ascii") for e in ends}
         self.write("sts", STS_HEAD)
         self.write("out", f" MSC Marc stand-in of bubblefit (no MSC software), job {name}\n")
 
-    def write(self, end: str, text: str) -> None:
+    def write(self, end, text):
         self.open[end].write(text)
         self.open[end].flush()
 
-    def error(self, text: str) -> None:
-        for end in ("out", "log"):
-            self.write(end, f" *** error - {text}\n")
+    def error(self, text):
+        self.write("out", f" *** error - {text}\n")
+        self.write("log", f" *** error - {text}\n")
 
 
-def solve(content: Content, command: argparse.Namespace, files: Files, fault: str) -> None:
-    library = None if command.user is None else compiled(command.user, command.folder)
+def solve(content, command, files, fault):
+    library = None if command.user is None else compiled(command.user, Path("."))
     if library is None and content.law == "hypoelastic":
         raise DeckError("hypoelastic with a user subroutine, and none was given (-u)")
     nlelast = content.law == "nlelast"
@@ -176,7 +150,7 @@ def solve(content: Content, command: argparse.Namespace, files: Files, fault: st
 class Running:
     """What is written with every increment; rests : in which increments nothing moves."""
 
-    def __init__(self, content: Content, files: Files, fault: str) -> None:
+    def __init__(self, content, files, fault):
         self.content, self.files, self.fault, self.increment = content, files, fault, 0
         self.schedule, self.rests = schedule_of(content), np.zeros(0, dtype=bool)
         count = content.cases[-1].increments
@@ -185,18 +159,18 @@ class Running:
         files.write("t19", t19_head(content.coordinates, quads, content.type, content.title))
         files.write("t19", t19_frame(0, 0.0, self._vectors(State(zero, zero, 0.0))))
 
-    def found(self, state: State) -> None:
+    def found(self, state):
         """Write the solver's next increment, and those after it in which nothing moves."""
         self._write(state)
         while self.increment < len(self.rests) and self.rests[self.increment]:
             self._write(state)
 
-    def _write(self, state: State) -> None:
+    def _write(self, state):
         i, s, u = self.increment, self.schedule, state.displacement
         self.increment = n = i + 1
         time = float(s.times[i])
-        line = sts_line(int(s.case[i]) + 1, n, 3 * n, s.steps[i], time, u.min(), u.max())
-        self.files.write("sts", line)
+        now = sts_line(int(s.case[i]) + 1, n, 3 * n, s.steps[i], time, u.min(), u.max())
+        self.files.write("sts", now)
         self.files.write("out", f" end of increment {n:8d}, total time {time:.6E}\n")
         if n % self.content.every == 0:
             self.files.write("t19", t19_frame(n, time, self._vectors(state)))
@@ -212,12 +186,10 @@ class Running:
             child.wait()
         elif self.fault == "disk full":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        elif self.fault in ("3015", "code0", "early"):
+        elif self.fault in ("3015", "early"):
             raise Ended(NORMAL if self.fault == "early" else NO_SMALLER_STEP)
-        elif self.fault == "repeated":
-            self.files.write("sts", line)
 
-    def _vectors(self, state: State) -> dict[str, Array]:
+    def _vectors(self, state):
         """Return displacement (mm), reaction and contact forces (N) of every node."""
         content = self.content
         case = content.cases[int(self.schedule.case[self.increment - 1])]

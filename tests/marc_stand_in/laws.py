@@ -6,29 +6,22 @@ between two of 121 points. Points on no such curve are refused. Those of a subro
 in its stiffness, and its stress after one increment has to agree with them.
 """
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from bubblefit.materials.forms.base import UNLIMITED
 from bubblefit.materials.law import HypoelasticLaw
-from numpy.typing import ArrayLike
 
-from .deck import Array, Content, DeckError
+from .deck import DeckError
 
 #: Relative, of the largest modulus: the deck has 13 digits.
 EXACT = 1e-9
-#: Strain over which a table's modulus jumps, at most.
-JUMP = 1e-5
-#: Points that a cubic is recognised by: one more than it has coefficients.
-FEWEST = 5
+#: Strain over which a table's modulus jumps, at most; points that a cubic is recognised by.
+JUMP, FEWEST = 1e-5, 5
 #: Strains at which HYPELA2 is asked for its moduli.
 ASKED = np.linspace(0.0, 0.6, 1201)
 #: What Marc has for a subroutine to end the job with.
@@ -49,54 +42,44 @@ class NotCompiled(Exception):
 class Piecewise:
     """The form of a law whose beta holds the coefficients of every piece of E1, E2 and G12.
 
-    ends : the strains at which one piece of E1, E2, G12 gives way to the next.
+    ends : the strains at which pieces of E1, E2, G12 end, equally many of each.
     """
 
     ends: tuple[tuple[float, ...], ...]
+    size: int
     name = "piecewise"
 
     @property
-    def size(self) -> int:
-        return 4 * sum(len(ends) + 1 for ends in self.ends)
-
-    @property
-    def free(self) -> range:
+    def free(self):
         return range(self.size)
 
-    def piece_map(self) -> Array:
-        most = max(map(len, self.ends)) + 1
-        whole, first = np.zeros((3, most, 4, self.size)), 0
-        for component, ends in enumerate(self.ends):
-            for piece in range(most):
-                begin = first + 4 * min(piece, len(ends))
-                whole[component, piece, :, begin : begin + 4] = np.eye(4)
-            first += 4 * (len(ends) + 1)
-        return whole
+    def piece_map(self):
+        return np.eye(self.size).reshape(3, -1, 4, self.size)
 
-    def uppers(self) -> Array:
-        most = max(map(len, self.ends)) + 1
-        return np.array([[*ends, *[UNLIMITED] * (most - len(ends))] for ends in self.ends], float)
+    def uppers(self):
+        return np.array(self.ends)
 
-    def grid(self, component: int, end: float) -> Array:
+    def grid(self, component, end):
         knots = [0.0, *(at for at in self.ends[component] if at < end), end]
         return np.unique(np.concatenate([np.linspace(a, b, 31) for a, b in pairwise(knots)]))
 
 
-def piecewise_law(
-    e1: ArrayLike, e2: ArrayLike, g12: ArrayLike, nu12: float = 0.24, thickness: str = "constant"
-) -> HypoelasticLaw:
+def piecewise_law(e1, e2, g12, nu12=0.24, thickness="constant"):
     """Return the law of three moduli (n, 5), MPa: upper end and coefficients of each piece."""
-    curves = [np.asarray(curve, dtype=float) for curve in (e1, e2, g12)]
-    form = Piecewise(tuple(tuple(curve[:-1, 0].tolist()) for curve in curves))
-    beta = np.concatenate([curve[:, 1:].ravel() for curve in curves])
+    curves, most = [np.array(curve, float) for curve in (e1, e2, g12)], max(map(len, (e1, e2, g12)))
     ends = np.array([curve[-1, 0] for curve in curves])
-    return HypoelasticLaw(beta, nu12, ends, thickness, form)  # type: ignore[arg-type]
+    for curve in curves:
+        curve[-1, 0] = UNLIMITED
+    # The last piece again, where another modulus has more.
+    pieces = np.array([np.pad(c, ((0, most - len(c)), (0, 0)), "edge") for c in curves])
+    form = Piecewise(tuple(map(tuple, pieces[..., 0].tolist())), 12 * most)
+    return HypoelasticLaw(pieces[..., 1:].ravel(), nu12, ends, thickness, form)
 
 
-def law_of_tables(content: Content) -> HypoelasticLaw:
+def law_of_tables(content):
     if content.moduli[2] != 0:
         raise DeckError("nlelast: nu12 with a table")
-    curves: list[ArrayLike] = []
+    curves = []
     for name, k in (("E1", 0), ("E2", 1), ("G12", 3)):
         factor, number = content.multipliers[k], content.moduli[k]
         if number == 0:
@@ -118,9 +101,7 @@ def law_of_tables(content: Content) -> HypoelasticLaw:
     return piecewise_law(*curves, content.multipliers[2])
 
 
-def _pieces(
-    x: Array, y: Array, what: str, modulus: Callable[[float], float] | None = None
-) -> Array:
+def _pieces(x, y, what, modulus=None):
     """Return pieces (n, 5) of the modulus through points from zero strain up.
 
     modulus : finds it anywhere; without it one piece gives way to the next in a point.
@@ -150,7 +131,7 @@ def _pieces(
     return np.array(rows)
 
 
-def _stretch(x: Array, y: Array, size: float) -> tuple[int, Array | None]:
+def _stretch(x, y, size):
     """Return the last of the first points that are on one cubic to `size`, and the cubic.
 
     Equal values are one from two on; other cubics from FEWEST on.
@@ -167,7 +148,7 @@ def _stretch(x: Array, y: Array, size: float) -> tuple[int, Array | None]:
     return last, cubic
 
 
-def _cubic(x: Array, y: Array, size: float) -> Array | None:
+def _cubic(x, y, size):
     """Return the one cubic (4,) through all points, to `size`; None where there is none."""
     weights = float(np.abs(x).max()) ** np.arange(3, -1, -1)
     rows = np.vander(x, 4) / weights
@@ -175,28 +156,24 @@ def _cubic(x: Array, y: Array, size: float) -> Array | None:
     return None if np.abs(rows @ found - y).max() > size else found / weights
 
 
-def compiled(source: Path, folder: Path) -> ctypes.CDLL:
+def compiled(source, folder):
     compiler = shutil.which("gfortran")
     if compiler is None or not source.exists():
         raise NotCompiled(f"gfortran: command not found, or no such file: {source.name}")
-    folder = folder.resolve()
     host, library = folder / "standin_quit.f", folder / "standin_hypela2.so"
     host.write_text(QUIT)
     command = [compiler, "-O1", "-fPIC", "-shared", "-ffixed-form", str(source), str(host)]
     done = subprocess.run([*command, "-o", str(library)], capture_output=True, text=True)
     if done.returncode:
         raise NotCompiled(done.stderr or f"gfortran ended with {done.returncode}")
-    loaded = ctypes.CDLL(str(library))
-    host.unlink()
-    library.unlink()
-    return loaded
+    return ctypes.CDLL(str(library.resolve()))
 
 
-def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
+def law_of_subroutine(library, states):
     """Return the law that the subroutine carries; DeckError: its moduli are no cubics."""
     asked = ctypes.c_int32.in_dll(library, "asked_")
 
-    def called(k: int, strain: float, more: float = 0.0, thin: int = 0) -> tuple[float, Array]:
+    def called(k, strain, more=0.0, thin=0):
         """Return Cauchy stress and stiffness (3, 3) of component k; NaN: it ended the job."""
         d, g, s, zero = np.zeros((3, 3), order="F"), np.zeros(3), np.zeros(3), np.zeros(99)
         e, de, t = np.zeros(3), np.zeros(3), np.zeros(states)
@@ -219,12 +196,12 @@ def law_of_subroutine(library: ctypes.CDLL, states: int) -> HypoelasticLaw:
     curves = []
     for k in range(3):
 
-        def modulus(own: float, k: int = k) -> float:
+        def modulus(own, k=k):
             if k == 0:
                 return 0.5 * (own + np.sqrt(own * own - 4.0 * own * nu12**2 * d[1, 1] * coupling))
             return own / (1.0 + own * nu12**2 / (d[0, 0] * coupling)) if k == 1 else own
 
-        def at(strain: float, k: int = k, modulus: Callable[[float], float] = modulus) -> float:
+        def at(strain, k=k, modulus=modulus):
             return modulus(called(k, strain, 0.0, thin)[1][k, k])
 
         y = np.array([at(strain) for strain in ASKED])

@@ -1,22 +1,21 @@
-"""Build models of the membrane solver from decks: flat sheets, strips, bent cylinders."""
-
-from __future__ import annotations
+"""Build models of the membrane solver from decks, and converge it as their control blocks ask."""
 
 from collections import namedtuple
-from typing import Any
+from contextlib import contextmanager
 
 import numpy as np
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import Bending, Gas, InflatedModel, RigidCylinder
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import UniaxialModel
+from bubblefit.solvers.membrane import closed, newton
 from bubblefit.solvers.membrane.bending import BITE
 from bubblefit.solvers.membrane.closed import brought_to_touch
+from bubblefit.solvers.membrane.factorisation import SingularTangent
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from numpy.typing import NDArray
 
-from .deck import TIME, Array, Body, Content, DeckError, level
+from .deck import TIME, DeckError, level
 
 #: mm that a corner of a patch may be away from the circle through all of them, and a support from
 #: where it touches the inflated membrane.
@@ -27,7 +26,7 @@ ROUND, NEAR = 1e-6, 0.2
 Schedule = namedtuple("Schedule", "times case steps first last")
 
 
-def schedule_of(content: Content) -> Schedule:
+def schedule_of(content):
     case = np.repeat(np.arange(len(content.cases)), [case.increments for case in content.cases])
     steps = np.array([content.cases[i].step for i in case])
     times = np.cumsum(steps)
@@ -39,7 +38,7 @@ def schedule_of(content: Content) -> Schedule:
     return Schedule(times, case, steps, content.cases[0].conditions, content.cases[-1].conditions)
 
 
-def pressures(content: Content, schedule: Schedule) -> list[float]:
+def pressures(content, schedule):
     """Return the MPa that inflates, at the increments of the first load case."""
     loads = [content.conditions[name] for name in schedule.first]
     loads = [c for c in loads if c.kind != "fixed"]
@@ -51,9 +50,9 @@ def pressures(content: Content, schedule: Schedule) -> list[float]:
     return level(content.tables[loads[0].tables[0]], times).tolist()
 
 
-def held(content: Content, names: list[str]) -> dict[int, tuple[int, ...]]:
+def held(content, names):
     """Return by node (from 0) the translations (0 to 2) that these conditions hold at zero."""
-    found: dict[int, set[int]] = {}
+    found = {}
     for c in (content.conditions[name] for name in names):
         for dof, value in zip(c.dofs, c.values, strict=True) if c.dofs else ():
             if dof <= 3 and value == 0.0:
@@ -62,9 +61,7 @@ def held(content: Content, names: list[str]) -> dict[int, tuple[int, ...]]:
     return {node: tuple(sorted(dofs)) for node, dofs in sorted(found.items())}
 
 
-def supported(
-    content: Content, nodes: dict[int, tuple[int, ...]], **sets: Any
-) -> tuple[Mesh, dict[str, tuple[int, ...]]]:
+def supported(content, nodes, **sets):
     """Return the mesh, with a node set for each way of being held, and what each holds."""
     names = {f"held_{''.join(map(str, dofs))}": dofs for dofs in nodes.values()}
     for name, dofs in names.items():
@@ -72,9 +69,7 @@ def supported(
     return Mesh(content.coordinates, (content.connectivity - 1).astype(np.intp), sets), names
 
 
-def model_of(
-    content: Content, schedule: Schedule, law: HypoelasticLaw
-) -> tuple[Any, NDArray[np.bool_]]:
+def model_of(content, schedule, law):
     """Return the model, and in which increments (n,) of the deck nothing moves.
 
     DeckError: Marc would run this, the stand-in cannot.
@@ -101,7 +96,7 @@ def model_of(
     return _bent(content, schedule, law, slack) if content.gas else (slack, rests)
 
 
-def _strip(content: Content, schedule: Schedule, thickness: float, warp: Array) -> UniaxialModel:
+def _strip(content, schedule, thickness, warp):
     """Return the strip; its gauge is a line along the pull, from a pulled node to a held one."""
     conditions = [content.conditions[name] for name in schedule.first]
     (name, moved), *more = [
@@ -123,9 +118,7 @@ def _strip(content: Content, schedule: Schedule, thickness: float, warp: Array) 
     raise DeckError("stand-in: no pulled node with a held one above it")
 
 
-def _bent(
-    content: Content, schedule: Schedule, law: HypoelasticLaw, slack: InflatedModel
-) -> tuple[InflatedModel, NDArray[np.bool_]]:
+def _bent(content, schedule, law, slack):
     """Return the inflated cylinder bent between the deck's bodies, and when nothing moves."""
     kinds = [[content.conditions[n].load for n in c.conditions] for c in content.cases]
     if [[k for k in case if k] for case in kinds] != [[1], [2], [2]]:
@@ -148,9 +141,7 @@ def _bent(
     return model, rests
 
 
-def _bodies(
-    content: Content, schedule: Schedule, position: Array
-) -> tuple[RigidCylinder, RigidCylinder, Array]:
+def _bodies(content, schedule, position):
     """Return support, collar, and mm of the collar below touching, after inflation."""
     support, collar = content.bodies[1:]
     post, ring = support_of(support), collar_of(collar)
@@ -178,18 +169,15 @@ def _bodies(
     return post, ring, -heights[1][after] - free
 
 
-def support_of(body: Body) -> RigidCylinder:
+def support_of(body):
     """Return a post along x: all corners on one circle, patches facing away from its axis."""
     centre, radius = _circle(body.patches.reshape(-1, 3)[:, 1:], body)
     _facing(body, np.array([0.0, *centre]), 0, 1.0)
     return RigidCylinder(body.name, (1.0, 0.0, 0.0), (0.0, *centre), radius)
 
 
-def collar_of(body: Body) -> RigidCylinder:
-    """Return a ring along z: its inner cylinder, and a mouth on a circle in planes of the axis.
-
-    What is there has to be a part of the ring that is alike on both sides of z = 0.
-    """
+def collar_of(body):
+    """Return a ring along z: its inner cylinder, and a mouth on a circle in planes of the axis."""
     corners = body.patches.reshape(-1, 3)
     rows = np.unique(np.round(corners[:, 2], 6))
     circles = [_circle(corners[np.abs(corners[:, 2] - z) < 1e-5, :2], body) for z in rows]
@@ -206,11 +194,8 @@ def collar_of(body: Body) -> RigidCylinder:
     return RigidCylinder(body.name, (0.0, 0.0, 1.0), place, radius, True, length, fillet)
 
 
-def first_touch(body: Body, nodes: Array) -> float:
-    """Return mm that the patches of a ring go down until one of `nodes` (n, 3) lies on one of them.
-
-    Straight down from each patch: a node above its plane, and between its ends along z, is met.
-    """
+def first_touch(body, nodes):
+    """Return mm that the patches of a ring go down until one of `nodes` (n, 3) is on one."""
     found = np.inf
     for patch in body.patches:
         a, normal = patch[0], np.cross(patch[1] - patch[0], patch[2] - patch[0])
@@ -224,7 +209,7 @@ def first_touch(body: Body, nodes: Array) -> float:
     return found
 
 
-def _circle(points: Array, body: Body) -> tuple[Array, float]:
+def _circle(points, body):
     """Return centre (2,) and radius of the circle through all points (n, 2)."""
     if len(points) < 3:
         raise DeckError(f"body {body.name} has no patches, or no rounded mouth")
@@ -238,7 +223,7 @@ def _circle(points: Array, body: Body) -> tuple[Array, float]:
     return middle + np.array([a, b]), radius
 
 
-def _facing(body: Body, centre: Array, axis: int, outwards: float) -> None:
+def _facing(body, centre, axis, outwards):
     """Raise DeckError unless corners are counter-clockwise seen from the fabric."""
     p = body.patches
     arm = p.mean(axis=1) - centre
@@ -246,3 +231,101 @@ def _facing(body: Body, centre: Array, axis: int, outwards: float) -> None:
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     if (outwards * np.einsum("pk,pk->p", normal, arm) <= 0).any():
         raise DeckError(f"body {body.name}: a patch shows the fabric its back")
+
+
+#: displacement (n, 3) mm, unbalance (n, 3) N: what supports take; contact (n, 3) N, or 0.
+State = namedtuple("State", "displacement unbalance contact")
+
+
+def control_of(content):
+    """Return what all load cases ask for; DeckError where they differ, which Marc would run."""
+    first, *others = [case.control for case in content.cases]
+    if any(other != first for other in others):
+        raise DeckError("stand-in: one control for all load cases")
+    return first
+
+
+@contextmanager
+def converging(control, found=None):
+    """Within, converge every equilibrium of the membrane solver as `control` asks, no better.
+
+    The largest residual force is at most `residual` times the largest reaction, and the largest
+    correction of the last iteration at most `correction` times the largest displacement of the
+    increment so far. No increment goes without an iteration, and none has chord steps.
+
+    found : is called with every increment but those that the solver adds to pass a snap.
+    """
+    unbalance, accept, plain = Membrane.unbalance, Membrane.accept, Membrane.equilibrium
+    searched, chords = closed.searched_equilibrium, newton.CHORD_BELOW
+
+    def measured(self, u, pressure, with_tangent):
+        ratio = unbalance(self, u, pressure, with_tangent)
+        if not hasattr(self, "increment_start"):
+            # A membrane without stress begins at rest; one with stress where another one ended.
+            self.increment_start = u.copy() if self.strain_old.any() else np.zeros_like(u)
+        self.evaluated = u.copy()
+        force = np.abs(self.residual)
+        reaction = float(np.delete(force, self.free).max(initial=0.0))
+        if ratio == np.inf or not reaction > 0:
+            return ratio
+        return float(force[self.free].max()) / reaction
+
+    def accepted(self):
+        accept(self)
+        self.increment_start = self.evaluated
+        bodies = getattr(self, "bodies", ())
+        if found is None or (getattr(self, "gas", None) is not None and not bodies):
+            return
+        # Residuals hold the push of the bodies as well, with its sign changed: gone from there.
+        residual = self.residual.reshape(self.reference.shape).copy()
+        found(State(self.evaluated, residual, sum(self.contact) if bodies else 0.0))
+
+    def full(original):
+        def equilibrium(self, u, pressure):
+            self.tolerance = control.residual
+            tangent, last = self.tangent, [np.inf]
+            solve = tangent.solve
+
+            def solved(rhs):
+                answer = solve(rhs)
+                last[0] = float(np.abs(answer).max())
+                return answer
+
+            tangent.solve = solved
+            try:
+                end = original(self, u, pressure)
+            finally:
+                del tangent.solve
+            return None if end is None else _corrected(self, end, pressure, last[0], control)
+
+        return equilibrium
+
+    Membrane.unbalance, Membrane.accept, Membrane.equilibrium = measured, accepted, full(plain)
+    closed.searched_equilibrium, newton.CHORD_BELOW = full(searched), 0.0
+    try:
+        yield
+    finally:
+        Membrane.unbalance, Membrane.accept, Membrane.equilibrium = unbalance, accept, plain
+        closed.searched_equilibrium, newton.CHORD_BELOW = searched, chords
+
+
+def _corrected(membrane, u, pressure, last, control):
+    """Iterate from u (n, 3), whose residual is small, until the `last` correction (mm) is, too."""
+    u, before = u.copy(), np.inf
+    for _ in range(control.iterations):
+        norm = membrane.unbalance(u, pressure, with_tangent=True)
+        # A residual that is small and falls no further is rounding.
+        settled = norm <= control.residual or 0.5 * before < norm < newton.ROUNDING_BELOW
+        increment = float(np.abs(u - membrane.increment_start).max())
+        if settled and last <= control.correction * increment:
+            return u
+        try:
+            membrane.tangent.factor()
+        except SingularTangent:
+            return None
+        step = -membrane.tangent.solve(membrane.residual[membrane.free])
+        u.reshape(-1)[membrane.free] += step
+        last, before = float(np.abs(step).max()), norm
+        if not np.isfinite(last):
+            return None
+    return None

@@ -1,7 +1,5 @@
 """Fits to strips of constant moduli, nearly all in closed form, and to a bubble of 48 quads."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import bubblefit as bf

@@ -1,13 +1,9 @@
 """A fit from Python: the same result as the command, tables, interruption, several tests."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
@@ -20,13 +16,13 @@ from bubblefit.experiments.kinds import Around, Doubt, Judgement, laws_around
 from bubblefit.materials.card import CardCertainty, MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.reports.content import Exhibit, Report, Table, read_page_data
+from bubblefit.reports.content import Exhibit, Table, read_page_data
 from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
 from bubblefit.runs.fit import Check
 from bubblefit.runs.folder import PRESENTERS
-from bubblefit.runs.predictions import Predictions, RunEvent, predict
+from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import notes_of_fit
 from bubblefit.runs.setup import prepare_fit, shared_unknowns
 from bubblefit.runs.starts import StartRecord
@@ -155,7 +151,6 @@ def test_the_best_start_is_the_one_run_again(fitted):
 
 
 def test_the_command_says_so_and_writes_no_result(fitted, tmp_path, monkeypatch):
-    """A start whose moduli give another objective from the unloaded state: exit 4, a page."""
     ended = replace(fitted.best.ranked[0], objective=fitted.objective + 1e-3)
     monkeypatch.setattr(
         "bubblefit.runs.executor.Executor.run_starts", lambda *a: iter([replace(ended, number=0)])
@@ -175,7 +170,7 @@ def test_the_command_says_so_and_writes_no_result(fitted, tmp_path, monkeypatch)
     assert "from the unloaded state" in done.stderr
 
 
-def maps_and_surface_say_what_the_table_says(fit: bf.Fit, folder: Path) -> None:
+def maps_and_surface_say_what_the_table_says(fit, folder):
     """Of the first bubble: every value of the page beside residuals.csv and the history."""
     parts = list(read_page_data(folder).parts)
     (maps,) = [p for p in parts if isinstance(p, Maps) and p.name == "bubble 1 maps"]
@@ -263,7 +258,7 @@ def test_derivatives_by_the_solver_or_a_surrogate(together):
 @pytest.mark.parametrize(("external", "tries"), [(True, 2), (False, 1)])
 def test_another_program_gets_a_second_try(together, external, tries):
     problem = together.setup.problem()
-    asked: list[bool] = []
+    asked = []
 
     def fail(*_, **__):
         asked.append(True)
@@ -279,7 +274,6 @@ def test_another_program_gets_a_second_try(together, external, tries):
 
 @pytest.mark.parametrize(("off", "fails"), [(0.9, False), (1.1, True), (-0.9, False), (-1.1, True)])
 def test_what_counts_as_the_same_objective(together, off, fails):
-    """1e-5 of it, and a millionth of what the noise adds."""
     problem, first = together.setup.problem(), together.best.ranked[0]
     noise = noise_of(problem)
     assert first.objective is not None
@@ -304,9 +298,9 @@ def test_noise_is_what_a_perfect_law_leaves(together):
 SURE, VAGUE = Doubt("unit", True, "off by 1000"), Doubt("slack", False, "0.2 mm of slack")
 
 
-def looked(*judgements: Judgement) -> Check:
+def looked(*judgements):
     tests = [SimpleNamespace(test=SimpleNamespace(name=j.test, kind="made")) for j in judgements]
-    setup: Any = SimpleNamespace(tests=tests, project=SimpleNamespace(title="made"))
+    setup = SimpleNamespace(tests=tests, project=SimpleNamespace(title="made"))
     return Check(setup, judgements)
 
 
@@ -316,7 +310,7 @@ FINE = Judgement("three", (), frozenset())
 
 
 def test_a_look_at_data(tmp_path, monkeypatch):
-    seen: list[Report] = []
+    seen = []
     presenter = import_module(f"bubblefit.reports.{PRESENTERS['Check'][0]}")
     monkeypatch.setattr(presenter, "write_report", lambda _, report: seen.append(report))
 
@@ -355,17 +349,17 @@ def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
 
 
-def card(directions: np.ndarray = DIRECTIONS, e1: float = E1) -> MaterialCard:
+def card(directions=DIRECTIONS, e1=E1):
     law = HypoelasticLaw.linear(e1, 150.0, 20.0)
     return MaterialCard(law, 0.81, "sure", "", CardCertainty(directions, "made"))
 
 
-def predictions(folder: Path, own: MaterialCard, **options: object) -> Predictions:
+def predictions(folder, own, **options):
     project = read_project(write_project(folder))
     return predict(project, "high", cards={"sure": own}, jobs=1, **options)
 
 
-def slope(folder: Path) -> np.ndarray:
+def slope(folder):
     """N per MPa of E1 at the frames, by the formula."""
     loads = [predictions(folder, replace(card(), certainty=None,
                                          law=HypoelasticLaw.linear(e, 150.0, 20.0))).curves()
@@ -374,7 +368,7 @@ def slope(folder: Path) -> np.ndarray:
 
 
 def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
-    events: list[RunEvent | None] = []
+    events = []
     done = predictions(tmp_path, card(), progress=events.append)
     assert events[-1].total == 3  # the prediction, and a run a direction
     curve, (run,) = done.curves(), done.each
@@ -464,7 +458,6 @@ def test_what_is_not_known_is_not_said(tmp_path, off, e1, known, words):
 
 
 def test_a_step_keeps_the_moduli_positive(tmp_path):
-    """A G12 of 20 MPa that may be off by 30: the step goes up, half of it stays above zero."""
     around, laws = laws_around(card(np.array([[-30.0, 0, 0], [-15.0, 0, 0]])), None)
     assert around.steps == [-1.0, 1.0]
     assert [float(law.G12(0.0)) for law in laws] == pytest.approx([50.0, 5.0])
@@ -480,13 +473,12 @@ def test_a_step_keeps_the_moduli_positive(tmp_path):
 FIT = "[fit]\nstarts = 2\nseed = 7\n"
 
 
-def project(folder: Path, unknowns: str, *changes: tuple[str, str]):
+def project(folder, unknowns, *changes):
     return read_project(constant_strips(folder, (FIT, f"{FIT}[fit.unknowns]\n{unknowns}\n"),
                                         *changes))  # fmt: skip
 
 
 def test_a_fit_with_the_thickness_unknown(together, tmp_path):
-    """Strips know modulus times thickness: 5 % of thickness are 5 % of every modulus."""
     unknown = "[fit.unknowns]\nthickness = { bounds = [0.7, 0.9], prior = 0.04 }\n"
     fixed = together.result
     constant_strips(tmp_path, (FIT, FIT + unknown))

@@ -1,14 +1,10 @@
 """The whole page of a fit: facts, tables, figures, warnings, files, each as reckoned here."""
 
-from __future__ import annotations
-
 import html
 import importlib.util
 import pickle
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
@@ -28,7 +24,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page as page
 from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
-from bubblefit.reports.content import Download, Exhibit, Facts, Report, Words
+from bubblefit.reports.content import Download, Exhibit, Facts, Words
 from bubblefit.reports.fit_page import (
     COEFFICIENTS_TITLE,
     WORDS,
@@ -40,7 +36,7 @@ from bubblefit.reports.html import number, percent
 from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import versions, write_table
-from bubblefit.runs.predictions import Predictions, RunEvent, predict
+from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import COMPARED, TABLES, TOGETHER, next_step, notes_of_fit, reaches
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
@@ -56,7 +52,7 @@ ENDS = {"one": 2.9, "two": 2.5}
 
 def drawn_by(monkeypatch):
     """Arguments of the charts by name, which are not drawn."""
-    calls: dict[str, Any] = {}
+    calls = {}
     monkeypatch.setattr(page, "save", lambda path, charts: None)
     for name in ("optima_chart", "moduli_charts", "pinned_charts"):
         declare = getattr(page, name)
@@ -72,7 +68,7 @@ def told(monkeypatch):
 
 
 def reported(fit, folder, monkeypatch):
-    seen: list[Report] = []
+    seen = []
     monkeypatch.setattr(
         page, "write_report", lambda folder, report: seen.append(report) or folder / "report.html"
     )
@@ -115,14 +111,14 @@ def nothing_shown(together, monkeypatch):
     monkeypatch.setattr(strips_report, "show", lambda *_: Exhibit())
 
 
-def points(test: str, direction: str) -> tuple[np.ndarray, np.ndarray]:
+def points(test, direction):
     """Strain and load (N) of both specimens, as far as the model goes."""
     strain = np.log1p(ELONGATION[ELONGATION <= ENDS[test]] / 20)
     loads = [20 * e * strain for e in MODULI[test][direction]]
     return np.tile(strain, 2), np.concatenate(loads)
 
 
-def rms(fit: bf.Fit, test: str, direction: str) -> float:
+def rms(fit, test, direction):
     """N, of a constant modulus in closed form."""
     strain, load = points(test, direction)
     modulus = fit.law.beta[11 if direction == "warp" else 7]
@@ -432,7 +428,7 @@ def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
 
 
-def banded(folder: Path, soft: float = 500.0, **options: object) -> Predictions:
+def banded(folder, soft=500.0, **options):
     """Predictions of two cylinders, the first of them measured, with two cards."""
     write_readings(folder / "made-up.csv")
     path = write_project(folder, 'measured.files = ["made-up.csv"]', soft)
@@ -461,7 +457,7 @@ def test_both_ends_are_run_and_named(tmp_path):
     of = {note.of for note in done.notes}
     assert "high with soft" in of and "high with soft, rigid wall" in of and len(of) == 8
     assert len(list((tmp_path / "out" / "runs").glob("*.npz"))) == 8
-    events: list[RunEvent | None] = []
+    events = []
     again = banded(tmp_path, out=tmp_path / "out", resume=True, progress=events.append)
     told = [event for event in events if event is not None and event.run is not None]
     assert len(told) == 8 and all(event.again for event in told)
@@ -481,7 +477,7 @@ def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
     # Where every run of a card fails, it is the prediction that says nothing.
     failed = banded(tmp_path, FAILS)
     assert failed.failed() == [0, 1, 4, 5] and failed.silent() == [0]
-    pages: list[Report] = []
+    pages = []
     monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
     failed.report(tmp_path / "out")
@@ -609,7 +605,7 @@ def test_every_table_is_written_and_read_back(together, tmp_path, table):
 
 
 def test_parquet_is_written_by_pandas_as_it_is(together, tmp_path, monkeypatch):
-    asked: list[Any] = []
+    asked = []
 
     def to_parquet(table, path, **options):
         asked.append((table, options))
@@ -639,7 +635,7 @@ LEAST = {"E1": 5.0, "E2": 6.0, "G12": 0.5}
 
 def test_expected_moduli_of_bounds():
     def expected(bounds):
-        setup: Any = SimpleNamespace(bounds=bounds, law=LAW)
+        setup = SimpleNamespace(bounds=bounds, law=LAW)
         return dict(expected_of(setup).moduli)
 
     ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
@@ -691,7 +687,6 @@ def test_the_residual_stands_beside_the_noise(bubble):
 
 
 def test_kinds_of_notes_are_no_closed_list():
-    """A kind of another distribution is kept by name, also by copies from other processes."""
     kind = NoteKind("creep")
     note = pickle.loads(pickle.dumps(Note(kind, "the load fell by 3 %", "a strip")))
     assert note.kind is kind and kind == "creep" and kind.mark == 0

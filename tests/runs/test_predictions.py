@@ -1,11 +1,7 @@
 """Tests with cards from Python: which cards, tables, notes, what is in the folder."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,7 +15,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project import project as project_module
 from bubblefit.project.project import read_project
 from bubblefit.reports import run_pages
-from bubblefit.reports.content import Exhibit, Report, Words
+from bubblefit.reports.content import Exhibit, Words
 from bubblefit.reports.html import percent
 from bubblefit.runs import executor
 from bubblefit.runs import predictions as predictions_module
@@ -49,7 +45,7 @@ def project(tmp_path):
 
 
 def test_every_test_with_every_card(project, tmp_path):
-    events: list[RunEvent | None] = []
+    events = []
     done = predict(project, jobs=1, progress=events.append)
     runs, curves = done.runs(), done.curves()
     keys = [(test, card) for test in TESTS for card in CARDS]
@@ -127,7 +123,7 @@ def test_what_is_there_is_not_run_again(project, tmp_path):
 
 @pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])
 def test_processes(project, monkeypatch, asked, said, some):
-    told: list[tuple[int, str]] = []
+    told = []
 
     def side_by_side(prepare, numbers, jobs, what):
         told.append((jobs, what))
@@ -141,7 +137,6 @@ def test_processes(project, monkeypatch, asked, said, some):
 
 
 def test_a_card_runs_with_its_own_thickness(project):
-    """Not with the fabric's of 0.81 mm: the card's moduli are those of the card's thickness."""
     law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
     cards = {f"{t} mm": MaterialCard(law, t) for t in (0.81, 0.9)}
     done = predict(project, ["high"], cards, jobs=1)
@@ -184,7 +179,7 @@ def test_an_early_end_is_a_result_with_its_reason(tmp_path, seen):
 def seen(monkeypatch):
     monkeypatch.setattr(cylinders, "draw_figures", lambda *_: [("loads.png", "loads")])
     monkeypatch.setattr(cylinders, "write_beams", lambda *_: [("a.vtu", "a beam")])
-    reports: list[Report] = []
+    reports = []
     monkeypatch.setattr(
         run_pages, "write_report", lambda folder, r: reports.append(r) or folder / "report.html"
     )
@@ -280,7 +275,7 @@ class StrutTest:
     name: str
     kind: str = "strut"
 
-    def models(self, thickness: float = 1.0) -> Mapping[str, Strut]:
+    def models(self, thickness=1.0):
         return {"strut": Strut(0.01, thickness)}
 
 
@@ -384,7 +379,7 @@ def test_two_kinds_in_one_series(mixed, tmp_path, monkeypatch):
     assert '"labels":["deflection of the collar, mm","load, N"]' in page
     # One kind of two; then one that is neither fitted nor predicted.
     assert [t.name for t in measured_tests(mixed)] == ["pulled"]
-    events: list[Any] = []
+    events = []
     done = predict(mixed, "strut", jobs=1, out=tmp_path / "out", resume=True,
                    progress=events.append)  # fmt: skip
     assert all(event.again for event in events if event is not None and event.run is not None)

@@ -1,7 +1,5 @@
 """Tasks side by side, here and on a Dask cluster: the same, whoever dies on the way."""
 
-from __future__ import annotations
-
 import multiprocessing
 import multiprocessing.util
 import os
@@ -9,11 +7,9 @@ import signal
 import struct
 import sys
 import time
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from threading import Thread
-from typing import Any
 
 import bubblefit as bf
 import cloudpickle
@@ -165,7 +161,7 @@ def test_what_cannot_cross_is_told_in_words():
         list(run_tasks(lambda: task, [1], 1))
 
 
-def alive(process: int) -> bool:
+def alive(process):
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -254,7 +250,7 @@ NOBODY = "tcp://127.0.0.1:1"
 @pytest.fixture(scope="module")
 def scheduler():
     """The address of one with two workers."""
-    distributed: Any = needs.library("distributed")
+    distributed = needs.library("distributed")
     options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(n_workers=2, processes=True, **options) as local:
         yield local.scheduler_address
@@ -284,7 +280,7 @@ def test_what_a_task_tells_comes_once_and_before_its_end(scheduler):
             tell((number, k))
         return announce("waiting", f"run {number}") or time.sleep(0.1) or number
 
-    heard: list[Announcement] = []
+    heard = []
     with hearing(heard.append):
         records = tasks(scheduler, always(task), 5)
     assert len(records) == 15 and Announcement("waiting", "run 0") in heard
@@ -303,7 +299,7 @@ def test_it_is_got_ready_once_a_worker(scheduler):
 
         return task
 
-    counts: dict[int, list[int]] = {}
+    counts = {}
     for pid, count in tasks(scheduler, prepare, 8):
         counts.setdefault(pid, []).append(count)
     assert sum(map(len, counts.values())) == 8
@@ -374,7 +370,7 @@ def test_an_error_of_a_task_is_an_error_here(scheduler):
 
 
 def test_a_scheduler_that_goes_is_an_error_soon():
-    distributed: Any = needs.library("distributed")
+    distributed = needs.library("distributed")
     options = {"n_workers": 1, "processes": False, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(**options) as local:
         running = Executor(scheduler=local.scheduler_address).run_tasks(
@@ -419,7 +415,7 @@ def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
         ("another code", (*ours[:2], "other")), ("it has no bubblefit of this", Elsewhere()),
     ):  # fmt: skip
         monkeypatch.setattr(cluster, "version", lambda other=other: other)
-        heard: list[Announcement] = []
+        heard = []
         with hearing(heard.append):
             said = complaint(tasks, scheduler, lambda: None, 3)
         assert said.startswith("--scheduler: worker tcp://127.0.0.1:") and words in said
@@ -445,9 +441,9 @@ def test_the_code_counts_by_content(tmp_path, monkeypatch):
 
 
 def test_workers_that_come_later_are_waited_for_and_used():
-    distributed: Any = needs.library("distributed")
+    distributed = needs.library("distributed")
     options = {"processes": False, "dashboard_address": ":0", "silence_logs": 50}
-    heard: list[Announcement] = []
+    heard = []
     with distributed.LocalCluster(n_workers=0, **options) as local, hearing(heard.append):
         running = Executor(scheduler=local.scheduler_address).run_tasks(
             lambda: lambda number, tell: 10 * number, [1, 2, 3]
@@ -506,7 +502,7 @@ def test_processes_and_a_cluster_share_licences_also_when_a_worker_dies(schedule
         solver = CountedSolver(runs, 5.0 if dies else 0.05)
         return licences.licensed(solver, "counted", given).run(number, None)
 
-    here: list[Any] = []
+    here = []
     local = Thread(target=lambda: here.extend(Executor(2).run_tasks(always(task), range(10, 18))))
     local.start()
     there = tasks(scheduler, always(task), 8)
@@ -532,7 +528,7 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
 
 def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
     monkeypatch.setattr(licences, "CONNECT_S", 1.0)
-    distributed: Any = needs.library("distributed")
+    distributed = needs.library("distributed")
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
     options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(**options) as local:
@@ -554,7 +550,7 @@ def test_a_fit_hands_its_scheduler_to_the_solver(strips_project):
     assert "licence_scheduler" not in project.solver_options["marc"]
 
 
-def wait_for(there: Callable[[], object]) -> None:
+def wait_for(there):
     end = time.monotonic() + 30
     while not there():
         assert time.monotonic() < end

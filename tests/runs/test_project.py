@@ -1,11 +1,8 @@
 """A project as a whole: units, law and bounds, tests, cards, defaults, and one-line errors."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -139,7 +136,6 @@ def test_bounds_on_coefficients(example, form, size):
 
 @pytest.mark.parametrize("form", form_names())
 def test_each_modulus_has_bounds_of_its_own(example, form):
-    """E1 may not go as low as E2, whatever the smaller of the two."""
     knots = "\nknots = 5" if form == "spline" else ""
     p = example(
         (CUBIC, f'form = "{form}"{knots}'), ("E1 = [0.02, 2.0]", "E1 = [0.1, 2.0]"),
@@ -276,16 +272,16 @@ LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 CONSTANT = [0, 0, 0, 0.02, 0, 0, 0, 0.2, 0, 0, 0, 0.5]
 
 
-def place(folder: Path = Path(), **scales: Any) -> Place:
+def place(folder=Path(), **scales):
     fabric = Fabric("a fabric", 0.8, "incompressible")
     return Place(folder / "p.toml", "", fabric, Scales(**scales))
 
 
-def table(**said: Any) -> CardSection:
+def table(**said):
     return CardSection.model_validate({"name": "mine", "beta": [0, 0, 0, 0.5] * 3, **said})
 
 
-def filed(folder: Path, name: str = "soft", file: str = "c.toml") -> Path:
+def filed(folder, name="soft", file="c.toml"):
     write_card(MaterialCard(LAW, 0.7, name, "a fit"), folder / file)
     return folder / file
 
@@ -341,7 +337,7 @@ def test_cards_that_cannot_be(tmp_path, said, words):
     assert found.startswith(f"{tmp_path / 'p.toml'}: card[") and words in found
 
 
-def with_cards(folder: Path, *names: str) -> Any:
+def with_cards(folder, *names):
     cards = {name: NamedCard(MaterialCard(LAW, 0.8, name)) for name in names}
     return SimpleNamespace(cards=cards, path=folder / "fabric" / "project.toml")
 

@@ -1,7 +1,5 @@
 """What results came from: the project as run, data files, command; and what differs, in words."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -9,8 +7,6 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
-from pathlib import Path
-from typing import Any
 
 import bubblefit as bf
 import bubblefit.runs.fit
@@ -36,7 +32,7 @@ from bubblefit.runs.folder import (
     this_run,
     versions,
 )
-from bubblefit.runs.setup import FitSetup, fingerprints, prepare_fit, proposals
+from bubblefit.runs.setup import fingerprints, prepare_fit, proposals
 from bubblefit.solvers.decks import in_words
 
 from ..commands import in_process
@@ -76,7 +72,7 @@ starts = 3
 FILES = ("low.csv", "high.csv")
 
 
-def written(folder: Path, *changes: tuple[str, str]) -> Path:
+def written(folder, *changes):
     """A bubble of two measured frames, and the project of it, changed by replacing text."""
     folder.mkdir(exist_ok=True)
     x, y = (a.ravel() for a in np.meshgrid(*[np.linspace(-90, 90, 9)] * 2))
@@ -112,7 +108,7 @@ def first(tmp_path_factory):
     return folder / "out"
 
 
-def refused(first: Path, setup: FitSetup) -> str:
+def refused(first, setup):
     """What differs, as --resume says it; nothing is written over."""
     before = {path: path.read_bytes() for path in first.iterdir()}
     with pytest.raises(InputError) as caught:
@@ -205,8 +201,8 @@ def test_what_calculix_runs_with_is_named(ccx, tmp_path):
 
 
 def test_differences_of_tests_and_long_values():
-    before: dict[str, Any] = {"tests": {"a": {"k": list(range(40))}, "b": {"n": 1}}}
-    now: dict[str, Any] = {"tests": {"a": {"k": list(range(1, 41))}, "c": {}}}
+    before = {"tests": {"a": {"k": list(range(40))}, "b": {"n": 1}}}
+    now = {"tests": {"a": {"k": list(range(1, 41))}, "c": {}}}
     tests, values = differences(before, now)
     assert tests == "the tests: a, b, now a, c"
     assert values.startswith("a.k = [0, 1, 2") and "..., now [1, 2, 3" in values
@@ -452,7 +448,7 @@ def earlier(strips_project, tmp_path_factory):
     return folder
 
 
-def objectives_at_first(folder: Path) -> list[float]:
+def objectives_at_first(folder):
     rows = [row.split(",") for row in (folder / "history.csv").read_text().splitlines()[1:]]
     return [float(row[4]) for row in rows if row[1] == "1"]
 

@@ -1,13 +1,10 @@
 """Runs with cards as they are stored: exactly, each under a mark of all that it depends on."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import json
 import os
 import tempfile
-from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -224,7 +221,7 @@ def finished(number):
 class Folder(RunningFiles):
     """The running files of a fit in a store of their own."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         super().__init__(Store(path), COLUMNS, SCALE)
 
 
@@ -266,7 +263,7 @@ def test_page_and_card_of_an_earlier_result_go(tmp_path, resume):
     assert "notes.txt" in kept and not kept & {RESULT, "report.html", "material.toml"}
 
 
-def study(path: Path) -> Folder:
+def study(path):
     """Starts 0 and 1 finished, start 2 under way: then the process is killed."""
     folder = Folder(path)
     assert begin(folder) == {}
@@ -278,7 +275,7 @@ def study(path: Path) -> Folder:
     return folder
 
 
-def rows(path: Path) -> list[dict[str, str]]:
+def rows(path):
     with open(path / HISTORY, encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
 
@@ -375,7 +372,7 @@ class Killed(BaseException):
     """In place of a signal that nobody can catch: nothing of ours handles it."""
 
 
-ENDS: dict[str, Callable[[], BaseException]] = {
+ENDS = {
     "kill": Killed,
     "full disk": lambda: OSError(errno.ENOSPC, "No space left on device"),
     "broken disk": lambda: OSError(errno.EIO, "Input/output error"),
@@ -384,7 +381,7 @@ ENDS: dict[str, Callable[[], BaseException]] = {
 
 def counted(patch, last, end):
     """What is written, in order; in place of number `last` comes the end."""
-    written: list[str] = []
+    written = []
     replace, append = writing.os.replace, running_files._append
 
     def note(what):

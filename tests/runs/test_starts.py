@@ -1,13 +1,8 @@
 """One start, with a problem made up: what is counted, told, and said of its end."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
@@ -36,13 +31,13 @@ from ..projects import BUBBLE, project_file
 class Problem:
     """Two coefficients and an offset; the solver that counts is another program."""
 
-    def __init__(self, name: str, external: bool, surrogate: Any = None) -> None:
+    def __init__(self, name, external, surrogate=None):
         self.solver = SimpleNamespace(name=name, external=external)
         self.surrogate, self.watch, self.failure = surrogate, None, ""
         self.unknowns = SimpleNamespace(size=2, to_coefficients=np.diag([10.0, 100.0]))
         self.resets, self.cached = 0, 0
 
-    def reset(self) -> None:
+    def reset(self):
         self.resets += 1
 
 
@@ -68,8 +63,8 @@ def started(monkeypatch, problem, optimum):
     monkeypatch.setattr(room, "strains_of", strains.__getitem__)
     monkeypatch.setattr(room, "feasible_start", lambda p, s, n: f"at start {n} of {s}")
     monkeypatch.setattr(room, "fit_from", fit_from)
-    told: list[EvaluationRecord] = []
-    options: Any = "options"
+    told = []
+    options = "options"
     return run_start(problem, options, 7, 4, told.append), told
 
 
@@ -149,8 +144,8 @@ def test_from_the_optimum_of_the_coarse_mesh(monkeypatch):
 
     monkeypatch.setattr(room, "strains_of", lambda history: [0.0] * 3)
     monkeypatch.setattr(room, "fit_from", fit_from)
-    told: list[EvaluationRecord] = []
-    problem: Any = Problem("membrane", False)
+    told = []
+    problem = Problem("membrane", False)
     record = run_start(problem, None, 7, 4, told.append, coarse=coarse)
     assert [(e.analysis, e.mesh) for e in told] == [(7, "full")]
     assert (record.analyses, record.coarse_analyses, record.coarse_objective) == (7, 6, 0.5)
@@ -173,7 +168,7 @@ def test_a_record_of_an_older_version():
 STARTS = 3
 
 
-def project(folder: Path, *changes: tuple[str, str]) -> bf.Project:
+def project(folder, *changes):
     """A quarter bubble of 48 quads, 12 on the coarse mesh, its data of its own model."""
     finer = ("elements = 32", "elements = 192")
     path = project_file(folder, f"{BUBBLE}\n[fit]\ncoarse_to_fine = true\n", finer, *changes)
@@ -237,11 +232,11 @@ def test_every_place_says_what_ran_where(fitted, folder):
     assert words in line and "12 of 48" in line
 
 
-def when_it_is(mesh: str, analyses: int) -> Callable[[Any], None]:
+def when_it_is(mesh, analyses):
     """Interrupts once so many analyses of the last start ran on a mesh."""
-    seen: list[Any] = []
+    seen = []
 
-    def tell(event: Any) -> None:
+    def tell(event):
         if getattr(event, "analysis", None) is not None and event.mesh == mesh:
             seen.append(event)
             if len(seen) == analyses:
@@ -255,7 +250,7 @@ def test_interrupted_in_either_stage_it_ends_the_same(fitted, folder, tmp_path, 
     with pytest.raises(KeyboardInterrupt):
         bf.fit(fitted.project, out=tmp_path / "out", progress=when_it_is(mesh, analyses))
     assert not (tmp_path / "out" / "result.json").exists()
-    told: list[Any] = []
+    told = []
     again = bf.fit(fitted.project, out=tmp_path / "out", resume=True, progress=told.append)
     ended = [e.analyses for e in told if isinstance(e, StartRecord) and e.mesh == "coarse"]
     ran = [e for e in told if getattr(e, "mesh", "") == "coarse" and hasattr(e, "analysis")]
@@ -346,7 +341,7 @@ def test_optima_are_told_apart_by_moduli_and_by_what_they_leave(fitted):
 
 
 def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch):
-    begun: list[Any] = []
+    begun = []
 
     def run_start(problem, options, seed, number, tell, coarse):
         begun.append((number, coarse.number))
@@ -356,7 +351,7 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
     group = [ended(fitted, n, 0.2) for n in (3, 5, 8)]
     for fails, tried in ((0, [3]), (4, [3, 5]), (99, [3, 5, 8])):
         begun.clear()
-        told: list[Any] = []
+        told = []
         last = stages._continuation(fitted.setup, [group])(0, told.append)
         assert begun == [(n, n) for n in tried]
         full = {r.number: r for r in (*told, last)}
@@ -417,7 +412,6 @@ def errors(fitted):
 
 
 def test_the_estimate_is_the_error(off):
-    """Moduli of a coarse mesh are off by 7 to 28 %; two thirds of that and more is foretold."""
     for true, said in errors(off):
         largest = np.abs(true).max()
         assert largest > 0.07

@@ -10,7 +10,6 @@ import signal
 import stat
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from bubblefit.cli.progress import StudyProgress
@@ -35,8 +34,8 @@ from ..complaints import complaint
 from ..counted_program import CountedSolver, seen
 from ..plug_ins import install
 
-FORK: Any = multiprocessing.get_context("fork")
-LAW: Any = None
+FORK = multiprocessing.get_context("fork")
+LAW = None
 PROJECT = Path("/somewhere/project.toml")
 
 
@@ -59,7 +58,6 @@ def in_processes(count, work):
 
 @pytest.mark.parametrize("count", [2, None])
 def test_never_more_at_once_than_there_are_licences(tmp_path, count):
-    """Without licences there are as many as there are processes: the test can fail."""
 
     def work(process):
         solver = CountedSolver(tmp_path / "runs", 0.02 if count else 0.3)
@@ -87,7 +85,7 @@ def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path):
     assert holder.pid is not None
     os.kill(holder.pid, signal.SIGKILL)
     holder.join()
-    heard: list[Announcement] = []
+    heard = []
     with hearing(heard.append):
         licensed(CountedSolver(folder), settings(tmp_path, 1)).run("next", LAW)
     found = seen(folder)
@@ -95,7 +93,6 @@ def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path):
 
 
 def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path):
-    """Who started it may be gone before: a child of a child is killed by nobody."""
     from bubblefit.solvers.process import run_process
 
     def work(_):
@@ -185,7 +182,7 @@ def test_a_lock_is_of_the_file_that_is_there(tmp_path, monkeypatch):
 @pytest.fixture
 def pauses(monkeypatch):
     """Pauses between tries, none of which is made; time passes as if they were."""
-    made: list[float] = []
+    made = []
     monkeypatch.setattr(licences.time, "sleep", made.append)
     monkeypatch.setattr(licences.time, "monotonic", lambda: sum(made))
     monkeypatch.setattr(licences.random, "uniform", lambda low, high: (low + high) / 2)
@@ -194,7 +191,7 @@ def pauses(monkeypatch):
 
 def denials(count, folder, error=LicenceDenied):
     """Fails so many times, then gives 7; every try leaves a scratch folder."""
-    tries: list[Path] = []
+    tries = []
 
     def run():
         if len(tries) == count:
@@ -208,7 +205,7 @@ def denials(count, folder, error=LicenceDenied):
 
 def test_pauses_double_up_to_ten_times_the_first(tmp_path, pauses):
     run, tries = denials(7, tmp_path)
-    heard: list[Announcement] = []
+    heard = []
     given = settings(tmp_path, licence_wait=1000.0, licence_retry=3.0)
     with hearing(heard.append):
         assert patiently(run, "acme", given) == 7
@@ -239,7 +236,7 @@ def test_defaults_and_the_file_of_the_site(tmp_path):
     assert waits == [0, 600, 0]
     site = tmp_path / "site.toml"
     site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
-    solver: Any = solver_named("marc", marc=site, licences=5)
+    solver = solver_named("marc", marc=site, licences=5)
     assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
     assert solver.licences.licence_folder == str(tmp_path / "locks")
 
@@ -276,7 +273,7 @@ def test_a_solver_stays_what_it_is(tmp_path):
         def band(self, model):
             return (model,)
 
-    able: Any = licensed(Able(tmp_path), settings(tmp_path))
+    able = licensed(Able(tmp_path), settings(tmp_path))
     assert isinstance(able, DifferentiatingSolver) and isinstance(able, BandedSolver)
     assert able.run_with_sensitivity(3, LAW, ("nu12",)) == (3, ("nu12",))
     assert able.band(4) == [4]
@@ -290,7 +287,7 @@ def test_a_solver_stays_what_it_is(tmp_path):
         def run_with_sensitivity(self, *_):
             return licences._any(tmp_path / "locks", "counted", 1)
 
-    able: Any = licensed(Able(tmp_path), settings(tmp_path, 1))
+    able = licensed(Able(tmp_path), settings(tmp_path, 1))
     assert able.run_with_sensitivity(3, LAW) is None
 
 
@@ -300,7 +297,7 @@ def test_every_external_solver_has_the_keys(packages, tmp_path):
     tables = {"marc": keys, "calculix": keys, "acme": {**keys, "acmes": 1}}
     found = solver_settings(PROJECT, tables)
     for name in tables:
-        solver: Any = solver_named(name, **found[name])
+        solver = solver_named(name, **found[name])
         assert isinstance(solver, LicensedSolver), name
         assert solver.licences.licences == 4 and solver.licences.wait == 600
         assert solver.licences.licence_folder == "/somewhere/locks"
@@ -322,7 +319,7 @@ def test_what_a_worker_announces_is_heard_here():
     def prepare():
         return lambda number, tell: announce("waiting", f"run {number}")
 
-    heard: list[Announcement] = []
+    heard = []
     with hearing(heard.append):
         records = list(run_tasks(prepare, [4], 1))
     assert heard == [Announcement("waiting", "run 4")]
@@ -360,7 +357,7 @@ def wait_for(there):
 
 
 def test_pauses_differ_by_chance_and_a_site_has_words_of_its_own(tmp_path, monkeypatch):
-    made: list[float] = []
+    made = []
     monkeypatch.setattr(licences.time, "sleep", made.append)
     for k in range(40):
         (tmp_path / str(k)).mkdir()

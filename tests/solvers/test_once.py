@@ -96,7 +96,6 @@ def test_another_law_or_model_is_another_run(cache, what):
 
 
 def test_another_solver_is_another_run(cache, tmp_path):
-    """Its name, what it says of itself, its options, its programs by what is in them, its code."""
     one = program(tmp_path / "a" / "solve", "#!/bin/sh\ntrue\n")
     moved = program(tmp_path / "b" / "elsewhere", "#!/bin/sh\ntrue\n")
     changed = program(tmp_path / "c" / "solve", "#!/bin/sh\nfalse\n")
@@ -152,7 +151,6 @@ def test_runs_that_are_not_kept(cache):
 
 
 def test_which_solvers_have_none_and_a_band_stays_one(cache):
-    """Ours in this process, one that starts from a guess, one whose folders are to be kept."""
 
     class Sloped(Counting):
         def run_with_sensitivity(self, model, law, parameters=None, guess=None):

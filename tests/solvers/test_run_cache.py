@@ -103,7 +103,6 @@ def test_a_damaged_run_is_dropped_and_told(cache, caplog, share, how):
 
 
 def test_another_run_layout_or_result_is_refused(tmp_path):
-    """Nothing is unpickled, not where somebody has written the right checksum either."""
     mark = tmp_path / "unpickled"
 
     class Trap:

@@ -51,7 +51,6 @@ def members(group):
 
 
 def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp_path):
-    """Also what a script has started, which the kernel's signal does not reach."""
     needs.linux("processes by their group")
     running, folder = begun(tmp_path)
     group = int((folder / "group").read_text())

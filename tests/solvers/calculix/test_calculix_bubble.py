@@ -160,7 +160,6 @@ def test_linear_orthotropic_as_abaqus(ccx):
 
 
 def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
-    """The strain path is the model's: a deck that cuts every step in four gives the same."""
     model = bubble(64, "quarter", (0.059, 0.132, 0.186))
     text = (TEMPLATES / "calculix" / "bubble.inp.j2").read_text()
     (tmp_path / "bubble.inp.j2").write_text(
@@ -173,7 +172,6 @@ def test_increments_of_calculix_do_not_matter(ccx, tmp_path):
 
 
 def test_an_elliptic_edge_agrees_with_the_membrane(ccx):
-    """A coarse quarter, for time: elements of the two differ by 0.5 % of the height anywhere."""
     mesh = elliptic_disk_mesh(Outline(120.0, 80.0, 90.0), 192, "quarter")
     apex, field, *_ = differences("S8R", BubbleModel(mesh, 0.81, (0.06,)), LINEAR)
     assert apex.max() < AGREEMENT and field.max() < 0.01

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,6 @@ import pytest
 from bubblefit.cli.options import with_solver
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.project.project import read_project
-from bubblefit.solvers.calculix.executable import Executable
 from bubblefit.solvers.run_cache import VARIABLE, RunCache
 
 from ...commands import in_process as bubblefit
@@ -22,20 +20,20 @@ TIMES = ("wall_s", "external_runs", "cached_runs")
 
 
 @pytest.fixture
-def counted(ccx: Executable, tmp_path: Path) -> tuple[Path, Path]:
+def counted(ccx, tmp_path):
     """A ccx that writes a line into a file for every analysis, and the file."""
     told = tmp_path / "analyses"
     text = f'#!/bin/sh\ncase "$1" in -i) echo run >> {told} ;; esac\nexec {ccx.path} "$@"\n'
     return program(tmp_path / "bin" / "ccx", text), told
 
 
-def result_of(folder: Path) -> dict:
+def result_of(folder):
     result = json.loads((folder / "result.json").read_text())
     result["starts"] = [{k: v for k, v in s.items() if k not in TIMES} for s in result["starts"]]
     return result
 
 
-def test_a_second_identical_fit_runs_no_ccx(counted, tmp_path, monkeypatch) -> None:
+def test_a_second_identical_fit_runs_no_ccx(counted, tmp_path, monkeypatch):
     ccx, told = counted
     cache = RunCache(tmp_path / "runs")
     monkeypatch.setenv(VARIABLE, str(cache.folder))
@@ -75,7 +73,7 @@ def test_a_second_identical_fit_runs_no_ccx(counted, tmp_path, monkeypatch) -> N
     assert third == second
 
 
-def test_it_can_be_turned_off(tmp_path, monkeypatch) -> None:
+def test_it_can_be_turned_off(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "usual"))
     path = tmp_path / "project.toml"
@@ -91,7 +89,7 @@ def test_it_can_be_turned_off(tmp_path, monkeypatch) -> None:
     assert read_project(path).run_cache is None
 
 
-def test_no_cache_runs_every_analysis(counted, tmp_path, monkeypatch) -> None:
+def test_no_cache_runs_every_analysis(counted, tmp_path, monkeypatch):
     ccx, told = counted
     monkeypatch.setenv(VARIABLE, str(tmp_path / "runs"))
     (tmp_path / "project.toml").write_text(PROJECT.replace("elements = 64", "elements = 32"))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder_model import CylinderModel, Gas, RigidSupports, inflated_cylinder
+from bubblefit.meshes.cylinder_model import Gas, RigidSupports, inflated_cylinder
 from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (
@@ -49,12 +49,12 @@ ENERGIES = {
 }
 
 
-def case(size: float = 25.0, seam: float = 0.0, length: float = 900.0) -> CylinderModel:
+def case(size=25.0, seam=0.0, length=900.0):
     supports = RigidSupports(length / 1.5)
     return inflated_cylinder(2 * RADIUS, PRESSURE, THICKNESS, size, length, seam, supports=supports)
 
 
-def closed_form(pressure: float) -> np.ndarray:
+def closed_form(pressure):
     """Axial and hoop log strain of a long thin-walled tube with closed ends.
 
     Hoop stress p r / t, axial p r / 2 t, with the radius r as inflated and t as at rest.
@@ -62,7 +62,7 @@ def closed_form(pressure: float) -> np.ndarray:
     den = 1 - LINEAR.nu12**2 * FILL / WARP
     d11, d22, d12 = WARP / den, FILL / den, LINEAR.nu12 * FILL / den
 
-    def unbalance(strain: np.ndarray) -> list[float]:
+    def unbalance(strain):
         hoop = pressure * RADIUS * np.exp(strain[1]) / THICKNESS
         return [
             d11 * strain[0] + d12 * strain[1] - 0.5 * hoop,
@@ -72,7 +72,7 @@ def closed_form(pressure: float) -> np.ndarray:
     return fsolve(unbalance, [0.01, 0.05], xtol=1e-12)
 
 
-def run(ccx, model: CylinderModel, folder: Path):
+def run(ccx, model, folder):
     solids = solid_mesh(model)
     for name, text in (cylinder_decks(model, LINEAR, solids) | law_files(LINEAR)).items():
         (folder / name).write_text(text)
@@ -105,11 +105,11 @@ def test_the_middle_of_the_tube_has_the_closed_form(ccx, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def scratch(tmp_path_factory) -> Path:
+def scratch(tmp_path_factory):
     return tmp_path_factory.mktemp("bending")
 
 
-def last_run(scratch: Path) -> Path:
+def last_run(scratch):
     return max(scratch.rglob("job.frd"), key=os.path.getmtime).parent
 
 
@@ -129,9 +129,9 @@ def bent(ccx, scratch):
     return model, solver.run(model, LINEAR)
 
 
-def energies(dat: Path) -> tuple[np.ndarray, np.ndarray]:
+def energies(dat):
     """Of the fabric and of contact, N mm of the quarter, at every increment of bending."""
-    found: dict[str, list[float]] = {"internal": [], "contact": []}
+    found = {"internal": [], "contact": []}
     name = ""
     for line in dat.read_text().splitlines():
         words = line.split()
@@ -162,7 +162,7 @@ def test_work_of_collar_and_gas_is_energy_of_fabric_and_contact(bent, scratch):
     closed = model.gas.closed_in(model.pressure, history.cavity_volume[0])
     gauge = np.array([closed.pressure(v) for v in middle])
 
-    def work(force, way) -> float:
+    def work(force, way):
         """From the first increment, where the cylinder has come to lie on its supports."""
         return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(way)))
 
@@ -269,7 +269,6 @@ def test_frames_between_increments_lie_on_a_smooth_curve():
 
 
 def test_the_gas_settles_in_two_passes_on_a_compliant_volume():
-    """V(p) = V0 (1 + c (p - p0)) - V1(d): what CalculiX would find at a given pressure."""
     volume, pressure, slope = 6e7, 0.14, 6e7
     gas = Gas().closed_in(pressure, volume)
     lost = np.array([0.0, 1e5, 4e5])
@@ -339,7 +338,7 @@ def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, s
 # Solids
 
 
-def jacobians(points: np.ndarray, elements: np.ndarray) -> np.ndarray:
+def jacobians(points, elements):
     """Least of the Jacobians at the corners, as a sign that a solid is the right way out."""
     spokes = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
     spokes += ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))

@@ -97,7 +97,6 @@ def test_its_own_error_message_is_the_reason(fake):
 
 
 def test_its_exit_code_counts_whatever_it_says(fake):
-    """A log that ends well, results and all, and then an exit code that does not."""
     script = f"cat > job.sta <<'.'\n{STA}.\necho ' Job finished'; touch job.frd; exit 3"
     found = failure(fake(script))
     assert found.reason == "ended badly after step 1, increment 2"
@@ -176,7 +175,6 @@ def test_a_whole_result_is_taken_and_parts_are_not(fake, results):
 
 
 def test_nothing_stale_is_read(fake, results, tmp_path):
-    """A good run, then one that writes nothing: in every place where the first left something."""
     kept = fake(f"cp {results}/job.frd . ; echo Job finished", keep=True)
     kept.run(model(), LAW)
     first = {p.name for p in (tmp_path / "scratch").iterdir()}
@@ -234,7 +232,6 @@ def test_a_full_file_system(ccx, tmp_path):
 
 
 def test_a_law_that_cannot_converge(ccx, tmp_path):
-    """The warp modulus falls to nothing at 1 % strain: no increment is small enough."""
     beta = LAW.beta.copy()
     beta[10:12] = -8e4, 800.0
     with pytest.raises(SolverFailure) as found:
@@ -262,7 +259,6 @@ def study(folder, script):
 
 
 def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
-    """Run 1 makes the data; run 2, the first of the first start, is killed."""
     script = f"echo x >> {tmp_path}/runs; [ $(wc -l < {tmp_path}/runs) = 2 ] && kill -9 $$\n"
     arguments = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", "1"]
     bubblefit(*arguments, cwd=tmp_path)
@@ -277,7 +273,6 @@ def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
 
 @pytest.mark.parametrize("moment", ["mkdtemp", "rmtree"])
 def test_no_moment_of_an_interruption_leaves_a_folder(tmp_path, monkeypatch, moment):
-    """The signal comes while the folder is made (held off), or while it is removed (finished)."""
     place = scratch.tempfile if moment == "mkdtemp" else scratch.shutil
     really, came = getattr(place, moment), []
 
@@ -306,7 +301,7 @@ def test_interruption_ends_calculix(ccx, tmp_path, jobs):
     arguments = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", jobs]
     pids = tmp_path / "pids"
 
-    def all_run() -> bool:
+    def all_run():
         if not pids.exists() or len(pids.read_text().split()) < 3:
             return False
         time.sleep(0.3)

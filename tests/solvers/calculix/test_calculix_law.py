@@ -189,7 +189,6 @@ def test_random_paths_give_the_stress_of_the_python_law(function, name):
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("size", SIZES)
 def test_increments_of_any_size_from_anywhere(function, name, size):
-    """At the ends of pieces, below zero, beyond the range; far below the rounding of a strain."""
     law = LAWS[name]
     for old, new in increments_everywhere(law, size):
         gradient = np.eye(3)

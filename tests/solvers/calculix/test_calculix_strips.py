@@ -1,7 +1,6 @@
 """The three strips on CalculiX: agreement with the membrane and closed forms, the gauge, faults."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import (
     PatchModel,
-    UniaxialModel,
     bias_strip,
     elongations,
     straight_strip,
@@ -35,14 +33,14 @@ WIDTH, THICKNESS = 25.0, 0.81
 COARSE = {"across": 4, "along": 12}
 
 
-def model(name: str, increments: int = 100, **counts: int) -> UniaxialModel:
+def model(name, increments=100, **counts):
     if name == "bias":
         return bias_strip(*BIAS, THICKNESS, increments=increments, **counts)
     lengths = WARP if name == "warp" else FILL
     return straight_strip(name, *lengths, THICKNESS, increments=increments, **counts)
 
 
-def off(found, expected) -> float:
+def off(found, expected):
     """Largest difference anywhere on the load curve, as a part of the end load."""
     assert found.load.shape == expected.load.shape
     return float(np.abs(found.load - expected.load).max() / expected.load[-1])
@@ -84,7 +82,6 @@ def test_agrees_with_the_membrane(ccx, name, element, law, increments, counts, m
 @pytest.mark.parametrize("name", ["warp", "fill"])
 @pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
 def test_the_homogeneous_strip(ccx, name, element, thickness_change):
-    """Stress is the integral of E, whatever the increments; the strip gets narrower by nu."""
     strip_model, law = model(name, 20), replace(LAW, thickness_change=thickness_change)
     strain = np.log1p(np.array(strip_model.elongations) / strip_model.gauge_length)
     integral = np.polyint(law.beta[8:] if name == "warp" else law.beta[4:8])
@@ -99,7 +96,7 @@ def test_the_homogeneous_strip(ccx, name, element, thickness_change):
     np.testing.assert_allclose(found.displacement[:, :, 0], sideways, atol=1e-6)
 
 
-def plane_stress(folder: Path) -> Path:
+def plane_stress(folder):
     """Templates of a user who takes plane stress elements: the membrane's own shape functions."""
     deck = (TEMPLATES / "calculix" / "strip.inp.j2").read_text()
     mesh = (TEMPLATES / "calculix" / "mesh.inp.j2").read_text()
@@ -206,7 +203,6 @@ def test_the_deck(name, angle):
 
 
 def test_a_law_that_breaks_on_the_way(ccx, tmp_path):
-    """The warp modulus is nothing at 6 % strain, the end of the strip is at 15 %."""
     beta = np.zeros(12)
     beta[[3, 7, 10, 11]] = 5.0, 220.0, -5000.0, 300.0
     with pytest.raises(SolverFailure, match="did not converge at step 1") as found:

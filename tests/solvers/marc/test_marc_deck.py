@@ -226,7 +226,7 @@ def test_whole_decks_of_the_site(tmp_path):
 
 
 @pytest.mark.parametrize("key", ["slack", "rim_motion"])
-def test_a_slack_sheet_and_a_rim_that_moves_are_refused(key) -> None:
+def test_a_slack_sheet_and_a_rim_that_moves_are_refused(key):
     mesh = disk_mesh(100.0, 16)
     rim = len(mesh.node_sets["rim"])
     what = {"slack": (0.001, 0.0), "rim_motion": np.zeros((1, rim, 3))}[key]

@@ -128,7 +128,6 @@ def test_random_paths_give_stress_and_stiffness_of_the_python_law(libraries, nam
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("size", SIZES)
 def test_increments_of_any_size_from_anywhere(libraries, name, size):
-    """At the ends of pieces, below zero, beyond the range; far below the rounding of a strain."""
     law, stress = LAWS[name], reals(3.0, -1.0, 0.5)
     for old, new in increments_everywhere(law, size):
         point = Point(libraries(name, own_state=True))
@@ -180,7 +179,6 @@ def test_the_full_tangent_is_the_derivative_of_the_stress(libraries, name):
 
 
 def test_a_call_changes_nothing_that_the_next_one_needs(libraries):
-    """Marc calls at every recycle with the state at the start of the increment."""
     point = Point(libraries("cubic"))
     point.commit(reals(0.02, 0.01, -0.03))
     first, _, _, state = point.call(reals(0.01, 0.0, 0.02))
@@ -248,7 +246,6 @@ def test_what_the_law_cannot_be_asked_ends_the_job(tmp_path, libraries):
 
 @pytest.mark.parametrize("name", ["cubic", "incompressible"])
 def test_the_check_in_the_heading_is_what_the_subroutine_answers(tmp_path, name):
-    """A bar as in the heading, its width found by Newton with the D that Marc would be given."""
     text = hypela2(MaterialCard(LAWS[name], 0.5, "Valmex"), NoOptions()).files[".f"]
     library = build(tmp_path, text, "-ffixed-form", beside=QUIT)
     point = Point(library)

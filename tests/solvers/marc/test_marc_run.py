@@ -246,7 +246,6 @@ def test_results_that_cannot_be_used(fake, good, damage, match):
 
 
 def test_results_of_another_job_are_not_taken(machine, fake):
-    """Left by an earlier job in a place that a careless script copies from."""
     other = BubbleModel(disk_mesh(120.0, 32, "quarter"), 0.81, (0.01, 0.03))
     folder = files(machine / "other", other, MembraneSolver().run(other, LAW))
     assert "of another job" in failure(fake(f"cp {folder}/job.* .")).reason

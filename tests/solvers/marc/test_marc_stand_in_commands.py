@@ -70,7 +70,6 @@ def card(tmp_path):
 
 @pytest.mark.slow
 def test_the_known_solution_is_found_in_four_runs_of_marc(marc, tmp_path):
-    """Six digits, and more increments than the membrane that leads: twelve each."""
     text = (EXAMPLES / "bubble-known-solution/project.toml").read_text()
     for old, new in (("elements = 800 ", "elements = 48 "), ("starts = 50", "starts = 1")):
         assert old in text

@@ -45,7 +45,7 @@ def bending(settings=SETTINGS, law=LINEAR):
 DECKS = {"bubble": bubble(), "strip": strip(), "bending": bending()}
 
 
-def read(folder: Path, text: str):
+def read(folder, text):
     path = folder / "job.dat"
     path.write_text(text)
     return read_deck(path)
@@ -113,7 +113,7 @@ def test_the_law_is_found_in_tables_and_in_the_subroutine(tmp_path, name):
             np.testing.assert_allclose(other.modulus(modulus, strain), wanted, rtol=1e-8)
 
 
-def first(pattern: str, text: str, new: str) -> str:
+def first(pattern, text, new):
     """`text` with the first match of `pattern` replaced by what `new` says."""
     changed, count = re.subn(pattern, new, text, count=1, flags=re.MULTILINE)
     assert count == 1 and changed != text, pattern

@@ -114,7 +114,6 @@ def read(path):
 
 
 def test_every_truncation_is_refused(tmp_path):
-    """A prime stride meets every kind of place; the last lines byte by byte."""
     whole = t19_text(POINTS, QUADS, frames(2)).encode()
     path = tmp_path / "job.t19"
     for size in (*range(0, len(whole), 11), *range(len(whole) - 200, len(whole))):
