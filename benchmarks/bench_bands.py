@@ -1,8 +1,5 @@
 """Check what biases the moduli of the known solution, and whether bands and notes are right."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
 
 import bubblefit as bf
@@ -12,7 +9,6 @@ from bubblefit.inference.assessment import moduli_error
 from bubblefit.inference.posterior import bands_of
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.best import with_certainty
-from bubblefit.runs.setup import FitSetup
 from common import known_project, known_setup, settled, start_on
 from scipy.interpolate import CloughTocher2DInterpolator
 
@@ -32,7 +28,7 @@ CASES = {
 }
 
 
-def bias(starts: int = 3) -> None:
+def bias(starts=3):
     """Fit data of other meshes and load steps, and by polynomial surfaces; STARTS each.
 
     Printed: e, largest errors of the moduli, without the mesh's part, and the truth in the bands.
@@ -72,12 +68,11 @@ def bias(starts: int = 3) -> None:
               flush=True)  # fmt: skip
 
 
-def held(band: Sequence[np.ndarray], true: np.ndarray) -> np.ndarray:
-    """Return at which strains the truth lies between the ends of a band."""
+def held(band, true):
     return (band[0] <= true) & (true <= band[1])
 
 
-def correlated(points: np.ndarray) -> np.ndarray:
+def correlated(points):
     """Return the factor (points, points) that makes white noise alike over a facet, times mm."""
     distance = np.hypot(*(points[:, None] - points).T)
     whole = np.exp(-((distance / FACET) ** 2)) + 1e-9 * np.eye(len(points))
@@ -85,10 +80,9 @@ def correlated(points: np.ndarray) -> np.ndarray:
 
 
 def noisy(
-    pressures: Sequence[float], points: np.ndarray, exact: Sequence[np.ndarray], root: np.ndarray,
-    seed: Sequence[int],
-) -> tuple[DisplacementField, ...]:  # fmt: skip
-    """Return the displacements with correlated noise."""
+    pressures, points, exact, root,
+    seed,
+):  # fmt: skip
     random = np.random.default_rng(seed)
     return tuple(
         DisplacementField(p, points, u + root @ random.standard_normal(u.shape))
@@ -96,7 +90,7 @@ def noisy(
     )
 
 
-def coverage(fields: int = 100, quads: int = 432) -> None:
+def coverage(fields=100, quads=432):
     """Count how often the bands of fits to FIELDS noisy fields hold the truth.
 
     Data of 7200 quads at the nodes of a disk of QUADS, noise alike over a facet; strains up to 0.9
@@ -111,9 +105,9 @@ def coverage(fields: int = 100, quads: int = 432) -> None:
     targets, known = comparison.objective.targets, prepared.known
     nodes = comparison.model.mesh.points[:, :2]
     root = correlated(nodes)
-    inside: dict[str, list] = {}
-    moduli: dict[str, list] = {}
-    widths: dict[str, list] = {}
+    inside = {}
+    moduli = {}
+    widths = {}
     for number in range(fields):
         seen = noisy([t.pressure for t in targets], nodes,
                      [t.displacement for t in targets], root, [number, 7])  # fmt: skip
@@ -150,7 +144,7 @@ def coverage(fields: int = 100, quads: int = 432) -> None:
         print(f"width of the band over scatter, {name}: {np.median(ratio):.2f} (median)")
 
 
-def discrepancy(fields: int = 100, quads: int = 192, *chosen: str) -> None:
+def discrepancy(fields=100, quads=192, *chosen):
     """Count in how many of FIELDS noisy fields a wrong form of law or model is noticed.
 
     Data of 3200 quads at points 4 mm apart, matched on a disk of QUADS. CHOSEN: names of `CASES`.
@@ -186,7 +180,7 @@ def discrepancy(fields: int = 100, quads: int = 192, *chosen: str) -> None:
               f"smooth {np.median(rms):.2g} mm", flush=True)  # fmt: skip
 
 
-def form_setup(quads: int, symmetry: str, form: str, thickness: str) -> FitSetup:
+def form_setup(quads, symmetry, form, thickness):
     """Prepare a fit, its data without noise; `thickness` is the option of the data."""
     project = known_project()
     (test,) = project.tests.values()
@@ -200,10 +194,7 @@ def form_setup(quads: int, symmetry: str, form: str, thickness: str) -> FitSetup
     return known_setup(replace(project, tests={test.name: case}, law=law, fabric=fabric))
 
 
-def camera(
-    fields: Sequence[DisplacementField], points: np.ndarray, turned: float
-) -> list[np.ndarray]:
-    """Return the displacements at the points of a camera that is turned."""
+def camera(fields, points, turned):
     c, s = np.cos(turned), np.sin(turned)
     turn = np.array([[c, -s], [s, c]])
     moved = []

@@ -1,7 +1,5 @@
 """Bend inflated cylinders: CalculiX beside the membrane, coarse and fine elements, increments."""
 
-from __future__ import annotations
-
 import resource
 import time
 from dataclasses import replace
@@ -11,9 +9,8 @@ import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder.predicted import initial_stiffness
 from bubblefit.materials.card import MaterialCard
-from bubblefit.meshes.cylinder_model import CylinderModel, inflated_cylinder
+from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.runs.refinement import refine
-from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.bending import closed_membrane_of
@@ -29,9 +26,9 @@ NAME, SIZE, DEFLECTION, FRAMES = "150 mm, 140 kPa", 46.8, 120.0, 30
 
 
 def calculix(
-    size: float = 30.0, *cases: str, to: float = 240.0, increment: float = 4.0,
-    contact: float = cylinder.STIFFNESS, constant_pressure: bool = False,
-) -> None:  # fmt: skip
+    size=30.0, *cases, to=240.0, increment=4.0,
+    contact=cylinder.STIFFNESS, constant_pressure=False,
+):  # fmt: skip
     """Compare both solvers; SIZE: mm of an element, CASE: DIAMETER/KPA, contact in MPa/mm.
 
     Same model, mesh and law (Table 4.2), the membrane both ends of its band; CPU time.
@@ -52,8 +49,7 @@ def calculix(
         compare(replace(model, increments=np.union1d(steps, shown).tolist()), case, contact)
 
 
-def compare(model: CylinderModel, case: str, contact: float) -> None:
-    """Print the inflated states, loads and cost of both solvers."""
+def compare(model, case, contact):
     print(f"\n## {case} (mm/kPa), {len(model.mesh.quads):,} quads, contact {contact:g} MPa/mm")
     closed = closed_membrane_of(model)
     closed = replace(closed, bending=replace(closed.bending, penalty=contact))
@@ -86,7 +82,7 @@ def compare(model: CylinderModel, case: str, contact: float) -> None:
     print(f"cost: CalculiX {calculix:.1f} s, {calculix / stiff:.1f} times {stiff:.1f} s")
 
 
-def run(solver: MembraneSolver | CalculixSolver, model: object) -> tuple[History | None, float]:
+def run(solver, model):
     """Return the history, if any, and s of CPU time, that of a subprocess included."""
     begun = processor_seconds()
     try:
@@ -100,20 +96,19 @@ def run(solver: MembraneSolver | CalculixSolver, model: object) -> tuple[History
     return history, spent
 
 
-def processor_seconds() -> float:
-    """Return the CPU time of this process and of its ended children."""
+def processor_seconds():
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + children.ru_utime + children.ru_stime
 
 
-def inflated(model: CylinderModel, history: History) -> tuple[float, float, float]:
+def inflated(model, history):
     """Return radius and length (mm) of the tube and its volume (l) before bending."""
     side = model.mesh.node_sets["side_line"]
     at = model.mesh.points[side] + history.displacement[0, side]
     return at[0, 0], 2 * at[:, 2].max(), 1e-6 * float(history.cavity_volume[0])
 
 
-def elements(sizes: str = "25,12", *cases: str) -> None:
+def elements(sizes="25,12", *cases):
     """Predict the example's cylinders (DIAMETER/KPA) with elements of SIZES mm, the last finest."""
     project = bf.read_project(BENDING)
     heads = ("cylinder, card", "mm", "quads", "N/mm", *(f"at {p:g} mm, N" for p in PLACES))
@@ -137,7 +132,7 @@ def elements(sizes: str = "25,12", *cases: str) -> None:
                 print(f"| {' | '.join(row)} | {most} |", flush=True)
 
 
-def levels(what: str = "elements", count: int = 2) -> None:
+def levels(what="elements", count=2):
     """Refine `elements` or `increments` of a quarter cylinder COUNT times, to 120 mm."""
     project = bf.read_project(BENDING).with_solver("membrane", {}, ["wall=tension field"])
     deflections = tuple(map(float, np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:]))

@@ -1,7 +1,5 @@
 """Compare CalculiX with the membrane: cost, fits, fields, strips, tolerances, faces of bodies."""
 
-from __future__ import annotations
-
 import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.inference.assessment import moduli_error
@@ -10,7 +8,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.strip_models import UniaxialModel, bias_strip, straight_strip
+from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.runs.starts import run_start
 from bubblefit.solvers import prescribed
 from bubblefit.solvers.calculix import sheets
@@ -42,7 +40,7 @@ OF_STRIP = ((1e-7, 1e-6), (1e-5, 1e-4), (1e-4, 1e-3), (1e-3, 1e-2))
 BODIES = ((96, 96, 32, "faces"), (48, 24, 6, "faces"), (24, 12, 4, "faces"), (24, 12, 4, "ring"))
 
 
-def cost() -> None:
+def cost():
     """Print the seconds of one analysis of a bubble of 200 quads on both solvers."""
     model, known = known_model_and_law()
     print(f"{len(model.mesh.quads)} quads, {len(model.increments)} increments of the law, one core")
@@ -61,7 +59,7 @@ def cost() -> None:
             print(f"{name:18s} {element:4s} CalculiX {outside:6.2f} s, {ratio}", flush=True)
 
 
-def fits(runs: int = 60) -> None:
+def fits(runs=60):
     """Fit CalculiX' own data, led by the membrane and by NLopt alone, stopped after RUNS runs."""
     setup = known_setup(known_project(COARSE, solver="calculix"))
     problem, known = setup.problem(), setup.tests[0].known
@@ -88,13 +86,13 @@ def fits(runs: int = 60) -> None:
               flush=True)  # fmt: skip
 
 
-def starts(count: int = 1) -> None:
+def starts(count=1):
     """Fit the known solution on 48 S8R shells from COUNT random starts; print e run by run."""
     setup = known_setup(known_project(COARSE, solver="calculix"))
     problem, known = setup.problem(), setup.tests[0].known
     reached = MembraneSolver().run(problem.comparisons[0].model, known).strain_max
     for number in range(count):
-        heard: list[float] = []
+        heard = []
         options, hear = FitOptions("lm", max_analyses=100), objectives_of("calculix", heard)
         record = run_start(problem, options, 1, number, hear)
         law = known.with_beta(problem.unknowns.beta(np.array(record.unknowns)))
@@ -103,7 +101,7 @@ def starts(count: int = 1) -> None:
         print(f"start {number}: e = {runs}; moduli within {error:.1g} %", flush=True)
 
 
-def mesh(finest: int = 192) -> None:
+def mesh(finest=192):
     """Print the largest differences of bubbles of up to FINEST quads, % of the apex height."""
     base, known = known_model_and_law()
     heads = "".join(f"{1e3 * p:7.0f}" for p in base.pressures)
@@ -115,7 +113,7 @@ def mesh(finest: int = 192) -> None:
                 print(f"{name:20s}{element:8s}{quads:6d}{row}", flush=True)
 
 
-def mesh_row(base: BubbleModel, law: HypoelasticLaw, element: str, quads: int) -> str:
+def mesh_row(base, law, element, quads):
     """Return the differences, without the last pressures where CalculiX stops before them."""
     disk = disk_mesh(100.0, 4 * quads, "quarter")
     apex = disk.node_sets["apex"][0]
@@ -137,13 +135,12 @@ def mesh_row(base: BubbleModel, law: HypoelasticLaw, element: str, quads: int) -
     return "".join(f"{value:7.2f}" for value in off) + missing + f"       {height:.3f}"
 
 
-def bias(increments: int, refined: int) -> UniaxialModel:
-    """Return the bias strip of Table 3.1 on its mesh refined so many times."""
+def bias(increments, refined):
     counts = {"across": 10 * refined, "along": 30 * refined}
     return bias_strip(*BIAS, THICKNESS, increments=increments, **counts)
 
 
-def strips(finest: int = 2) -> None:
+def strips(finest=2):
     """Compare the three strips, the bias strip on meshes refined up to FINEST times.
 
     The bias strip in 20 increments: beside the same mesh, and one refined three times. Table 3.2.
@@ -162,8 +159,7 @@ def strips(finest: int = 2) -> None:
             strip_row("bias", element, bias(20, refined), fine)
 
 
-def strip_row(name: str, element: str, model: UniaxialModel, fine: np.ndarray | None = None):
-    """Print one strip on both solvers."""
+def strip_row(name, element, model, fine=None):
     done = []
     membrane, calculix = (
         seconds(lambda solver=solver: done.append(solver.run(model, LAW_3_2)))
@@ -171,7 +167,7 @@ def strip_row(name: str, element: str, model: UniaxialModel, fine: np.ndarray | 
     )
     inside, outside = done
 
-    def off(load: np.ndarray) -> str:
+    def off(load):
         return f"{100 * np.abs(outside.load - load).max() / load[-1]:9.2g}"
 
     print(f"{name:6s}{element:9s}{len(model.mesh.quads):6d}{len(model.elongations):6d}"
@@ -180,7 +176,7 @@ def strip_row(name: str, element: str, model: UniaxialModel, fine: np.ndarray | 
           f"{calculix / membrane:7.0f}", flush=True)  # fmt: skip
 
 
-def tolerances(models: str = "bubble") -> None:
+def tolerances(models="bubble"):
     """Print what looser tolerances cost and save on the bubble (`all`: and on the bias strip)."""
     base, known = known_model_and_law()
     disk = disk_mesh(100.0, 192, "quarter")
@@ -212,7 +208,7 @@ def tolerances(models: str = "bubble") -> None:
         setattr(sheets, name, shipped)
 
 
-def collar(size: float = 60.0) -> None:
+def collar(size=60.0):
     """Bend a cylinder by collars and on supports of few and many faces; SIZE: mm of an element.
 
     The collar begins 0.5 mm above the cylinder by its faces, or by the ring of these.
@@ -220,7 +216,7 @@ def collar(size: float = 60.0) -> None:
     model = inflated_cylinder(150.0, 0.14, THICKNESS, size, deflections=(10.0, 20.0))
     radius = 0.5 * model.collar.inner_diameter
 
-    def way_of_ring(faces: np.ndarray, points: np.ndarray) -> float:
+    def way_of_ring(faces, points):
         near = points[(points[:, 1] > 0) & (points[:, 2] <= 0.5 * model.collar.length)]
         return float((np.sqrt(radius**2 - near[:, 0] ** 2) - near[:, 1]).min())
 

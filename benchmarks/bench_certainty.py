@@ -1,14 +1,11 @@
 """Check what a plan predicts, what a bootstrap costs and how strips count in the certainty."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.kinds import Candidate, MakeSolver, Planning, Weighting
+from bubblefit.experiments.kinds import Planning, Weighting
 from bubblefit.experiments.registry import kinds
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.comparison import Comparison
@@ -18,7 +15,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import bootstrap as study
 from bubblefit.runs.fit import fit
-from bubblefit.runs.plan import Present, present_tests
+from bubblefit.runs.plan import present_tests
 from bubblefit.runs.setup import prepare_fit
 from common import EXAMPLES, SHARED, known_project, start_on
 
@@ -36,9 +33,7 @@ DESIGNS = (
 )  # fmt: skip
 
 
-def case(
-    scale: Sequence[float], noise: Mapping[str, float]
-) -> tuple[Present, MakeSolver, dict[str, Candidate]]:
+def case(scale, noise):
     """Return the bubble with moduli times `scale` (G12, E2, E1), and what could be added."""
     project = known_project(QUADS)
     project = replace(project, law=project.law.model_copy(update={"strain_range": list(RANGE)}))
@@ -69,8 +64,7 @@ class Simulated:
     sigma: float
 
     @classmethod
-    def of(cls, comparison: Comparison, specimens: int, present: Present) -> Simulated:
-        """Compute the data of so many specimens."""
+    def of(cls, comparison, specimens, present):
         unknowns, objective = present.problem.unknowns, comparison.objective
         history, slope = comparison.differentiate(present.law, unknowns.free, {}, warm=False)
         exact = objective.residual(history, {}) * objective.scale
@@ -78,7 +72,7 @@ class Simulated:
         # Specimens that are alike but for their noise are one of less noise.
         return cls(comparison, specimens, exact, slopes, objective.least_noise / specimens**0.5)
 
-    def residual(self, present: Present, y: np.ndarray) -> np.ndarray:
+    def residual(self, present, y):
         """Return model less exact data, (m,), at unknowns y of the law."""
         unknowns, objective = present.problem.unknowns, self.comparison.objective
         law = present.law.with_beta(unknowns.beta(y))
@@ -86,9 +80,7 @@ class Simulated:
         return objective.residual(history, {}) * objective.scale - self.exact
 
 
-def scatter(
-    tests: Sequence[Simulated], present: Present, asked: LawQuery, sets: int, seed: int
-) -> tuple[float, int]:
+def scatter(tests, present, asked, sets, seed):
     """Return the RMS scatter of G12 in refits along its strain, and how many sets had no fit."""
     size = PRIOR * np.abs(present.point.unknowns)
     whole = sum(t.slopes.T @ t.slopes / t.sigma**2 for t in tests) + np.diag(size**-2)
@@ -117,9 +109,7 @@ def scatter(
     return float(np.sqrt(np.mean(np.square(off)))), failed
 
 
-def designs(
-    scale: Sequence[float], noise: Mapping[str, float], sets: int, seed: int
-) -> list[tuple]:
+def designs(scale, noise, sets, seed):
     """Return name, predicted and simulated figure of G12, sets without a fit, of every design."""
     present, make, offered = case(scale, noise)
     ends = np.minimum(present.reached, RANGE)
@@ -137,7 +127,7 @@ def designs(
     return rows
 
 
-def plan(sets: int = 250, repetitions: int = 10, ranked: int = 30) -> None:
+def plan(sets=250, repetitions=10, ranked=30):
     """Compare the predicted uncertainty of ten designs with the scatter of refits of noisy data.
 
     The example's bubble on 48 quads and one more test; SETS of noise, fitted by Gauss-Newton steps.
@@ -170,9 +160,7 @@ def plan(sets: int = 250, repetitions: int = 10, ranked: int = 30) -> None:
         print(f"the first in rank is first by simulation: {first} of {repetitions}")
 
 
-def bootstrap(
-    samples: int = 100, *, data: str = str(SHARED / "bubble"), elements: int = 108
-) -> None:
+def bootstrap(samples=100, *, data=str(SHARED / "bubble"), elements=108):
     """Bootstrap the frames of the published test 1; print analyses and whether refits settle.
 
     20 frames, full disk of ELEMENTS quads, constant moduli; refits with ten times as many analyses.
@@ -197,7 +185,7 @@ def bootstrap(
         print(f"  {name} of {few} samples moves by {off.max():.2g} sigma at most when it settles")
 
 
-def strips(*, data: str = str(SHARED / "uniaxial")) -> None:
+def strips(*, data=str(SHARED / "uniaxial")):
     """Compare the certainty of the published strips by specimens with that by every load.
 
     By the published polynomials and, where DATA has them, by the measured points; cubics.

@@ -1,7 +1,5 @@
 """Measure time, memory and size: analyses, growth with the mesh, reading, pages."""
 
-from __future__ import annotations
-
 import resource
 import sys
 import tempfile
@@ -13,7 +11,6 @@ from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.doubts import View, doubts_of
 from bubblefit.experiments.bubble.registration import register_fields
 from bubblefit.experiments.kinds import Expected
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.readers.fields import DisplacementField, read_fields
@@ -35,7 +32,7 @@ RADIUS = 100.0
 FIGURES = "figure img, svg.chart, svg.map, svg.solid"
 
 
-def analysis(repeats: int = 40) -> None:
+def analysis(repeats=40):
     """Time an analysis of the known solution and its derivatives, the least of REPEATS turns."""
     model, law = known_model_and_law()
     solver = MembraneSolver()
@@ -64,7 +61,7 @@ def analysis(repeats: int = 40) -> None:
     print(f"a gradient costs {gradient:.2f} of an analysis (goal: at most 0.5)")
 
 
-def growth(largest: int = QUADS[-1]) -> None:
+def growth(largest=QUADS[-1]):
     """Time quarter models of up to LARGEST quads, banded LU beside SuperLU, on one core."""
     base, law = known_model_and_law()
     print(f"{'quads':>6s}{'unknowns':>10s}{'band, s':>9s}{'SuperLU, s':>12s}"
@@ -90,7 +87,7 @@ def growth(largest: int = QUADS[-1]) -> None:
     print(f"time grows with quads to the power {np.polyfit(sizes, ratios, 1)[0]:.2f}")
 
 
-def timed(model: BubbleModel, law: HypoelasticLaw, limit: int) -> tuple[float, float, str]:
+def timed(model, law, limit):
     """Return s of one cold analysis, its highest apex (mm) and the factorisation it used."""
     factorisation.LARGEST_BAND = limit
     try:
@@ -106,7 +103,7 @@ def timed(model: BubbleModel, law: HypoelasticLaw, limit: int) -> tuple[float, f
     return wall, float(apex), "band" if kind == "BandedTangent" else "SuperLU"
 
 
-def registration(points: int = 37_000, frames: int = 49) -> None:
+def registration(points=37_000, frames=49):
     """Register and examine a whole bubble test; print s of processor time and peak memory."""
     fields = seen(points, frames)
     begun = time.process_time()
@@ -123,7 +120,7 @@ def registration(points: int = 37_000, frames: int = 49) -> None:
           f"doubts: {[d.name for d in doubts] or 'none'}")  # fmt: skip
 
 
-def seen(points: int, frames: int) -> list[DisplacementField]:
+def seen(points, frames):
     """Return an orthotropic sheet's possible shape, turned, tilted and shifted, with noise."""
     rng = np.random.default_rng(1)
     turn = Rotation.from_euler("zx", [12.0, 3.0], degrees=True)
@@ -144,7 +141,7 @@ def seen(points: int, frames: int) -> list[DisplacementField]:
     return fields
 
 
-def readers(points: int = 37_000, frames: int = 49, *formats: str) -> None:
+def readers(points=37_000, frames=49, *formats):
     """Read one export of each of FORMATS as often as there are frames; s of processor time."""
     random = np.random.default_rng(1)
     r, angle = 100 * np.sqrt(random.random(points)), 2 * np.pi * random.random(points)
@@ -168,7 +165,7 @@ def readers(points: int = 37_000, frames: int = 49, *formats: str) -> None:
               f"{peak:7.0f} MB")  # fmt: skip
 
 
-def pages(*folders: str) -> None:
+def pages(*folders):
     """Print sizes of the pages in FOLDERS, figures that are seen and complaints of a browser."""
     print("| page | report.html, kB | figures | complaints |\n|---|---|---|---|")
     sys.path.insert(0, str(ROOT))

@@ -4,8 +4,6 @@ Kills the command, a worker, or CalculiX. Compares the result with that of a who
 for processes, scratch folders, half-written files and shared memory left. Exit code 1 if any.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import os
@@ -17,11 +15,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from common import start_on
@@ -84,7 +80,7 @@ warp = { gauge_length = 20, final_length = 22.9 }
 fill = { gauge_length = 20, final_length = 22.9 }
 data = { files = ["points.csv"] }
 """
-COMMANDS: dict[str, tuple[str, tuple[str, ...]]] = {
+COMMANDS = {
     "fit": (BUBBLE.replace("{starts}", "4"), ("fit",)),
     "fit by CalculiX": (BUBBLE.replace("{starts}", "2"), ("fit", "--solver", "calculix")),
     "bend": (CYLINDERS, ("bend", "--samples", "0")),
@@ -104,9 +100,7 @@ class Told:
 
 
 class Trial:
-    """One command in a folder of its own, killed and resumed."""
-
-    def __init__(self, folder: Path, name: str) -> None:
+    def __init__(self, folder, name):
         text, (command, *options) = COMMANDS[name]
         folder = folder / "project"  # results are called by it
         folder.mkdir(parents=True)
@@ -118,7 +112,7 @@ class Trial:
         self.arguments = [command, "project.toml", *options, "--out", "out", "--quiet"]
         self.said = folder / "stderr"
 
-    def start(self) -> int:
+    def start(self):
         """Fork this process into the command, with --resume where results exist."""
         used = any((self.out / name).exists() for name in ("run.json", "result.json"))
         sys.stdout.flush()
@@ -146,7 +140,7 @@ class Trial:
         finally:
             os._exit(70)
 
-    def all_alive(self, own: int) -> list[tuple[int, str]]:
+    def all_alive(self, own):
         """Return numbers and names of living processes of the trial: of its session or marked."""
         mark = f"{MARK}={self.folder}".encode()
         found = []
@@ -162,7 +156,7 @@ class Trial:
                 found.append((number, head.partition("(")[2]))
         return found
 
-    def left(self) -> list[str]:
+    def left(self):
         """Return scratch folders, half-written files and shared memory that are there."""
         places = [*(self.folder / "tmp").iterdir(), *self.folder.rglob(".*.part")]
         places += [path for path in self.out.rglob(".*") if path.is_file()]
@@ -170,8 +164,7 @@ class Trial:
         return [str(path) for path in places]
 
 
-def until(done: Any, seconds: float) -> bool:
-    """Wait for a condition; return True if it came to hold within the time."""
+def until(done, seconds):
     end = time.monotonic() + seconds
     while not done():
         if time.monotonic() > end:
@@ -180,7 +173,7 @@ def until(done: Any, seconds: float) -> bool:
     return True
 
 
-def finish(process: int) -> int:
+def finish(process):
     """Return the exit code (-9: killed); -1000 where the process took too long and was killed."""
     if until(lambda: not alive_still(process), LONGEST):
         return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
@@ -189,7 +182,7 @@ def finish(process: int) -> int:
     return -1000
 
 
-def killed(trial: Trial, process: int, draw: random.Random) -> str:
+def killed(trial, process, draw):
     """Kill one of the trial's processes; return which, "" where it had ended."""
     alive = trial.all_alive(process)
     solvers = [number for number, name in alive if name.startswith("ccx")]
@@ -204,17 +197,16 @@ def killed(trial: Trial, process: int, draw: random.Random) -> str:
     return ""
 
 
-def alive_still(process: int) -> bool:
-    """Return True while our child has not ended (it is not waited for)."""
+def alive_still(process):
     with suppress(OSError):
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
 
 
-def content(out: Path) -> dict[str, Any]:
+def content(out):
     """Return all that a command found: result.json and tables, without what `UNEQUAL` names."""
 
-    def plain(value: Any) -> Any:
+    def plain(value):
         if isinstance(value, dict):
             return {k: plain(v) for k, v in value.items() if k not in UNEQUAL}
         return [plain(one) for one in value] if isinstance(value, list) else value
@@ -231,8 +223,8 @@ def content(out: Path) -> dict[str, Any]:
     return found
 
 
-def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, most: int,
-              draw: random.Random, told: Told) -> int:  # fmt: skip
+def one_trial(folder, name, whole, seconds, most,
+              draw, told):  # fmt: skip
     """Kill one command up to `most` times, wait for its end; return how many kills there were."""
     trial, count, failed = Trial(folder, name), 0, False
     while True:
@@ -271,8 +263,7 @@ def one_trial(folder: Path, name: str, whole: dict[str, Any], seconds: float, mo
     return count
 
 
-def trials(place: Path, name: str, kills: int, seed: int) -> Told:
-    """Kill a command so many times, in as many trials as that takes."""
+def trials(place, name, kills, seed):
     draw, told, count = random.Random(f"{name} {seed}"), Told(), 0
     first = Trial(place / f"{name} whole", name)
     for _ in range(2):  # the second time everything is compiled
@@ -293,8 +284,7 @@ def trials(place: Path, name: str, kills: int, seed: int) -> Told:
     return told
 
 
-def lines(name: str, told: Told) -> Iterator[str]:
-    """Return the lines of a command's trials."""
+def lines(name, told):
     killed_words = ", ".join(f"{what} {count}" for what, count in sorted(told.killed.items()))
     yield (
         f"{name:16} {told.trials:3} trials, killed: {killed_words}; the same to the last digit: "
@@ -303,7 +293,7 @@ def lines(name: str, told: Told) -> Iterator[str]:
     yield from (f"    {line}" for line in [*told.other, *told.left])
 
 
-def main(kills: int = 4, seed: int = 1, *commands: str) -> None:
+def main(kills=4, seed=1, *commands):
     """Kill each command KILLS times; exit with 1 where anything differs or is left."""
     if OWN not in os.environ and shutil.which("unshare"):
         mount = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs tmpfs /dev/shm && "$@"', "sh"]
@@ -319,7 +309,7 @@ def main(kills: int = 4, seed: int = 1, *commands: str) -> None:
     sys.exit(int(bad))
 
 
-def _write_points(path: Path) -> None:
+def _write_points(path):
     elongation = np.linspace(0.2, 2.8, 8)
     rows = ["direction,specimen,elongation (mm),load (N)"]
     for direction, moduli in {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}.items():

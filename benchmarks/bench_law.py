@@ -1,7 +1,5 @@
 """Measure what increments, the disk's rim, the load ratio, exports and constants lose."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import resource
@@ -10,7 +8,6 @@ import tempfile
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
@@ -28,7 +25,6 @@ from bubblefit.materials.responses import (
 )
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh
 from bubblefit.runs.validation import validate
 from bubblefit.solvers.membrane import factorisation, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -70,13 +66,13 @@ bounds = { E1 = [100, 3000], E2 = [100, 3000], G12 = [1, 300] }
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
-def in_parts(parts: int, more: tuple[float, ...] = ()) -> np.ndarray:
+def in_parts(parts, more=()):
     """Return the seven pressures, each rise in so many increments, and more of them, MPa."""
     levels = np.interp(np.arange(1, 7 * parts + 1) / parts, range(8), [0.0, *PRESSURES])
     return np.unique([*levels, *more])
 
 
-def increments(*, starts: int = 5) -> None:
+def increments(*, starts=5):
     """Compare apex heights of Table 4.2's bubble with those of 350 increments; count Newton's work.
 
     Exit code 1 where seven increments miss the goal. STARTS of the example's counted; 0 for none.
@@ -103,14 +99,14 @@ def increments(*, starts: int = 5) -> None:
         sys.exit(f"goal missed: {errors[7]:.2g} % > {GOAL} %")
 
 
-def work_of_starts(starts: int) -> tuple[dict[str, int], float]:
+def work_of_starts(starts):
     """Count Newton's work in starts of the example, whose process is a fork of this one."""
     count = {name: multiprocessing.Value("q") for name in ("increments", "assemblies", "factors")}
 
-    def count_calls(kind: Any, method: str, name: str) -> None:
+    def count_calls(kind, method, name):
         original = getattr(kind, method)
 
-        def counting(*given: Any, **named: Any) -> Any:
+        def counting(*given, **named):
             count[name].value += 1
             return original(*given, **named)
 
@@ -132,7 +128,7 @@ def work_of_starts(starts: int) -> tuple[dict[str, int], float]:
     return {name: value.value for name, value in count.items()}, spent
 
 
-def rim() -> None:
+def rim():
     """Compare apex heights on coarse disks whose rim is on the circle, or of the circle's area.
 
     Errors in % of the apex on the finest quarter disk, whose two rims hardly differ.
@@ -156,30 +152,27 @@ def rim() -> None:
     print("| order | | {:.2f}, {:.2f} | {:.2f}, {:.2f} |".format(*orders))
 
 
-def heights(mesh: Mesh) -> np.ndarray:
-    """Return the apex's height (mm) at every pressure."""
+def heights(mesh):
     history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, PRESSURES.tolist()), LAW_4_2)
     return history.displacement[:, mesh.node_sets["apex"][0], 2]
 
 
-def factor(mesh: Mesh) -> float:
+def factor(mesh):
     """Return by how much the rim's polygon has to grow to have the area of the circle."""
     x, y = mesh.points[mesh.node_sets["rim"], :2].T
     turns = np.diff(np.sort(np.arctan2(y, x)))
     return float(np.sqrt(turns.sum() / np.sin(turns).sum()))
 
 
-def moved_out(mesh: Mesh) -> Mesh:
-    """Return the disk with a rim of the circle's area."""
+def moved_out(mesh):
     return replace(mesh, points=factor(mesh) * mesh.points)
 
 
-def ratio_law(beta: np.ndarray) -> HypoelasticLaw:
-    """Return a law whose moduli are linear in the load ratio."""
+def ratio_law(beta):
     return HypoelasticLaw(beta, NU, form=LoadRatio())
 
 
-def ratio() -> None:
+def ratio():
     """Measure increments, a fit and left-out ratios of a law that goes with the load ratio."""
     print("a path in two legs, error of the strain at its end, %: ratio at start, mean, end")
     exact = strain(20_000, 0.5)
@@ -218,7 +211,7 @@ def ratio() -> None:
     print(table.to_string(index=False, float_format="%.3g"))
 
 
-def strain(parts: int, where: float) -> np.ndarray:
+def strain(parts, where):
     """Integrate along CORNERS, each leg in `parts`, the ratio taken at a share of each part."""
     law, total = ratio_law(BETA), np.zeros(2)
     for start, end in pairwise(CORNERS):
@@ -231,7 +224,7 @@ def strain(parts: int, where: float) -> np.ndarray:
     return total
 
 
-def exports() -> None:
+def exports():
     """Print what exported cards of Table 4.2 lose: moduli in tables, uncoupled curves, shear."""
     law = known_law()
     print("tables: largest error between points, %")
@@ -248,7 +241,7 @@ def exports() -> None:
     print(f"trellis to gamma12 = 0.13: {warp:.1f} and {fill:.1f} MPa along warp and fill")
 
 
-def constants(lowest: float = 0.0, highest: float = 5.0) -> None:
+def constants(lowest=0.0, highest=5.0):
     """Print the published cards as a designer's constants between two loads, kN/m.
 
     With the spread over all other choices of what is evaluated, and the RMS that lines leave.

@@ -1,7 +1,5 @@
 """Compare with Marc: published profiles, decks through the stand-in, bars of a misread law."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -31,7 +29,7 @@ MODELS = {
 }
 
 
-def profiles() -> None:
+def profiles():
     """Compare the bubble of Table 4.2 with Marc's profiles, read off a figure to about 5 %."""
     published = pd.read_csv(PROFILES, comment="#")
     model, law = known_model_and_law()
@@ -55,7 +53,7 @@ def profiles() -> None:
               f"{100 * cuts[0]:10.1f}{100 * cuts[1]:10.1f}")  # fmt: skip
 
 
-def stand_in(also: str = "") -> None:
+def stand_in(also=""):
     """Solve through Marc's deck and result file at several tolerances of the control block.
 
     Largest difference from the membrane, which the stand-in solves with. `fit`: also a fit.
@@ -84,19 +82,18 @@ def stand_in(also: str = "") -> None:
         print("known solution: e = " + ", ".join(f"{e:.1e}" for e in heard))
 
 
-def integral(modulus: Modulus, end: float, measure: Callable[[float], float]) -> float:
+def integral(modulus, end, measure):
     """Integrate a modulus that is looked up by a measure of the log strain."""
     return float(quad(lambda strain: modulus(measure(strain)), 0.0, end)[0])
 
 
-def at_ends(modulus: Modulus, end: float) -> float:
-    """Sum up the modulus at the end of each increment."""
+def at_ends(modulus, end):
     pulled = np.log1p(np.expm1(end) * np.arange(INCREMENTS + 1) / INCREMENTS)
     steps = zip(pulled[1:], np.diff(pulled), strict=True)
     return float(sum(modulus(e) * step for e, step in steps))
 
 
-READINGS: dict[str, Callable[[Modulus, float], float]] = {
+READINGS = {
     "the law": lambda modulus, end: integral(modulus, end, lambda e: e),
     "secant, not tangent moduli": lambda modulus, end: modulus(end) * end,
     "of engineering strain": lambda modulus, end: integral(modulus, end, np.expm1),
@@ -108,7 +105,7 @@ READINGS: dict[str, Callable[[Modulus, float], float]] = {
 }
 
 
-def bars() -> None:
+def bars():
     """Print end stresses (MPa) of the four published bars for ways of getting the law wrong."""
     print(f"{'MPa':36s}" + "".join(f"{f'{bar.model} {bar.direction}':>14s}" for bar in BARS))
     print(f"{'published':36s}" + "".join(f"{bar.stress:14.3f}" for bar in BARS))

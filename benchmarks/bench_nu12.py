@@ -1,7 +1,5 @@
 """Fit nu12 with the moduli to computed data of bubbles, strips and biaxial tests; 0.24 is right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import bubblefit as bf
@@ -9,15 +7,12 @@ import numpy as np
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial
 from bubblefit.experiments.biaxial.prepared import candidates as biaxial_candidates
 from bubblefit.experiments.bubble.prepared import PreparedBubble
-from bubblefit.experiments.kinds import Planning, PreparedTest
+from bubblefit.experiments.kinds import Planning
 from bubblefit.experiments.strips.prepared import candidates
 from bubblefit.inference.assessment import certainty, verdicts
 from bubblefit.inference.methods.lm import LevenbergMarquardt
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
-from bubblefit.project.project import Project
 from bubblefit.project.schema import UnknownSection, UnknownsSection
-from bubblefit.runs.setup import FitSetup
 from common import BENDING, EXAMPLES, known_project, known_setup, start_on
 
 FROM, OF_LOAD, OF_STRAIN = 0.1, 0.01, 1e-4
@@ -34,14 +29,13 @@ DATA = {
 }
 
 
-def free(project: Project) -> FitSetup:
-    """Prepare the project's fit with nu12 among the unknowns."""
+def free(project):
     unknowns = UnknownsSection(nu12=UnknownSection(bounds=[0.0, 0.6]))
     settings = project.fit.model_copy(update={"unknowns": unknowns})
     return known_setup(replace(project, fit=settings))
 
 
-def bubble(sets: int = 10, quads: int = 800) -> None:
+def bubble(sets=10, quads=800):
     """Fit SETS sets of noise on the known solution of QUADS, with strips and biaxial tests.
 
     Noise of 0.02 and of 0.05 mm, 1 % of the largest load on strips, 0.01 % on biaxial strains;
@@ -68,7 +62,7 @@ def bubble(sets: int = 10, quads: int = 800) -> None:
             print(f"{name}, {noise:g} mm: {fitted(own, test.known, FROM, True)}", flush=True)
 
 
-def noisy(test: PreparedTest, noise: float, random: np.random.Generator) -> PreparedTest:
+def noisy(test, noise, random):
     """Return the test with noise (mm) on its fields, or a share of it on its loads or strains."""
     if isinstance(test, PreparedBubble):
         fields = tuple(
@@ -90,7 +84,7 @@ def noisy(test: PreparedTest, noise: float, random: np.random.Generator) -> Prep
     return replace(test, test=replace(test.test, strips={direction: done}, noise=level))
 
 
-def fitted(setups: list[FitSetup], known: HypoelasticLaw, nu12: float | None, moduli: bool) -> str:
+def fitted(setups, known, nu12, moduli):
     """Fit each from a law on, nu12 (its own unless given) free; return what comes out."""
     found, sigma, rho, of_moduli = [], [], [], []
     for setup in setups:
@@ -123,7 +117,7 @@ def fitted(setups: list[FitSetup], known: HypoelasticLaw, nu12: float | None, mo
     return f"{words}, correlation {with_moduli}; median sigma of E1, E2, G12 {free}"
 
 
-def biaxial(sets: int = 10) -> None:
+def biaxial(sets=10):
     """Fit SETS of the computed biaxial example with other noise, first reading and strain kept."""
     known = bf.read_project(BENDING, need_data=False).cards["uniaxial"].card.law
     setup = free(bf.read_project(EXAMPLES / "biaxial-computed" / "project.toml"))

@@ -1,9 +1,6 @@
 """Compare starts on the known solution: methods, seeds, where starts begin, coarse to fine."""
 
-from __future__ import annotations
-
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.runs import fit as stages
 from bubblefit.runs.executor import Executor
 from bubblefit.runs.fit import SAME_MODULI, distinct, moduli_apart
-from bubblefit.runs.setup import CoarseToFine, FitSetup, coarse_problem
+from bubblefit.runs.setup import CoarseToFine, coarse_problem
 from bubblefit.runs.starts import StartRecord, run_start
 from common import known_project, known_setup, start_on
 
@@ -33,9 +30,7 @@ FOUND = 1e-6
 ELEMENTS, EARLIER_SEED, EARLIER, SAME, OTHER = 48, 99, 5, 0.01, 1.3
 
 
-def ended(
-    setup: FitSetup, options: FitOptions, seed: int, count: int
-) -> tuple[np.ndarray, float, str]:
+def ended(setup, options, seed, count):
     """Run starts; return e of each, the median of analyses, and best, median and worst e."""
     found = Executor().run_starts(setup.problem, options, seed, range(count))
     records = [record for record in found if isinstance(record, StartRecord)]
@@ -44,12 +39,11 @@ def ended(
     return e, float(np.median([r.analyses for r in records])), words
 
 
-def objectives(records: Sequence[StartRecord]) -> np.ndarray:
-    """Return e of each start, infinity where it failed."""
+def objectives(records):
     return np.array([np.inf if r.objective is None else r.objective for r in records])
 
 
-def methods(starts: int = 6, *names: str) -> None:
+def methods(starts=6, *names):
     """Compare optimisers (NAMES as in the first column) from the same random feasible starts.
 
     Published (DOT and Marc, boolean): best 0.096, median 0.226, worst 3.2, 36 of 50 below 0.5.
@@ -67,7 +61,7 @@ def methods(starts: int = 6, *names: str) -> None:
               f"{analyses:10.0f}{wall:9.1f}", flush=True)  # fmt: skip
 
 
-def seeds(count: int = 1, starts: int = 50) -> None:
+def seeds(count=1, starts=50):
     """Count how many of STARTS random starts of each of COUNT seeds find the known solution."""
     setup = known_setup(known_project())
     found, tried = 0, 0
@@ -80,7 +74,7 @@ def seeds(count: int = 1, starts: int = 50) -> None:
     print(f"{found} of {tried} starts below {FOUND:g}")
 
 
-def places(starts: int = 12, seeds: int = 2) -> None:
+def places(starts=12, seeds=2):
     """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum.
 
     48 quads; within 1 % of the least. Proposals: from five starts on the same, or another, fabric.
@@ -95,7 +89,7 @@ def places(starts: int = 12, seeds: int = 2) -> None:
     }
     print("| starts | analyses a start | in the best optimum | analyses until it | ratio |")
     print("|---" * 5 + "|")
-    ends: dict[str, list[StartRecord]] = {}
+    ends = {}
     for way, problem.starts in ways.items():
         ends[way] = [run_start(problem, setup.options, seed, number, lambda _: None)
                      for seed in range(1, 1 + seeds) for number in range(starts)]  # fmt: skip
@@ -111,10 +105,9 @@ def places(starts: int = 12, seeds: int = 2) -> None:
               f"{until:.1f} | {until / random:.2f} |", flush=True)  # fmt: skip
 
 
-def proposals(setup: FitSetup, problem: FitProblem) -> ProposedStarts:
-    """Return the starts that evaluations of a few random starts propose."""
+def proposals(setup, problem):
     problem.starts = RandomStarts()
-    heard: list = []
+    heard = []
     for number in range(EARLIER):
         run_start(problem, setup.options, EARLIER_SEED, number, heard.append)
     good = [record for record in heard if record.objective is not None]
@@ -123,8 +116,7 @@ def proposals(setup: FitSetup, problem: FitProblem) -> ProposedStarts:
     )
 
 
-def another(setup: FitSetup, problem: FitProblem) -> FitProblem:
-    """Return the same problem with the data of a fabric of other moduli."""
+def another(setup, problem):
     (prepared,), (comparison,) = setup.tests, problem.comparisons
     stiffer = prepared.known.with_beta(OTHER * prepared.known.beta)
     history = comparison.solver.run(comparison.model, stiffer)
@@ -135,7 +127,7 @@ def another(setup: FitSetup, problem: FitProblem) -> FitProblem:
     return FitProblem((changed,), other.law, other.unknowns)
 
 
-def coarse(starts: int = 50, *project: str) -> None:
+def coarse(starts=50, *project):
     """Compare starts coarse to fine with starts on the full mesh: optima and processor time.
 
     STARTS of the example, or of PROJECT (and the folder of its measured data).

@@ -1,20 +1,16 @@
 """Fit the three measured bubble tests of VALMEX 7318, in shared/data/bubble unless --data."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from bubblefit.experiments.bubble.findings import fitted_model
-from bubblefit.experiments.kinds import PreparedTest, Weighting
-from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.experiments.kinds import Weighting
 from bubblefit.meshes.mesh import sampling_matrix
-from bubblefit.project.project import Project, read_project
+from bubblefit.project.project import read_project
 from bubblefit.runs.compare import best_of
 from bubblefit.runs.fit import fit
 from bubblefit.runs.setup import FitSetup
@@ -70,9 +66,9 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
 
 
 def project(
-    law: str, tests: Mapping[str, int], data: Path, frames: Sequence[int], elements: int,
-    modes: int, starts: int, strip_increments: int,
-) -> Project:  # fmt: skip
+    law, tests, data, frames, elements,
+    modes, starts, strip_increments,
+):  # fmt: skip
     """Return a project of measured tests by name and, unless 0, of the published strips."""
     table = pd.read_csv(data / "grid_pressures.csv")
     said = {"pressures": [float(table["p_bar"][k]) for k in frames], "frames": list(frames)}
@@ -88,7 +84,7 @@ def project(
         return read_project(path, data=dict.fromkeys(tests, data))
 
 
-def measured(data: str) -> Path:
+def measured(data):
     """Return the folder of measured data; end the script where it is not there."""
     folder = Path(data)
     if not (folder / "grid").is_dir():
@@ -97,7 +93,7 @@ def measured(data: str) -> Path:
     return folder
 
 
-def residuals(starts: int = 2, *tests: str, data: str = DATA) -> None:
+def residuals(starts=2, *tests, data=DATA):
     """Print mean |dx| + |dy| + |dz| (mm) of fits with and without offsets, and their moduli."""
     folder = measured(data)
     print(f"{'test':>4s}  {'moduli':6s}  {'nuisance':45s}{'mean, mm':>9s}{'published':>11s}"
@@ -116,7 +112,7 @@ def residuals(starts: int = 2, *tests: str, data: str = DATA) -> None:
                   flush=True)  # fmt: skip
 
 
-def symmetry(*, data: str = DATA) -> None:
+def symmetry(*, data=DATA):
     """Print how far the tests are from any doubly symmetric model, which is the fits' floor.
 
     The nearest such field in mean |dx| + |dy| + |dz| is the median of mirror images; also of dz.
@@ -134,7 +130,7 @@ def symmetry(*, data: str = DATA) -> None:
         print(f"{test:4d}{left:11.2f}{gaps[0]:20.2f}{gaps[1]:20.2f}{middle:19.1f}")
 
 
-def unsymmetric(frame: pd.DataFrame) -> np.ndarray:
+def unsymmetric(frame):
     """Return (points,) |dx| + |dy| + |dz| from the nearest doubly symmetric field."""
     cells = frame[["x", "y"]].abs().round(1)
     groups = [cells["x"], cells["y"]]
@@ -150,7 +146,7 @@ def unsymmetric(frame: pd.DataFrame) -> np.ndarray:
     return total
 
 
-def mirrored(frame: pd.DataFrame, axis: str) -> np.ndarray:
+def mirrored(frame, axis):
     """Return (pairs,) |dz - dz of the mirror image across the plane `axis` = 0|."""
     here = frame.assign(x=frame.x.round(1), y=frame.y.round(1))
     both = here.merge(here.assign(**{axis: -here[axis]}), on=["x", "y"])
@@ -158,9 +154,9 @@ def mirrored(frame: pd.DataFrame, axis: str) -> np.ndarray:
 
 
 def sheets(
-    *tests: str, data: str = DATA, elements: int = 112, modes: int = 10, starts: int = 3,
-    without_strips: bool = False, with_strips: bool = False,
-) -> None:  # fmt: skip
+    *tests, data=DATA, elements=112, modes=10, starts=3,
+    without_strips=False, with_strips=False,
+):  # fmt: skip
     """Fit each test with a surface z0 of few modes, without the strips and with them.
 
     Eleven pressures; z0 is held against the three points where it was measured.
@@ -183,7 +179,7 @@ def sheets(
                   flush=True)  # fmt: skip
 
 
-def moduli(law: HypoelasticLaw | None) -> str:
+def moduli(law):
     """Return E1, E2 in GPa and G12 in MPa at one strain, as words."""
     if law is None:
         return "no fit"
@@ -192,18 +188,16 @@ def moduli(law: HypoelasticLaw | None) -> str:
 
 
 class InMillimetres(FitSetup):
-    """A fit of several bubbles whose objective is the sum of their own, in mm."""
-
     @property
-    def weightings(self) -> tuple[Weighting, ...]:
+    def weightings(self):
         return tuple(Weighting() for _ in self.tests)
 
 
 def left_out(
-    *, data: str = DATA, elements: int = 112, modes: tuple[int, ...] = (0,),
-    form: tuple[str, ...] = ("constant",), objective: tuple[str, ...] = ("mm", "relative"),
-    starts: int = 1, strips: bool = False, frames: str = "all",
-) -> None:  # fmt: skip
+    *, data=DATA, elements=112, modes=(0,),
+    form=("constant",), objective=("mm", "relative"),
+    starts=1, strips=False, frames="all",
+):  # fmt: skip
     """Leave each test out of the fit in turn and predict it by the law of the others.
 
     Mean |dx| + |dy| + |dz|. Objective `mm`: the sum of RMS errors; `relative`: as `validate`.
@@ -236,10 +230,7 @@ def left_out(
                       f"{PUBLISHED_PREDICTED} of earlier work", flush=True)  # fmt: skip
 
 
-def law_of_others(
-    setup: FitSetup, objective: str, without: str | None, starts: int
-) -> HypoelasticLaw | None:
-    """Return the law of a fit of all tests, or without one of them."""
+def law_of_others(setup, objective, without, starts):
     kept = tuple(test for test in setup.tests if test.test.name != without)
     own = replace(setup, tests=kept)
     if objective == "mm":
@@ -249,7 +240,7 @@ def law_of_others(
     return None if unknowns is None else own.law.with_beta(problem.unknowns.beta(unknowns))
 
 
-def mean_error(test: PreparedTest, law: HypoelasticLaw | None, setup: FitSetup) -> float:
+def mean_error(test, law, setup):
     """Return mean |dx| + |dy| + |dz| of a test with a law, mm; NaN where either does not run."""
     if law is None:
         return float("nan")

@@ -4,15 +4,11 @@ Of the example with a known solution, coarse, one start, one process: each modul
 function is called, in the order of their first calls (docs/reference/walk.md). --list: all.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 
 import bubblefit as bf
 from bubblefit.runs.best import best_fit, with_certainty
@@ -25,11 +21,11 @@ KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
 
 
 @contextmanager
-def entered(modules: list[str]) -> Iterator[None]:
+def entered(modules):
     """Append each module (or template), once, when one of its functions is called."""
-    known: dict[str, str | None] = {}
+    known = {}
 
-    def watch(frame: FrameType, event: str, _: object) -> None:
+    def watch(frame, event, _):
         code = frame.f_code
         if event != "call" or code.co_name == "<module>":
             return
@@ -49,15 +45,15 @@ def entered(modules: list[str]) -> Iterator[None]:
         sys.setprofile(None)
 
 
-def walk() -> dict[str, list[str]]:
+def walk():
     """Return modules by step, each where it is entered first."""
-    steps: dict[str, list[str]] = {}
-    modules: list[str] = []
+    steps = {}
+    modules = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         path.write_text(KNOWN.read_text().replace("elements = 800", "elements = 48"))
 
-        def step(name: str) -> None:
+        def step(name):
             told = {module for several in steps.values() for module in several}
             steps[name] = [module for module in modules if module not in told]
 
@@ -82,7 +78,7 @@ def walk() -> dict[str, list[str]]:
     return steps
 
 
-def main() -> None:
+def main():
     """Print steps with their numbers of modules; with --list their names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--list", action="store_true")

@@ -1,7 +1,5 @@
 """Run on several processes and a Dask cluster: licences that are counted, cost of a run."""
 
-from __future__ import annotations
-
 import heapq
 import multiprocessing
 import os
@@ -11,10 +9,8 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
@@ -29,7 +25,7 @@ from common import known_project, known_setup, start_on
 from counted_program import CountedSolver, seen
 
 LICENCES, PROCESSES, OF_EACH, WORKERS, SECONDS, LONG = 4, 3, 2, 3, 0.05, 1.0
-FORK: Any = multiprocessing.get_context("fork")
+FORK = multiprocessing.get_context("fork")
 #: s, of one run; and for how many s there are runs for a worker.
 LENGTHS, BUSY_S = (0.01, 0.1, 1.0), 3.0
 #: s: a run of CalculiX on the example's bubble, docs/how-to/calculix.md; runs of it in a start.
@@ -40,8 +36,7 @@ THREADS, MANY = 16, 1000
 
 
 @contextmanager
-def local_cluster(workers: int, threads: int = 1) -> Iterator[str]:
-    """Start a Dask cluster on this machine and yield its scheduler's address."""
+def local_cluster(workers, threads=1):
     from distributed import LocalCluster
 
     options = {"threads_per_worker": threads, "dashboard_address": ":0", "silence_logs": 50}
@@ -49,7 +44,7 @@ def local_cluster(workers: int, threads: int = 1) -> Iterator[str]:
         yield local.scheduler_address
 
 
-def licences(jobs: int = 200) -> None:
+def licences(jobs=200):
     """Run JOBS of a program of which four may run at once; kill a worker while it runs.
 
     Three processes and a cluster of three workers share the licences: by locks of files, by leases
@@ -94,17 +89,12 @@ def licences(jobs: int = 200) -> None:
         sys.exit(1)
 
 
-def process(folder: Path, counted: str, numbers: Sequence[int], address: Any, results: Any) -> None:
-    """Run the jobs of one of the three processes."""
+def process(folder, counted, numbers, address, results):
     results.put(run(Executor(OF_EACH), folder, counted, numbers, address.get()))
 
 
-def run(
-    executor: Executor, folder: Path, counted: str, numbers: Sequence[int], scheduler: str
-) -> list[int]:
-    """Run the jobs of these numbers; return the results that came."""
-
-    def prepare() -> Callable[[int, Any], Any]:
+def run(executor, folder, counted, numbers, scheduler):
+    def prepare():
         shared = counted == "locks of files"
         given = {
             "licences": LICENCES if counted != "nobody" else None,
@@ -113,7 +103,7 @@ def run(
         }
         said = {key: value for key, value in given.items() if value is not None}
 
-        def job(number: int, tell: Any) -> Any:
+        def job(number, tell):
             # The one that is killed takes longer: it has to be killed before its end.
             counting = CountedSolver(folder / "runs", LONG if number == 0 else SECONDS)
             return licensed(counting, "counted", said).run(number, None)
@@ -124,8 +114,7 @@ def run(
         return [one for one in executor.run_tasks(prepare, numbers) if one is not None]
 
 
-def kill_one(folder: Path) -> None:
-    """Kill the worker of the cluster that has job 0, while its program runs."""
+def kill_one(folder):
     while True:
         for path in (folder / "runs" / "alive").glob("*"):
             try:
@@ -140,19 +129,17 @@ def kill_one(folder: Path) -> None:
 
 
 @contextmanager
-def here(workers: int) -> Iterator[Executor]:
-    """Yield an executor with processes of this machine."""
+def here(workers):
     yield Executor(workers)
 
 
 @contextmanager
-def cluster(workers: int, threads: int = 1) -> Iterator[Executor]:
-    """Yield an executor with workers of a Dask cluster on this machine."""
+def cluster(workers, threads=1):
     with local_cluster(workers, threads) as address, hearing(lambda said: None):
         yield Executor(scheduler=address)
 
 
-def cost(starts: int = 8) -> None:
+def cost(starts=8):
     """Measure what a run costs on one and two workers, here and of a Dask cluster.
 
     The runs sleep; then STARTS of the example; then, on paper, 1,000 starts on 100 workers.
@@ -170,7 +157,7 @@ def cost(starts: int = 8) -> None:
                     efficiency, lost = timed(executor, workers, count, length)
                 row += f" {100 * efficiency:.0f} % | {1000 * lost:.1f} |"
             print(row, flush=True)
-    spent: list[float] = []
+    spent = []
     setup = known_setup(known_project())
     for workers in (1, 2):
         row = []
@@ -202,11 +189,11 @@ def cost(starts: int = 8) -> None:
               f"{100 * np.sum(lengths) / (ON_PAPER * wall):.0f} % |")  # fmt: skip
 
 
-def timed(executor: Executor, workers: int, count: int, length: float) -> tuple[float, float]:
+def timed(executor, workers, count, length):
     """Return the efficiency of so many runs, and s lost a run."""
 
-    def prepare() -> Callable[[int, Any], tuple[float, float]]:
-        def run(number: int, tell: Any) -> tuple[float, float]:
+    def prepare():
+        def run(number, tell):
             begun = time.time()
             time.sleep(length)
             return begun, time.time()
@@ -219,7 +206,7 @@ def timed(executor: Executor, workers: int, count: int, length: float) -> tuple[
     return own / (workers * (last - first)), (workers * (last - first) - own) / count
 
 
-def scheduled(lengths: np.ndarray, handing: float) -> float:
+def scheduled(lengths, handing):
     """Return when the last ends, each given to the first free worker, one after the other."""
     free, client, end = [0.0] * ON_PAPER, 0.0, 0.0
     for length in lengths.tolist():

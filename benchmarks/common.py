@@ -1,24 +1,19 @@
 """Share published laws, projects of the examples and command lines among the benchmarks."""
 
-from __future__ import annotations
-
 import argparse
 import inspect
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from bubblefit.inference.methods.lm import LevenbergMarquardt
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.bubble_model import BubbleModel
-from bubblefit.project.project import Project, read_project
+from bubblefit.project.project import read_project
 from bubblefit.runs.best import best_fit, with_certainty
-from bubblefit.runs.setup import FitSetup, prepare_fit
-from bubblefit.runs.starts import EvaluationRecord, StartRecord
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.starts import StartRecord
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))  # no installed package has the tests
@@ -34,7 +29,7 @@ LAW_4_2 = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
 LAW_3_2 = HypoelasticLaw(1e3 * np.array(TABLE_3_2), strain_range=[0.153, 0.232, 0.7])
 
 
-def known_project(elements: int | None = None, **fit: Any) -> Project:
+def known_project(elements=None, **fit):
     """Return the example with a known solution; `elements`: of data and fit alike."""
     project = read_project(EXAMPLES / "bubble-known-solution" / "project.toml").with_fit(**fit)
     if elements is None:
@@ -44,33 +39,30 @@ def known_project(elements: int | None = None, **fit: Any) -> Project:
     return replace(project, tests={test.name: replace(test, elements=elements, data=data)})
 
 
-def known_setup(project: Project) -> FitSetup:
-    """Prepare the fit of a project, its data computed."""
+def known_setup(project):
     return prepare_fit(project, project.chosen(None, fitted=True))
 
 
-def known_model_and_law() -> tuple[BubbleModel, HypoelasticLaw]:
-    """Return the example's model and the law behind its data."""
+def known_model_and_law():
     (prepared,) = known_setup(known_project()).tests
     return prepared.test.models()["bubble"], prepared.known
 
 
-def known_law() -> HypoelasticLaw:
-    """Return the law behind the example's data."""
+def known_law():
     return known_model_and_law()[1]
 
 
-def objectives_of(solver: str, heard: list[float]) -> Callable[[EvaluationRecord], None]:
+def objectives_of(solver, heard):
     """Return a listener of a fit that appends e of each run of the solver to `heard`."""
 
-    def hear(record: EvaluationRecord) -> None:
+    def hear(record):
         if record.solver == solver:
             heard.append(np.inf if record.objective is None else record.objective)
 
     return hear
 
 
-def settled(setup: FitSetup, beta: np.ndarray, number: int) -> tuple[Any, Any] | None:
+def settled(setup, beta, number):
     """Fit from a law on; return the problem and its best with certainty, None without a fit."""
     problem = setup.problem()
     start = problem.unknowns.at(np.asarray(beta, dtype=float))
@@ -82,14 +74,13 @@ def settled(setup: FitSetup, beta: np.ndarray, number: int) -> tuple[Any, Any] |
     return problem, with_certainty(setup, problem, best_fit(problem, [record], 1e-7))
 
 
-def seconds(run: Callable[[], object]) -> float:
-    """Return the wall-clock seconds of a call."""
+def seconds(run):
     begun = time.perf_counter()
     run()
     return time.perf_counter() - begun
 
 
-def start_on(*parts: Callable[..., Any]) -> None:
+def start_on(*parts):
     """Run the part that the command line names, with its arguments; without a name all of them.
 
     Parameters are optional arguments in their order, keyword-only ones and flags are options.
@@ -123,7 +114,7 @@ def start_on(*parts: Callable[..., Any]) -> None:
     for part in [chosen] if chosen else parts:
         if not chosen:
             print(f"\n## {part.__name__}", flush=True)
-        values: list[Any] = []
+        values = []
         named = {}
         for name, own in inspect.signature(part).parameters.items() if chosen else ():
             if own.kind is own.VAR_POSITIONAL:

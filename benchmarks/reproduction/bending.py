@@ -6,18 +6,15 @@ statement with what the runs say, and whether it holds; exits 1 where one that i
 (`KNOWN`) does not.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import isclose
 from pathlib import Path
-from typing import Any
 
 Point = tuple[float, float]
 #: mm at which the thesis' loads are compared.
@@ -76,30 +73,26 @@ class Study:
     cards: tuple[str, ...]
     runs: Mapping[tuple[str, str], Run]
 
-    def case(self, diameter: float, pressure: float) -> str | None:
-        """Return the name of the cylinder of Table 6.1, if there is one."""
+    def case(self, diameter, pressure):
         near = {"rel_tol": 1e-6}
         return next((c.name for c in self.cylinders if isclose(c.diameter, diameter, **near)
                      and isclose(c.pressure, pressure, **near)), None)  # fmt: skip
 
-    def by_pressure(self) -> list[list[str]]:
-        """Return the cylinders of each diameter, pressures rising."""
-        groups: dict[float, list[str]] = {}
+    def by_pressure(self):
+        groups = {}
         for case in sorted(self.cylinders, key=lambda c: c.pressure):
             groups.setdefault(round(case.diameter, 6), []).append(case.name)
         return list(groups.values())
 
-    def by_diameter(self) -> list[list[str]]:
+    def by_diameter(self):
         """Return the cylinders of Table 6.1 at lowest, middle and highest pressure."""
         rows = ([self.case(d, PRESSURES[d][rank]) for d in sorted(PRESSURES)] for rank in range(3))
         return [[case for case in row if case is not None] for row in rows]
 
-    def of(self, cases: Sequence[str | None], card: str) -> list[tuple[str, Run]]:
-        """Return the runs of cylinders with a card that ended."""
+    def of(self, cases, card):
         return [(c, self.runs[c, card]) for c in cases if c and (c, card) in self.runs]
 
-    def named(self, test: str) -> list[str]:
-        """Return the cards from a kind of test."""
+    def named(self, test):
         return [card for card in self.cards if card.split()[0] == test]
 
 
@@ -116,22 +109,19 @@ class Statement:
     part: tuple[int, int] = (0, 1)
 
     @property
-    def verdict(self) -> str:
-        """Return "holds", "does not hold", how often it holds, or "not checked"."""
+    def verdict(self):
         if self.holds is False and self.part[0]:
             return f"holds in {self.part[0]} of {self.part[1]}"
         return {True: "holds", False: "does not hold", None: "not checked"}[self.holds]
 
     @classmethod
-    def of(cls, text: str, said: Sequence[str], good: Sequence[bool], need: str) -> Statement:
-        """Return the statement that every check holds, or what it needs."""
+    def of(cls, text, said, good, need):
         if not good:
             return cls(text, need, None)
         return cls(text, "; ".join(said), all(good), (sum(good), len(good)))
 
 
-def statements(study: Study) -> list[Statement]:
-    """Check all of them, in the order of the thesis."""
+def statements(study):
     larger = "Stiffer with larger diameter: lowest, middle and highest pressure of each (6.3)"
     under = "The uniaxial card underestimates the measured loads in all tests (6.5)"
     over = "The bubble cards overestimate the measured loads (6.5)"
@@ -147,7 +137,7 @@ def statements(study: Study) -> list[Statement]:
     ]  # fmt: skip
 
 
-def _inflation(study: Study) -> Statement:
+def _inflation(study):
     text = (
         "Inflated, the model with the uniaxial card reaches a strain of 0.06, 0.08 and 0.10 at the "
         "three pressures of each diameter (6.2)"
@@ -161,7 +151,7 @@ def _inflation(study: Study) -> Statement:
     return Statement.of(text, said, good, "needs a uniaxial card and a case of Table 6.1")
 
 
-def _spread(study: Study) -> Statement:
+def _spread(study):
     text = "At one deflection the load changes by up to 30 % from lowest to highest pressure (6.3)"
     said, good = [], []
     for card in study.cards:
@@ -178,7 +168,7 @@ def _spread(study: Study) -> Statement:
     )
 
 
-def _buckling(study: Study) -> Statement:
+def _buckling(study):
     text = "150 mm: the buckling load at 140 kPa is almost twice that at 90 kPa (6.3)"
     said, good = [], []
     for card in study.cards:
@@ -193,7 +183,7 @@ def _buckling(study: Study) -> Statement:
     return Statement.of(text, said, good, "needs both cases, buckling with one card")
 
 
-def _linear(study: Study) -> Statement:
+def _linear(study):
     text = "Load over deflection is nearly linear before buckling (6.3)"
     lines = {key: m.straightness for key, m in study.runs.items() if m.straightness is not None}
     good = [r2 >= LEAST_R2 and off <= MOST_OFF for r2, off in lines.values()]
@@ -205,7 +195,7 @@ def _linear(study: Study) -> Statement:
     return Statement.of(text, [f"to half of the buckling load; {tail}"], good, "")
 
 
-def _gas(study: Study) -> Statement:
+def _gas(study):
     text = "150 mm at 140 kPa: the pressure rises to 141.1 kPa at 240 mm (6.4, Fig. 6.11)"
     said, good = [], []
     for card in study.cards:
@@ -218,7 +208,7 @@ def _gas(study: Study) -> Statement:
     return Statement.of(text, said, near, "needs this case to 240 mm")
 
 
-def _soft(study: Study) -> Statement:
+def _soft(study):
     text = "The uniaxial card makes the beam softer than every bubble card (6.5)"
     said, good = [], []
     pairs = product(study.cylinders, study.named("uniaxial"), study.named("bubble"))
@@ -232,7 +222,7 @@ def _soft(study: Study) -> Statement:
     return Statement.of(text, said, good, "needs a uniaxial and a bubble card")
 
 
-def _against(text: str, study: Study, test: str, good: Callable[[float], bool]) -> Statement:
+def _against(text, study, test, good):
     runs = [run for (_, card), run in study.runs.items() if card in study.named(test)]
     errors = [run.mean_error for run in runs if run.mean_error is not None]
     if not errors:
@@ -242,7 +232,7 @@ def _against(text: str, study: Study, test: str, good: Callable[[float], bool]) 
     return Statement.of(text, [f"{sum(right)} of {len(right)} runs; {spread}"], right, "")
 
 
-def _order(text: str, study: Study, groups: Sequence[Sequence[str]], need: str) -> Statement:
+def _order(text, study, groups, need):
     """Check that the stiffness rises along each group, with each card."""
     said, good, changes = [], [], []
     for group, card in product(groups, study.cards):
@@ -261,8 +251,7 @@ def _order(text: str, study: Study, groups: Sequence[Sequence[str]], need: str) 
     return Statement.of(text, said, good, f"needs {need}")
 
 
-def read_study(folder: Path) -> Study:
-    """Read the runs in an output folder of `bubblefit bend`."""
+def read_study(folder):
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     cylinders = tuple(
         Cylinder(name, test["diameter_mm"], 1e-3 * test["pressure_kPa"])
@@ -274,8 +263,8 @@ def read_study(folder: Path) -> Study:
     return Study(cylinders, tuple(result["cards"]), runs)
 
 
-def _run(said: Mapping[str, Any]) -> Run:
-    def point(name: str) -> Point | None:
+def _run(said):
+    def point(name):
         d, load = said[name]["deflection_mm"], said[name]["load_N"]
         return None if d is None else (d, load)
 
@@ -289,11 +278,10 @@ def _run(said: Mapping[str, Any]) -> Run:
     )  # fmt: skip
 
 
-def main() -> None:
-    """Check the runs of a folder, after those of the example where none is given."""
+def main():
     parser = argparse.ArgumentParser(description=(__doc__ or "").replace("%", "%%"))
     parser.add_argument("folder", nargs="?", type=Path)
-    given: Path | None = parser.parse_args().folder
+    given = parser.parse_args().folder
     folder = given or Path("out") / EXAMPLE.parent.name
     if given is None:
         going_on = ["--resume"] if (folder / "run.json").exists() else []

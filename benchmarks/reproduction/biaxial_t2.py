@@ -6,14 +6,12 @@ MSAJ/M-02-1995", Structural Membranes 2011, which is not part of this repository
 an E (kN/m) is off by more than 4 % or a nu by more than 0.02, by five choices, 2 to 30 kN/m.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
 
 from bubblefit.experiments.biaxial.data import cycles_of, evaluated_paths, read_biaxial_table
-from bubblefit.materials.designers import LinearPath, Options, evaluate, line_of
+from bubblefit.materials.designers import Options, evaluate, line_of
 
 LOWEST, HIGHEST = 2.0, 30.0
 #: Published: E_x t, E_y t (kN/m), nu_xy, nu_yx, S (%^2) by options.
@@ -29,8 +27,7 @@ PUBLISHED = {
 E_WITHIN, NU_WITHIN = 0.04, 0.02
 
 
-def lines_of_file(path: Path) -> list[LinearPath]:
-    """The straight lines of the last cycle of each ratio."""
+def lines_of_file(path):
     table = read_biaxial_table(path)
     paths = evaluated_paths([table], cycles_of([table], [None]))
     cut = [one.between(LOWEST, HIGHEST) for one in paths]
@@ -38,8 +35,8 @@ def lines_of_file(path: Path) -> list[LinearPath]:
 
 
 def compared(
-    lines: list[LinearPath],
-) -> list[tuple[str, tuple[float, ...], tuple[float, ...], bool]]:
+    lines,
+):
     """Of each choice: its name, published, ours, whether ours is near enough."""
     found = []
     for name, (options, published) in PUBLISHED.items():
@@ -52,7 +49,7 @@ def compared(
     return found
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=(__doc__ or "").replace("%", "%%"))
     parser.add_argument("file", type=Path)
     rows = compared(lines_of_file(parser.parse_args().file))

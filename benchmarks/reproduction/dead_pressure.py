@@ -4,13 +4,10 @@ Prints the first table of docs/validation/published-bubble.md (Table 4.2, 800 qu
 then u_y of other variants of law and load, none of which explains Marc's.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.util
 import sys
 import tempfile
-from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +39,7 @@ NODES, PLACES = slice(10, 15), np.array([60.0, 68.0, 76.0, 84.0, 92.0])
 
 
 @contextmanager
-def dead() -> Iterator[None]:
+def dead():
     """Bubbles of the membrane solver meanwhile carry dead pressure (no derivatives of a fit)."""
     source = Path(kernel.__file__).read_text()
     for follows, stays in (*NORMAL, *PUSH):
@@ -67,7 +64,7 @@ def dead() -> Iterator[None]:
 LOADS = {"follower": nullcontext, "dead": dead}
 
 
-def known_bubble(parts: int | None = None) -> tuple[BubbleModel, HypoelasticLaw]:
+def known_bubble(parts=None):
     """The example's model as a full disk, with `parts` increments a pressure, and its law."""
     project = read_project(KNOWN)
     test = project.tests["bubble"]
@@ -81,7 +78,7 @@ def known_bubble(parts: int | None = None) -> tuple[BubbleModel, HypoelasticLaw]
     return model, HypoelasticLaw(test.data.beta, 0.24, np.array(project.law.strain_range))
 
 
-def cut(model: BubbleModel, displacement: Array, axis: int) -> tuple[Array, Array]:
+def cut(model, displacement, axis):
     """Displacements along the cut and upwards of its nodes from the centre to the rim, (nodes,)."""
     points = model.mesh.points
     on = np.flatnonzero((np.abs(points[:, 1 - axis]) < 1e-6) & (points[:, axis] > -1e-6))
@@ -89,7 +86,7 @@ def cut(model: BubbleModel, displacement: Array, axis: int) -> tuple[Array, Arra
     return points[on, axis], displacement[on][:, [axis, 2]]
 
 
-def main() -> None:
+def main():
     published = pd.read_csv(PROFILES, comment="#")
     published = published[(published["copy"] == 0) & (published.coord_mm > -0.01)]
     model, law = known_bubble(parts=2)
@@ -116,8 +113,7 @@ def main() -> None:
         print(f"  {words:42s}" + "".join(f"{value:7.0f}" for value in off), flush=True)
 
 
-def variants(law: HypoelasticLaw) -> Iterator[tuple[str, str, HypoelasticLaw]]:
-    """What else was thought of: words, load, law."""
+def variants(law):
     yield "follower, incompressible", "follower", replace(law, thickness_change="incompressible")
     for nu12 in (0.05, 0.4):
         yield f"follower, nu12 = {nu12:g}", "follower", replace(law, nu12=nu12)
@@ -127,13 +123,13 @@ def variants(law: HypoelasticLaw) -> Iterator[tuple[str, str, HypoelasticLaw]]:
     yield "dead, incompressible", "dead", replace(law, thickness_change="incompressible")
 
 
-def along(model: BubbleModel, displacement: Array, axis: int, component: int) -> Array:
+def along(model, displacement, axis, component):
     """Ours at the reference places of Marc's nodes: 0, along the cut; 1, upwards. mm."""
     places, values = cut(model, displacement, axis)
     return PchipInterpolator(places, values[:, component])(PLACES)
 
 
-def compare(model: BubbleModel, displacement: Array, marc: pd.DataFrame) -> list[float]:
+def compare(model, displacement, marc):
     """How much larger ours are: apex, u_x, u_y, and z on the y axis."""
     apex = displacement[model.mesh.node_sets["apex"][0], 2] / marc.z_mm.max() - 1
     off = [float(apex)]

@@ -4,19 +4,15 @@ Exits 1 where the ratios are further off than known (`MOST`, `STEEPER`): Marc's 
 follow the surface. Then with dead pressure and incompressible: docs/how-to/studies.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
-from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import bubblefit as bf
 import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.poisson import Ratios, vary_nu12
+from bubblefit.runs.poisson import vary_nu12
 from bubblefit.runs.verification import FIGURE
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"
@@ -26,32 +22,28 @@ BAND = 0.03
 MOST, STEEPER, NEAR = 0.0075, 1.22, 0.02
 
 
-def responses(thickness_change: str = "constant") -> Mapping[str, Ratios]:
-    """Ours, of the known solution, by pressure."""
+def responses(thickness_change="constant"):
     project = bf.read_project(KNOWN)
     ends = project.law.strain_range
     assert ends is not None
     test = project.tests["bubble"]
-    beta: Any = test.data.beta  # type: ignore[attr-defined]
+    beta = test.data.beta  # type: ignore[attr-defined]
     law = HypoelasticLaw(beta, 0.24, np.array(ends), thickness_change)  # type: ignore[arg-type]
     card = MaterialCard(law, project.fabric.thickness, "Table 4.2")
     return vary_nu12(project, card, list(FIGURE)).parts["bubble"].responses
 
 
-def ratios() -> Ratios:
-    """Ours at 300 kPa."""
+def ratios():
     return responses()["300 kPa"]
 
 
-def compare(ours: Ratios) -> tuple[float, float]:
-    """Largest difference, and how many times as steep our curve is."""
+def compare(ours):
     published = np.array([*FIGURE.values()])
     slope = np.polyfit(published - 1, ours.to_mean - 1, 1)[0]
     return float(np.abs(ours.to_mean - published).max()), float(slope)
 
 
-def main() -> int:
-    """Print, and whether it is as known."""
+def main():
     from dead_pressure import LOADS  # a script beside this one: not where a test loads this file
 
     print(f"{'nu12':46s}" + "".join(f"{nu12:9.2f}" for nu12 in FIGURE))
@@ -76,8 +68,7 @@ def main() -> int:
     return 0 if most < MOST and abs(slope - STEEPER) < NEAR else 1
 
 
-def show(what: str, values: Iterable[float], words: str = "") -> None:
-    """A row."""
+def show(what, values, words=""):
     print(f"{what:46s}" + "".join(f"{value:9.4f}" for value in values) + f"   {words}", flush=True)
 
 

@@ -4,17 +4,14 @@ Prints the second table of docs/validation/published-bubble.md, both pressures; 
 disk, other degrees and meshes, and what an odd cubic leaves of u_y along the fill axis at 22 kPa.
 """
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.readers.fields import powers
-from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from dead_pressure import LOADS, Array, cut, known_bubble
+from dead_pressure import LOADS, cut, known_bubble
 
 #: By pressure in kPa: x, y, z.
 TABLE_4_1 = {
@@ -29,7 +26,7 @@ MESHES = (48, 200, 3200)
 PARTS = {"full": (-200.0, -200.0), "half y >= 0": (-200.0, -1e-6), "quarter": (-1e-6, -1e-6)}
 
 
-def r_squared(points: Array, displacement: Array, degree: int) -> Array:
+def r_squared(points, displacement, degree):
     """(3,) of the least-squares surfaces of that degree through all points."""
     term = powers(points / 100.0, degree)
     left = displacement - term @ np.linalg.lstsq(term, displacement, rcond=None)[0]
@@ -37,14 +34,14 @@ def r_squared(points: Array, displacement: Array, degree: int) -> Array:
     return np.asarray(1 - (left**2).sum(axis=0) / (about**2).sum(axis=0))
 
 
-def rows(model: BubbleModel, history: History, part: str = "full", degree: int = 4) -> Array:
+def rows(model, history, part="full", degree=4):
     """R² (pressures, 3) over a part of the disk."""
     points = model.mesh.points[:, :2]
     on = (points > PARTS[part]).all(axis=1)
     return np.array([r_squared(points[on], u[on], degree) for u in history.displacement])
 
 
-def main() -> None:
+def main():
     model, law = known_bubble()
     histories = {}
     for name, load in LOADS.items():

@@ -3,8 +3,6 @@
 The thesis reports e_uniaxial = 50.1 N for these coefficients. RMS errors in N of Eqs 3.4 to 3.6.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +23,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "uniaxial-valmex7318" / "proj
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_3_2), strain_range=np.array([0.153, 0.232, 1.0]))
 
 
-def held(gamma: float) -> HypoelasticLaw:
+def held(gamma):
     return replace(LAW, strain_range=np.array([0.153, 0.232, gamma]))
 
 
@@ -40,7 +38,7 @@ READINGS = {
 }
 
 
-def main() -> None:
+def main():
     (test,) = bf.read_project(EXAMPLE).tests.values()
     models = test.models()
     print(f"{'reading':<52}{'warp':>8}{'fill':>8}{'bias':>8}{'sum':>8}   thesis {PUBLISHED}")

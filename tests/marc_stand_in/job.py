@@ -36,8 +36,6 @@ class Ended(Exception):
 
 
 def command_of(arguments):
-    """Return job, folder, user and background of run_marc's options, current and older ones."""
-    counts = [str(n) for n in range(1, 1000)]
     parser = argparse.ArgumentParser("run_marc", allow_abbrev=False, add_help=False)
     parser.add_argument("-j", "-jid", dest="job", required=True)
     # Without -b no run_marc returns at once and Marc goes on in the background.
@@ -45,7 +43,7 @@ def command_of(arguments):
     parser.add_argument("-v", choices=("yes", "no", "y", "n"))
     parser.add_argument("-u", dest="user", type=Path)
     for option in ("-nte", "-nts", "-nps", "-nprocd", "-nthread"):
-        parser.add_argument(option, choices=counts, metavar="COUNT")
+        parser.add_argument(option, type=int)
     found = parser.parse_args(arguments)
     found.job = found.job.removesuffix(".dat")
     if not (Path(f"{found.job}.dat")).exists():
@@ -102,8 +100,6 @@ def run(command):
 
 
 class Files:
-    """What a job writes; every line is on disk at once."""
-
     def __init__(self, name):
         ends = ("sts", "out", "log", "t19")
         self.open = {e: Path(f"{name}.{e}").open("w", encoding="ascii") for e in ends}
@@ -160,7 +156,6 @@ class Running:
         files.write("t19", t19_frame(0, 0.0, self._vectors(State(zero, zero, 0.0))))
 
     def found(self, state):
-        """Write the solver's next increment, and those after it in which nothing moves."""
         self._write(state)
         while self.increment < len(self.rests) and self.rests[self.increment]:
             self._write(state)
@@ -179,7 +174,6 @@ class Running:
         if self.fault == "killed":
             os.kill(os.getpid(), signal.SIGKILL)
         elif self.fault == "hanging":
-            # As run_marc, which waits for a program that it has started.
             child = subprocess.Popen(["sleep", "3600"])
             if folder := os.environ.get("MARC_STAND_IN_FOLDER"):
                 (Path(folder) / "pids").write_text(f"{child.pid}\n")
@@ -190,7 +184,6 @@ class Running:
             raise Ended(NORMAL if self.fault == "early" else NO_SMALLER_STEP)
 
     def _vectors(self, state):
-        """Return displacement (mm), reaction and contact forces (N) of every node."""
         content = self.content
         case = content.cases[int(self.schedule.case[self.increment - 1])]
         reaction = np.zeros_like(state.displacement)

@@ -1,9 +1,8 @@
 """Find the law that a deck holds: in tables of NLELAST, or by calling its subroutine HYPELA2.
 
 Each stretch of points on ONE cubic (least squares, to `EXACT` of the largest) is found, with jumps
-between two: so the moduli are those of the law and not of its table, which differs by up to 2e-4
-between two of 121 points. Points on no such curve are refused. Those of a subroutine are the moduli
-in its stiffness, and its stress after one increment has to agree with them.
+between two; points on no such curve are refused. Those of a subroutine are the moduli in its
+stiffness, and its stress after one increment has to agree with them.
 """
 
 import ctypes
@@ -18,10 +17,9 @@ from bubblefit.materials.law import HypoelasticLaw
 
 from .deck import DeckError
 
-#: Relative, of the largest modulus: the deck has 13 digits.
-EXACT = 1e-9
-#: Strain over which a table's modulus jumps, at most; points that a cubic is recognised by.
-JUMP, FEWEST = 1e-5, 5
+#: Relative, of the largest modulus: the deck has 13 digits. Strain over which a table's modulus
+#: jumps, at most; points that a cubic is recognised by.
+EXACT, JUMP, FEWEST = 1e-9, 1e-5, 5
 #: Strains at which HYPELA2 is asked for its moduli.
 ASKED = np.linspace(0.0, 0.6, 1201)
 #: What Marc has for a subroutine to end the job with.
@@ -126,7 +124,6 @@ def _pieces(x, y, what, modulus=None):
                         beyond = middle
                 last += 1
             rows.append([end, *cubic])
-        # At a knot of a table the next piece begins with this point, after a jump with the next.
         i = last
     return np.array(rows)
 

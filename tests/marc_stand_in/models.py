@@ -30,7 +30,6 @@ def schedule_of(content):
     case = np.repeat(np.arange(len(content.cases)), [case.increments for case in content.cases])
     steps = np.array([content.cases[i].step for i in case])
     times = np.cumsum(steps)
-    # A third, added up, is no whole number.
     times = np.where(np.abs(times - np.round(times)) < 1e-6, np.round(times), times)
     for number, table in content.tables.items():
         if table.variable == TIME and np.abs(table.x[[0, -1]] - [0.0, times[-1]]).max() > 1e-6:
@@ -70,10 +69,7 @@ def supported(content, nodes, **sets):
 
 
 def model_of(content, schedule, law):
-    """Return the model, and in which increments (n,) of the deck nothing moves.
-
-    DeckError: Marc would run this, the stand-in cannot.
-    """
+    """Return the model, and in which increments (n,) of the deck nothing moves."""
     rests = np.zeros(len(schedule.times), dtype=bool)
     flat = np.ptp(content.coordinates[:, 2]) <= 1e-9 and not content.gas
     if flat and len(content.thickness) + len(content.frames) != 2:

@@ -22,7 +22,7 @@ from bubblefit.solvers.marc.solver import MarcSolver
 
 from ..inference.cases import MODEL
 from ..marc_files import sts_text, t19_text
-from ..solvers.marc.test_marc_cylinder import frames_of
+from ..solvers.marc.test_marc_deck import frames_of
 from ..solvers.membrane.test_bending import LINEAR
 
 

@@ -1,27 +1,20 @@
 """A fit from Python: the same result as the command, tables, interruption, several tests."""
 
-import json
 from dataclasses import replace
-from importlib import import_module
-from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit import __version__
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.kinds import Around, Doubt, Judgement, laws_around
+from bubblefit.experiments.kinds import Around, laws_around
 from bubblefit.materials.card import CardCertainty, MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.reports.content import Exhibit, Table, read_page_data
+from bubblefit.reports.content import read_page_data
 from bubblefit.reports.maps import Maps, Solid
 from bubblefit.runs import best
 from bubblefit.runs.best import best_fit, noise_of, with_certainty
-from bubblefit.runs.fit import Check
-from bubblefit.runs.folder import PRESENTERS
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import notes_of_fit
 from bubblefit.runs.setup import prepare_fit, shared_unknowns
@@ -295,49 +288,6 @@ def test_noise_is_what_a_perfect_law_leaves(together):
             assert noise[prepared.part(direction)] == pytest.approx(expected)
 
 
-SURE, VAGUE = Doubt("unit", True, "off by 1000"), Doubt("slack", False, "0.2 mm of slack")
-
-
-def looked(*judgements):
-    tests = [SimpleNamespace(test=SimpleNamespace(name=j.test, kind="made")) for j in judgements]
-    setup = SimpleNamespace(tests=tests, project=SimpleNamespace(title="made"))
-    return Check(setup, judgements)
-
-
-ONE = Judgement("one", (SURE, VAGUE), frozenset())
-TWO = Judgement("two", (SURE, VAGUE), frozenset({"unit"}))
-FINE = Judgement("three", (), frozenset())
-
-
-def test_a_look_at_data(tmp_path, monkeypatch):
-    seen = []
-    presenter = import_module(f"bubblefit.reports.{PRESENTERS['Check'][0]}")
-    monkeypatch.setattr(presenter, "write_report", lambda _, report: seen.append(report))
-
-    def examine(one, out):
-        name = one.test.name
-        return Exhibit([("points", 3)], [(f"{name}.png", name)], [Table(name, [], [])])
-
-    monkeypatch.setattr(presenter, "report_of", lambda kind: SimpleNamespace(examine=examine))
-    done, alone = looked(ONE, TWO), looked(FINE)
-    done.report(tmp_path)
-    text = json.loads((tmp_path / "check.json").read_text())
-    unit = {"name": "unit", "severity": "error", "trusted": True, "text": "off by 1000"}
-    slack = {"name": "slack", "severity": "warning", "trusted": False, "text": "0.2 mm of slack"}
-    tests = {"one": [{**unit, "trusted": False}, slack], "two": [unit, slack]}
-    assert text == {"command": "check", "version": __version__, "sound": False, "tests": tests}
-    assert not done.sound and alone.sound and looked(TWO).sound
-    alone.report(tmp_path)
-    page, other = seen
-    assert page.facts == [("one: points", 3), ("two: points", 3)] and other.facts == [("points", 3)]
-    assert page.figures == [("one.png", "one"), ("two.png", "two")]
-    first, *own = page.tables
-    assert first.rows == [[*row] for row in done.rows()]
-    assert [table.title for table in own] == ["one", "two"]
-    assert len(page.warnings) == 4 and not other.warnings
-    assert sum("(trusted: unit)" in line for line in page.warnings) == 1
-
-
 #: MPa: E1 of the card, and by how much (1 sigma) two directions move it.
 E1, OFF = 500.0, (0.6, -0.8)
 #: G12, E2, E1 of each direction.
@@ -430,16 +380,6 @@ def test_the_spread_stands_wherever_the_load_does(tmp_path, monkeypatch, drawn):
 def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):
     monkeypatch.setattr(Formula, "external", True)
     assert predictions(tmp_path, card()).each[0].around is None
-
-
-@pytest.mark.parametrize(("samples", "spread"), [(3, "3 laws drawn"), (0, None)])
-def test_the_command_asks_for_draws_or_none(tmp_path, monkeypatch, samples, spread):
-    monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
-    write_project(tmp_path)
-    card().write(tmp_path / "sure.toml")
-    command = ("bend", "project.toml", "--card", "sure.toml", "--test", "high", "--jobs", "1")
-    in_process(*command, "--samples", samples, "--out", "out", cwd=tmp_path)
-    assert [run["spread"] for run in result_in(tmp_path / "out")["runs"]] == [spread]
 
 
 @pytest.mark.parametrize(

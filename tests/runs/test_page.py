@@ -226,7 +226,7 @@ def test_where_a_modulus_is_usable(off, usable, unknown, said):
     band = {n: law.modulus(n, strain) * np.array([1 - off(strain), 1 + off(strain)]) for n in names}
     sure = SimpleNamespace(strain=dict.fromkeys(names, strain), band=band)
     best = SimpleNamespace(valid=np.full(3, 0.1), certainty=sure)
-    fit: Any = SimpleNamespace(law=law, best=best, notes=[])
+    fit = SimpleNamespace(law=law, best=best, notes=[])
     fit.problem = SimpleNamespace(comparisons=[SimpleNamespace(name="bubble")])
     found = reaches(fit)["E1"]
     assert found.usable == (usable and pytest.approx(usable, abs=6e-4))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, Note, OutputError, SolverFailure, rows
+from bubblefit.errors import InputError, Note, SolverFailure, rows
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import RunRecord, notes_of_record
@@ -20,7 +20,7 @@ from bubblefit.reports.html import percent
 from bubblefit.runs import executor
 from bubblefit.runs import predictions as predictions_module
 from bubblefit.runs.folder import versions
-from bubblefit.runs.predictions import Predictions, RunEvent, measured_tests, predict
+from bubblefit.runs.predictions import Predictions, measured_tests, predict
 from bubblefit.runs.simulation import simulate, simulate_cards
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History
@@ -94,31 +94,6 @@ def test_tests_and_cards_by_name(project):
     none = {"of nothing": replace(mine, thickness=0.0)}
     said = complaint(predict, project, ["high"], none, jobs=1)
     assert said.startswith(f"{project.path}: 'high' with card 'of nothing', ")
-
-
-def test_what_is_there_is_not_run_again(project, tmp_path):
-    def again(events):
-        return [e.again for e in events if e is not None and e.run is not None]
-
-    def interrupt(event):
-        if event is not None and event.done == 2:
-            raise KeyboardInterrupt
-
-    out, events = tmp_path / "out", list[RunEvent | None]()
-    with pytest.raises(KeyboardInterrupt):
-        predict(project, jobs=1, out=out, progress=interrupt)
-    assert len(list((out / "runs").glob("*.npz"))) == 2 and not (out / "result.json").exists()
-    with pytest.raises(OutputError, match="--resume"):
-        predict(project, jobs=1, out=out)
-    done = predict(project, jobs=1, out=out, resume=True, progress=events.append)
-    assert again(events) == [True, True, False, False]
-    assert done.record is not None and len(done.record.runs) == 2
-    pd.testing.assert_frame_equal(done.curves(), predict(project, jobs=1).curves())
-    events.clear()
-    predict(project, ["high"], jobs=1, out=out, overwrite=True, progress=events.append)
-    assert again(events) == [False] * 2
-    with pytest.raises(InputError, match="nothing to go on with"):
-        predict(project, jobs=1, out=tmp_path / "none", resume=True)
 
 
 @pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])

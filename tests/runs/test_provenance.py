@@ -35,7 +35,6 @@ from bubblefit.runs.folder import (
 from bubblefit.runs.setup import fingerprints, prepare_fit, proposals
 from bubblefit.solvers.decks import in_words
 
-from ..commands import in_process
 from ..complaints import complaint
 from ..places import EXAMPLES
 from ..projects import constant_strips, project_file, with_form
@@ -530,11 +529,3 @@ def test_where_starts_begin_is_a_matter_of_the_project(tmp_path, earlier):
     assert "fit.earlier (or --earlier): means something with" in said
     said = complaint(bf.fit, project, jobs=1, starts_from="proposed")
     assert "name the folder of an earlier fit of this project" in said
-
-
-def test_the_command_takes_them(strips_project, earlier, tmp_path):
-    done = in_process(
-        "fit", strips_project.path, "--starts", 1, "--starts-from", "proposed", "--earlier",
-        tmp_path / "nothing", "--out", "out", cwd=tmp_path, code=2,
-    )  # fmt: skip
-    assert f"{tmp_path / 'nothing'}: fit.earlier (or --earlier): expected the folder" in done.stderr

@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -23,12 +22,14 @@ from click.testing import CliRunner
 
 from ..complaints import complaint
 from ..fortran_build import BETA, LAWS
+from ..places import EXAMPLES, ROOT
+from ..plug_ins import install
 
-ROOT = Path(__file__).resolve().parents[2]
-ADAPTER = ROOT / "examples" / "solver-adapter"
-STRIPS = ROOT / "examples" / "uniaxial-valmex7318"
+ADAPTER = EXAMPLES / "solver-adapter"
+STRIPS = EXAMPLES / "uniaxial-valmex7318"
 LAW = HypoelasticLaw(BETA, strain_range=np.array([0.16, 0.24, 0.9]))
 SIMULATE = ("simulate", "uniaxial", "project.toml", "--card", "material.toml", "--overwrite")
+GROUP = "bubblefit.solvers"
 DIAGNOSE = "bubblefit.solvers.calculix.solver.diagnose"
 
 
@@ -82,14 +83,6 @@ def test_the_example_pulls_strips_from_the_command_line(site, strips):
         assert len(one) > 5
         for column in one.select_dtypes("number"):
             np.testing.assert_allclose(one[column], other[column], rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_the_example_is_in_the_doctors_list(site, strips):
-    done = bubblefit(site, "doctor", "--solver", "homogeneous", "--json", cwd=strips)
-    (mine,) = [one for one in json.loads(done.stdout)["solvers"] if one["name"] == "homogeneous"]
-    assert mine["usable"] and not mine["expected"] and mine["version"] == "1.0"
-    assert mine["stresses"] == pytest.approx([bar.stress for bar in BARS], rel=1e-4)
 
 
 @pytest.mark.slow
@@ -203,14 +196,14 @@ BROKEN = {
                 "cannot be imported (RuntimeError: no licence file)"),
     "leaving": ("import sys\nsys.exit(1)", "cannot be imported (SystemExit: 1)"),
     "nothing": ("x = 1", "cannot be imported (AttributeError"),
-    "number": ("Solver = 3", "is no factory: acme_number:Solver cannot be called"),
-    "empty": ("class Solver: name = 'empty'",
-              "gives no solver: Solver has no external, progress, identity, run, check"),
-    "falling": ("def Solver(): raise ValueError('no DISPLAY')",
+    "number": ("THING = 3", "is no factory: acme_number:THING cannot be called"),
+    "empty": ("class THING: name = 'empty'",
+              "gives no solver: THING has no external, progress, identity, run, check"),
+    "falling": ("def THING(): raise ValueError('no DISPLAY')",
                 "fails when it is made (ValueError: no DISPLAY)"),
 }  # fmt: skip
 WORKING = """
-class Solver:
+class THING:
     name, external, progress, identity = "acme", True, None, "acme 9"
     def run(self, model, law, scratch=None, timeout=None): {run}
     def check(self):
@@ -220,25 +213,14 @@ class Solver:
 FINE = "return SolverCheck('acme', True, '9', True)"
 
 
-def install(folder, name, text, distribution="acme-solvers", module=None):
-    """What pip leaves of a distribution with one entry point, written by hand."""
-    module = module or f"acme_{name}"
-    if text:
-        (folder / f"{module}.py").write_text(text)
-    info = folder / f"{distribution.replace('-', '_')}-2.5.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 2.5\n")
-    (info / "entry_points.txt").write_text(f"[bubblefit.solvers]\n{name} = {module}:Solver\n")
-
-
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, name):
     text, words = BROKEN[name]
-    install(packages, name, text)
+    install(packages, name, text, group=GROUP)
     with pytest.raises(SolverFailure) as found:
         solver_named(name)
     message = str(found.value)
-    assert message.startswith(f"{name}: the plug-in '{name}' of acme-solvers 2.5 {words}")
+    assert message.startswith(f"{name}: the plug-in '{name}' of acme-things 2.5 {words}")
     assert "\n" not in message
     monkeypatch.chdir(strips)
     monkeypatch.setenv("BUBBLEFIT_CCX", "")
@@ -246,13 +228,13 @@ def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, nam
     run = CliRunner()
     done = run.invoke(main, ["doctor"])
     assert done.exit_code == 0 and "membrane    ok" in done.output
-    assert f"{name:10}  NOT USABLE  plug-in of acme-solvers 2.5\n" in done.output
+    assert f"{name:10}  NOT USABLE  plug-in of acme-things 2.5\n" in done.output
     assert words.split(" (")[0] in done.output
     if name != "failing":  # whole commands, once
         return
     assert run.invoke(main, ["doctor", "--solver", name]).exit_code == 4
     for solver, code, said in (
-        (name, 4, "acme-solvers 2.5"),
+        (name, 4, "acme-things 2.5"),
         ("nothere", 2, "calculix, failing, marc, membrane"),
         ("membrane", 0, ""),
     ):
@@ -262,31 +244,31 @@ def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, nam
 
 
 def test_one_name_is_one_plug_in(packages, tmp_path, monkeypatch):
-    install(packages, "acme", WORKING.format(run="...", check=FINE), "own-solvers")
+    install(packages, "acme", WORKING.format(run="...", check=FINE), "own-things", group=GROUP)
     again = tmp_path / "again"
     shutil.copytree(packages, again)
     monkeypatch.syspath_prepend(str(again))
     assert solver_named("acme").name == "acme"  # listed twice
-    install(packages, "twice", "Solver = 1")
-    install(packages, "twice", "Solver = 1", "other-solvers", "acme_other")
-    words = r"twice: is offered by (acme|other)-solvers 2\.5 and (acme|other)-solvers 2\.5"
+    install(packages, "twice", "THING = 1", group=GROUP)
+    install(packages, "twice", "THING = 1", "other-things", "acme_other", GROUP)
+    words = r"twice: is offered by (acme|other)-things 2\.5 and (acme|other)-things 2\.5"
     with pytest.raises(SolverFailure, match=words):
         solver_named("twice")
     assert solver_names().count("twice") == 1
     assert "is not one of" in complaint(solver_named, "nothere")
     # dict tells no signature on some Pythons; whatever it is, it is no solver.
-    install(packages, "plain", "Solver = dict", "plain-solvers")
+    install(packages, "plain", "THING = dict", "plain-things", group=GROUP)
     with pytest.raises(SolverFailure, match="gives no solver: dict has no name"):
         solver_named("plain")
 
 
 def test_our_own_names_stay_ours(packages, monkeypatch):
-    install(packages, "membrane", "raise RuntimeError")
+    install(packages, "membrane", "raise RuntimeError", group=GROUP)
     assert isinstance(solver_named("membrane"), MembraneSolver)
     monkeypatch.setattr(DIAGNOSE, lambda named: [])
     done = CliRunner().invoke(main, ["doctor"])
     assert done.exit_code == 0
-    assert "membrane    NOT USABLE  plug-in of acme-solvers 2.5" in done.output
+    assert "membrane    NOT USABLE  plug-in of acme-things 2.5" in done.output
     assert "is bubblefit's own: the plug-in needs another name" in done.output
 
 
@@ -319,7 +301,7 @@ CHECKS = {
 @pytest.mark.parametrize("what", CHECKS)
 def test_doctor_tells_what_a_plug_in_does(packages, strips, monkeypatch, what):
     check, run, words = CHECKS[what]
-    install(packages, "acme", WORKING.format(run=run, check=check))
+    install(packages, "acme", WORKING.format(run=run, check=check), group=GROUP)
     monkeypatch.setattr(DIAGNOSE, lambda named: [])
     done = CliRunner().invoke(main, ["doctor", "--solver", "acme"])
     # One that runs no strips is taken at its word, and the reader told.

@@ -74,7 +74,7 @@ def test_the_surface_the_rim_and_modes_follow_the_measurement(outline):
         measured_sheet(sheet, Outline(200.0, 160.0, 30.0), fields)
 
 
-UNEVEN = script("benchmarks/uneven_test.py")
+UNEVEN = script("benchmarks/bench_sheet.py")
 
 
 def project(folder: Path, sheet: str, **what: float) -> Path:

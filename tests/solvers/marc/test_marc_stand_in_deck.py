@@ -11,7 +11,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
-from bubblefit.solvers.marc.cylinder import bending_deck, inflation_deck
+from bubblefit.solvers.marc.cylinder import bending_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.sheets import bubble_deck, strip_deck
 
@@ -60,24 +60,6 @@ def test_every_deck_of_ours_is_taken(tmp_path, deck, law, element):
     assert sum(case.increments for case in content.cases) >= 100
 
 
-def test_inflation_alone_is_taken(tmp_path):
-    content = read(tmp_path, inflation_deck(CYLINDER, LINEAR, SETTINGS))
-    assert len(content.connectivity) == len(CYLINDER.mesh.quads) and not content.bodies
-
-
-def test_what_is_read_is_the_model(tmp_path):
-    content = read(tmp_path, DECKS["bending"])
-    np.testing.assert_allclose(content.coordinates, CYLINDER.mesh.points, atol=1e-9)
-    np.testing.assert_array_equal(content.connectivity - 1, CYLINDER.mesh.quads)
-    for name in ("symmetry_x", "symmetry_z", "support_bottom"):
-        np.testing.assert_array_equal(content.sets["node"][name] - 1, CYLINDER.mesh.node_sets[name])
-    warp = np.zeros_like(CYLINDER.mesh.warp)
-    for name, along, _ in content.frames:
-        warp[content.sets["element"][name] - 1] = along
-    np.testing.assert_allclose(warp, CYLINDER.mesh.warp, atol=1e-11)
-    assert content.gas == pytest.approx([0.101, 300.0, 1.2041e-12])
-
-
 @pytest.mark.parametrize(("diameter", "size"), [(150.0, 60.0), (200.0, 80.0), (250.0, 50.0)])
 def test_the_collar_touches_after_half_a_millimetre(tmp_path, diameter, size):
     model = inflated_cylinder(diameter, 0.08, 0.81, size, deflections=[20.0])
@@ -124,28 +106,16 @@ SPOILED = {
     # Columns
     "an integer moved": (
         "bubble", r"^         1       139", "        1        139", "columns 1 to"),
-    "an integer across two fields": (
-        "bubble", r"^         1       139         1", "         1       13 9         1", "columns"),
     "a real moved": ("bubble", r"^(         1)  0\.000", r"\1 0.000", "columns"),
     "a real without a point": (
         "bubble", r"^  8\.100000000000E-01", "       8100000000000", "expected r"),
-    "a field too many": ("bubble", r"^(         3 .*)$", r"\1         7", "beyond column"),
     "a tab": ("bubble", r"^         1       139", "\t1       139", "a tab"),
     "a long line": ("bubble", r"^title .*$", "title               " + 150 * "x", "more than 160"),
     "not ASCII": ("bubble", r"^title .*$", "title               Größe", "not ASCII"),
-    "parameters in other columns": (
-        "bubble", r"^alloc                       25", "alloc                  25", "columns"),
     # Counts
     "an element less": ("bubble", r"^         8       139 .*\n", "", "ends after 7 of 8"),
     "an element more": (
         "bubble", r"^(         8       139.*\n)", r"\1\1", "beyond column"),
-    "another count of elements": ("bubble", r"         0         8(        \d\d)",
-                                  r"         0         9\1", "ends after 8 of 9"),
-    "another count of nodes": (
-        "bubble", r"^(coordinates\n         3        )\d\d", r"\g<1>99", "expected"),
-    "a node less": ("bubble", r"^(        \d\d  .*\n)(\$?define|define)", r"\2", "ends after"),
-    "a point of a table less": (
-        "bubble", r"^  2\.000000000000E\+00  3.*\n(?=\$ unc)", "", "ends after 2 of 3"),
     "a condition less": ("bubble", r"^(loadcase            inflation\n         )4", r"\g<1>3",
                          "unknown history option"),
     "no increments": ("bubble", r"^(auto load\n         )2", r"\g<1>0", "no increments"),
@@ -157,18 +127,13 @@ SPOILED = {
     "elements out of order": ("bubble", r"^         2       139", "         3       139",
                               "element 3 .* expected 2"),
     "another type": ("bubble", r"^         2       139", "         2        75", "of type 75"),
-    "a type that is none": ("bubble", r"(elements            .{7})139", r"\g<1>138", "is none of"),
     "a set twice": ("bubble", r"^(define .*symmetry_)y", r"\1x", "is defined twice"),
     "a set with strangers": ("bubble", r"^(define +node +set +rim\n).*\n", "\\1        99\n",
                              "does not exist"),
-    "a set that goes on": ("bubble", r"^(define +node +set +rim\n.*)\n", "\\1 c\n", "members"),
-    "a set without members": ("bubble", r"^(define +node +set +rim\n).*\n", "\\1\n", "members"),
     "a run backwards": ("bubble", r"^(define +element .*\n) +1 to 8", r"\1         8 to 1",
                         "members"),
     "supports on an unknown set": ("bubble", r"^(         2\n)rim\n", "\\1rom\n",
                                    "no node set 'rom'"),
-    "pressure on an unknown set": ("bubble", r"^(         1\n)fabric\n", "\\1fabrik\n",
-                                   "no element set 'fabrik'"),
     "a name in capitals": ("bubble", r"^(define +node +set +)rim", r"\1Rim", "expected name"),
     "an element without thickness": ("bending", r"^(geometry\n(?:.*\n)+?)layer_2\n", "\\1layer_1\n",
                                      "its thickness"),
@@ -185,13 +150,10 @@ SPOILED = {
     "a table of time for the law": (
         "bubble", r"^        11(        12         0        13)", r"         1\1",
         "no table 1 of variable type 73"),
-    "another condition of the law": ("bubble", r"^nlelast", "nlelastic", "unknown model option"),
     "a frame that is none": ("bubble", r"(3d aniso  .{20}  )1\.0", r"\g<1>9.0", "unit vectors"),
     "a left-handed frame": ("bubble", r"(3d aniso.{82}) (.{19}) ( 1)", r"\1 \2 -1",
                             "not a quarter turn"),
     # Conditions and load cases
-    "an unknown condition": ("bubble", r"^(loadcase +inflation\n.*\n)fix_rim", r"\1fix_rum",
-                             "fix_rum"),
     "a condition twice": ("bubble", r"^(loadcase +inflation\n.*\n)fix_rim\nfix_symmetry_x",
                           "\\1fix_rim\nfix_rim", "twice in a load case"),
     "two conditions of a name": ("bubble", r"fix_symmetry_y(\n  0)", r"fix_symmetry_x\1",
@@ -201,13 +163,8 @@ SPOILED = {
     "pulled and held": ("strip", r"^(         1\n         )2(\n         2\nbottom)", r"\g<1>3\2",
                         "has two values"),
     "a pressure that does not follow": ("bubble", r"^follow for.*\n", "", "follow for"),
-    "state variables for nothing": ("bubble", r"^end$", "state vars                   7\nend",
-                                    "state vars 7, expected 0"),
-    "no end option": ("bubble", r"^end option\n", "", "beyond column"),
     "no continue": ("bending", r"^continue\n", "", "is a continue missing"),
-    "no last continue": ("bubble", r"^continue\n", "", "the file ends here"),
     "no control": ("bubble", r"^control\n(.*\n){3}", "", "without .*control"),
-    "no post": ("bubble", r"^post\n.*\n", "", "no post"),
     "no formatted post file": ("bubble", r"^(post\n(?:.{10}){3}         )1", r"\g<1>0",
                                "expected 1"),
     "no extended": ("bubble", r"^extended\n", "", "extended has to come before"),
