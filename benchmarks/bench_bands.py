@@ -29,10 +29,7 @@ CASES = {
 
 
 def bias(starts=3):
-    """Fit data of other meshes and load steps, and by polynomial surfaces; STARTS each.
-
-    Printed: e, largest errors of the moduli, without the mesh's part, and the truth in the bands.
-    """
+    """Fit data of other meshes and load steps, and by polynomial surfaces; STARTS each."""
     base = known_project()
     (test,) = base.tests.values()
     steps = np.unique([*test.pressures, *(1e-3 * np.array(STEPS))])

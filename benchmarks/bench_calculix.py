@@ -141,10 +141,7 @@ def bias(increments, refined):
 
 
 def strips(finest=2):
-    """Compare the three strips, the bias strip on meshes refined up to FINEST times.
-
-    The bias strip in 20 increments: beside the same mesh, and one refined three times. Table 3.2.
-    """
+    """Compare the three strips, the bias strip on meshes refined up to FINEST times."""
     print("differences in % of the end load, largest on the curve: from the membrane on the same\n"
           f"mesh, and on {300 * FINE**2} quads\nstrip element   quads incr.     same     fine"
           "    end, N  iter.  CalculiX   membrane  ratio")  # fmt: skip
@@ -209,10 +206,7 @@ def tolerances(models="bubble"):
 
 
 def collar(size=60.0):
-    """Bend a cylinder by collars and on supports of few and many faces; SIZE: mm of an element.
-
-    The collar begins 0.5 mm above the cylinder by its faces, or by the ring of these.
-    """
+    """Bend a cylinder by collars and on supports of few and many faces; SIZE: mm of an element."""
     model = inflated_cylinder(150.0, 0.14, THICKNESS, size, deflections=(10.0, 20.0))
     radius = 0.5 * model.collar.inner_diameter
 

@@ -161,10 +161,7 @@ def plan(sets=250, repetitions=10, ranked=30):
 
 
 def bootstrap(samples=100, *, data=str(SHARED / "bubble"), elements=108):
-    """Bootstrap the frames of the published test 1; print analyses and whether refits settle.
-
-    20 frames, full disk of ELEMENTS quads, constant moduli; refits with ten times as many analyses.
-    """
+    """Bootstrap the frames of the published test 1; print analyses and whether refits settle."""
     project = read_project(EXAMPLES / "bubble-valmex7318" / "test1-linear.toml", Path(data))
     (test,) = project.tests.values()
     project = replace(project, tests={test.name: replace(test, elements=elements)})
@@ -186,10 +183,7 @@ def bootstrap(samples=100, *, data=str(SHARED / "bubble"), elements=108):
 
 
 def strips(*, data=str(SHARED / "uniaxial")):
-    """Compare the certainty of the published strips by specimens with that by every load.
-
-    By the published polynomials and, where DATA has them, by the measured points; cubics.
-    """
+    """Compare the certainty of the published strips by specimens with that by every load."""
     example = EXAMPLES / "uniaxial-valmex7318"
     projects = {"published polynomials": read_project(example / "project.toml")}
     if Path(data).is_dir():

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import psutil
 from common import start_on
 
 #: In the environment of all that a trial starts, and of this process where /dev/shm is its own.
@@ -142,18 +143,13 @@ class Trial:
 
     def all_alive(self, own):
         """Return numbers and names of living processes of the trial: of its session or marked."""
-        mark = f"{MARK}={self.folder}".encode()
         found = []
-        for process in Path("/proc").glob("[0-9]*"):
-            try:
-                head, _, tail = (process / "stat").read_text().rpartition(")")
-                state, _, _, session = tail.split()[:4]
-                marked = mark in (process / "environ").read_bytes().split(b"\0")
-            except OSError:
-                continue
-            number = int(process.name)
-            if state != "Z" and number != os.getpid() and (int(session) == own or marked):
-                found.append((number, head.partition("(")[2]))
+        for process in psutil.process_iter(["name"]):
+            with suppress(psutil.Error, OSError):
+                marked = process.environ().get(MARK) == str(self.folder)
+                there = process.status() != psutil.STATUS_ZOMBIE and process.pid != os.getpid()
+                if there and (marked or os.getsid(process.pid) == own):
+                    found.append((process.pid, process.name()))
         return found
 
     def left(self):
@@ -198,9 +194,7 @@ def killed(trial, process, draw):
 
 
 def alive_still(process):
-    with suppress(OSError):
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    return False
+    return psutil.pid_exists(process) and psutil.Process(process).status() != psutil.STATUS_ZOMBIE
 
 
 def content(out):
@@ -223,8 +217,7 @@ def content(out):
     return found
 
 
-def one_trial(folder, name, whole, seconds, most,
-              draw, told):  # fmt: skip
+def one_trial(folder, name, whole, seconds, most, draw, told):
     """Kill one command up to `most` times, wait for its end; return how many kills there were."""
     trial, count, failed = Trial(folder, name), 0, False
     while True:
@@ -284,15 +277,6 @@ def trials(place, name, kills, seed):
     return told
 
 
-def lines(name, told):
-    killed_words = ", ".join(f"{what} {count}" for what, count in sorted(told.killed.items()))
-    yield (
-        f"{name:16} {told.trials:3} trials, killed: {killed_words}; the same to the last digit: "
-        f"{told.equal}; other ends {len(told.other)}, left behind {len(told.left)}"
-    )
-    yield from (f"    {line}" for line in [*told.other, *told.left])
-
-
 def main(kills=4, seed=1, *commands):
     """Kill each command KILLS times; exit with 1 where anything differs or is left."""
     if OWN not in os.environ and shutil.which("unshare"):
@@ -305,7 +289,10 @@ def main(kills=4, seed=1, *commands):
         for name in commands or COMMANDS:
             told = trials(Path(place), name, kills, seed)
             bad = bad or bool(told.other or told.left)
-            print("\n".join(lines(name, told)), flush=True)
+            what = ", ".join(f"{what} {count}" for what, count in sorted(told.killed.items()))
+            print(f"{name:16} {told.trials:3} trials, killed: {what}; the same to the last digit: "
+                  f"{told.equal}; other ends {len(told.other)}, left behind {len(told.left)}",
+                  *told.other, *told.left, sep="\n    ", flush=True)  # fmt: skip
     sys.exit(int(bad))
 
 

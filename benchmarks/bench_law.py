@@ -79,9 +79,7 @@ def increments(*, starts=5):
     """
     solver, mesh = MembraneSolver(1e-10), disk_mesh(100.0, 400, "quarter")
     apex, exact, errors = mesh.node_sets["apex"][0], None, {}
-    for steps in (
-        in_parts(50), in_parts(1), in_parts(1, (6e-3, 40e-3)), in_parts(3), in_parts(10)
-    ):  # fmt: skip
+    for steps in (in_parts(50), in_parts(1), in_parts(1, (6e-3, 40e-3)), in_parts(3), in_parts(10)):
         model = BubbleModel(mesh, THICKNESS, PRESSURES, steps)
         height = solver.run(model, LAW_4_2).displacement[:, apex, 2]
         exact = height if exact is None else exact
@@ -129,10 +127,7 @@ def work_of_starts(starts):
 
 
 def rim():
-    """Compare apex heights on coarse disks whose rim is on the circle, or of the circle's area.
-
-    Errors in % of the apex on the finest quarter disk, whose two rims hardly differ.
-    """
+    """Compare apex heights on coarse disks whose rim is on the circle, or of the circle's area."""
     finest = disk_mesh(100.0, 12_800, "quarter")
     exact = heights(finest)
     apart = 100 * np.abs(heights(moved_out(finest)) / exact - 1).max()
@@ -242,10 +237,7 @@ def exports():
 
 
 def constants(lowest=0.0, highest=5.0):
-    """Print the published cards as a designer's constants between two loads, kN/m.
-
-    With the spread over all other choices of what is evaluated, and the RMS that lines leave.
-    """
+    """Print the published cards as a designer's constants between two loads, kN/m."""
     print(f"{lowest:g} to {highest:g} kN/m, G to a shear strain of 0.05; E and G in kN/m")
     for name, one in bf.read_project(BENDING, need_data=False).cards.items():
         try:

@@ -70,10 +70,7 @@ def field(sheet, moduli):
 
 
 def facets(*quads):
-    """Estimate what moduli lose on QUADS quads where the measured sheet had 3,072, without noise.
-
-    By derivatives at the true law; read as flat quads, and as fits read them (`meshes/mesh.py`).
-    """
+    """Estimate what moduli lose on QUADS quads where the measured sheet had 3,072; no noise."""
     sheet = Uneven(slack=0.0, rim=0.0, noise=0.0)
     fine = model(sheet, PRESSURES, 3072)
     height = float(fine.mesh.points[fine.mesh.node_sets["apex"][0], 2])

@@ -44,10 +44,7 @@ def objectives(records):
 
 
 def methods(starts=6, *names):
-    """Compare optimisers (NAMES as in the first column) from the same random feasible starts.
-
-    Published (DOT and Marc, boolean): best 0.096, median 0.226, worst 3.2, 36 of 50 below 0.5.
-    """
+    """Compare optimisers (NAMES as in the first column) from the same random feasible starts."""
     setup = known_setup(known_project())
     print(f"{'method':13s}{'':26s}{'starts':>7s}{'best':>9s}{'median':>9s}{'worst':>9s}"
           f"{'<1e-6':>7s}{'<1e-3':>7s}{'<0.5':>6s}{'analyses':>10s}{'wall, s':>9s}")  # fmt: skip
@@ -75,10 +72,7 @@ def seeds(count=1, starts=50):
 
 
 def places(starts=12, seeds=2):
-    """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum.
-
-    48 quads; within 1 % of the least. Proposals: from five starts on the same, or another, fabric.
-    """
+    """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum."""
     setup = known_setup(known_project(ELEMENTS))
     problem = setup.problem()
     ways = {

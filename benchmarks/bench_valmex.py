@@ -113,10 +113,7 @@ def residuals(starts=2, *tests, data=DATA):
 
 
 def symmetry(*, data=DATA):
-    """Print how far the tests are from any doubly symmetric model, which is the fits' floor.
-
-    The nearest such field in mean |dx| + |dy| + |dz| is the median of mirror images; also of dz.
-    """
+    """Print how far the tests are from any doubly symmetric model, which is the fits' floor."""
     folder = measured(data)
     print("test  floor, mm  left and right, mm  top and bottom, mm  first picture, mm")
     for test in PUBLISHED:
@@ -157,10 +154,7 @@ def sheets(
     *tests, data=DATA, elements=112, modes=10, starts=3,
     without_strips=False, with_strips=False,
 ):  # fmt: skip
-    """Fit each test with a surface z0 of few modes, without the strips and with them.
-
-    Eleven pressures; z0 is held against the three points where it was measured.
-    """
+    """Fit each test with a surface z0 of few modes, without the strips and with them."""
     folder = measured(data)
     for strips in [False] * (not with_strips) + [True] * (not without_strips):
         print("with strips" if strips else "without strips", flush=True)

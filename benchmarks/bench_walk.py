@@ -21,9 +21,9 @@ KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
 
 
 @contextmanager
-def entered(modules):
-    """Append each module (or template), once, when one of its functions is called."""
-    known = {}
+def entered(steps, step):
+    """Append each module to its first step when one of its functions is called."""
+    known, modules = {}, steps.setdefault(step, [])
 
     def watch(frame, event, _):
         code = frame.f_code
@@ -35,7 +35,7 @@ def entered(modules):
             inside = inside and path.parent != ROOT / "benchmarks"
             known[code.co_filename] = str(path.relative_to(ROOT)) if inside else None
         name = known[code.co_filename]
-        if name is not None and name not in modules:
+        if name is not None and not any(name in own for own in steps.values()):
             modules.append(name)
 
     sys.setprofile(watch)
@@ -48,33 +48,23 @@ def entered(modules):
 def walk():
     """Return modules by step, each where it is entered first."""
     steps = {}
-    modules = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         path.write_text(KNOWN.read_text().replace("elements = 800", "elements = 48"))
 
-        def step(name):
-            told = {module for several in steps.values() for module in several}
-            steps[name] = [module for module in modules if module not in told]
-
-        with entered(modules):
+        with entered(steps, "read the project"):
             project = bf.read_project(path)
-        step("read the project")
-        with entered(modules):
+        with entered(steps, "prepare the tests"):
             setup = prepare_fit(project, project.chosen(None, fitted=True))
-        step("prepare the tests")
-        with entered(modules):
+        with entered(steps, "fit from one start"):
             problem = setup.problem()
             record = run_start(problem, setup.options, project.fit.seed, 0, lambda _: None)
-        step("fit from one start")
-        with entered(modules):
+        with entered(steps, "assess the best"):
             best = best_fit(problem, [record], project.fit.tolerance)
             fit = Fit(setup, problem, with_certainty(setup, problem, best), 0.0)
             _ = fit.card, fit.findings
-        step("assess the best")
-        with entered(modules):
+        with entered(steps, "write the report"):
             fit.report(Path(folder) / "out")
-        step("write the report")
     return steps
 
 

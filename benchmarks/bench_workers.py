@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -128,9 +128,8 @@ def kill_one(folder):
         time.sleep(0.002)
 
 
-@contextmanager
 def here(workers):
-    yield Executor(workers)
+    return nullcontext(Executor(workers))
 
 
 @contextmanager
@@ -140,10 +139,7 @@ def cluster(workers, threads=1):
 
 
 def cost(starts=8):
-    """Measure what a run costs on one and two workers, here and of a Dask cluster.
-
-    The runs sleep; then STARTS of the example; then, on paper, 1,000 starts on 100 workers.
-    """
+    """Measure what a run costs on one and two workers, here and of a Dask cluster."""
     print(
         "| runs of | workers | processes here | ms a run | Dask | ms a run |\n" + "|---" * 6 + "|"
     )

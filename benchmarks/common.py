@@ -114,13 +114,7 @@ def start_on(*parts):
     for part in [chosen] if chosen else parts:
         if not chosen:
             print(f"\n## {part.__name__}", flush=True)
-        values = []
-        named = {}
-        for name, own in inspect.signature(part).parameters.items() if chosen else ():
-            if own.kind is own.VAR_POSITIONAL:
-                values += given[name]
-            elif own.kind is own.KEYWORD_ONLY:
-                named[name] = given[name]
-            else:
-                values.append(given[name])
-        part(*values, **named)
+        own = inspect.signature(part).parameters.values() if chosen else ()
+        values = [given[p.name] for p in own if p.kind is p.POSITIONAL_OR_KEYWORD]
+        values += [value for p in own if p.kind is p.VAR_POSITIONAL for value in given[p.name]]
+        part(*values, **{p.name: given[p.name] for p in own if p.kind is p.KEYWORD_ONLY})

@@ -115,10 +115,14 @@ class Statement:
         return {True: "holds", False: "does not hold", None: "not checked"}[self.holds]
 
     @classmethod
-    def of(cls, text, said, good, need):
-        if not good:
+    def of(cls, text, checks, need, head=""):
+        """Return the statement of checks (holds, words), or what it needs where there are none."""
+        checks = list(checks)
+        if not checks:
             return cls(text, need, None)
-        return cls(text, "; ".join(said), all(good), (sum(good), len(good)))
+        good = [bool(holds) for holds, _ in checks]
+        said = "; ".join(filter(None, [head, *(words for _, words in checks)]))
+        return cls(text, said, all(good), (sum(good), len(good)))
 
 
 def statements(study):
@@ -126,10 +130,21 @@ def statements(study):
     under = "The uniaxial card underestimates the measured loads in all tests (6.5)"
     over = "The bubble cards overestimate the measured loads (6.5)"
     return [
-        _inflation(study),
+        Statement.of(
+            "Inflated, the model with the uniaxial card reaches a strain of 0.06, 0.08 and 0.10 at "
+            "the three pressures of each diameter (6.2)",
+            _inflation(study), "needs a uniaxial card and a case of Table 6.1",
+        ),
         _order("Stiffer with more pressure (6.3)", study, study.by_pressure(),
                "two pressures of one diameter"),
-        _spread(study), _buckling(study),
+        Statement.of(
+            "At one deflection the load changes by up to 30 % from lowest to highest pressure "
+            "(6.3)", _spread(study), f"needs two pressures of one diameter to {PLACES[0]:g} mm",
+        ),
+        Statement.of(
+            "150 mm: the buckling load at 140 kPa is almost twice that at 90 kPa (6.3)",
+            _buckling(study), "needs both cases, buckling with one card",
+        ),
         _order(larger, study, study.by_diameter(), "two diameters of Table 6.1"),
         _linear(study), _gas(study), _soft(study),
         _against(under, study, "uniaxial", lambda mean: mean < 0),
@@ -138,22 +153,14 @@ def statements(study):
 
 
 def _inflation(study):
-    text = (
-        "Inflated, the model with the uniaxial card reaches a strain of 0.06, 0.08 and 0.10 at the "
-        "three pressures of each diameter (6.2)"
-    )
-    said, good = [], []
     for card, (diameter, pressures) in product(study.named("uniaxial"), PRESSURES.items()):
         for gauge, strain in zip(pressures, INFLATION, strict=True):
             for name, run in study.of([study.case(diameter, gauge)], card):
-                good.append(abs(run.strain - strain) <= NEAR)
-                said.append(f"{name} {run.strain:.3f} ({strain:.2f})")
-    return Statement.of(text, said, good, "needs a uniaxial card and a case of Table 6.1")
+                near = abs(run.strain - strain) <= NEAR
+                yield near, f"{name} {run.strain:.3f} ({strain:.2f})"
 
 
 def _spread(study):
-    text = "At one deflection the load changes by up to 30 % from lowest to highest pressure (6.3)"
-    said, good = [], []
     for card in study.cards:
         changes = []
         for group in study.by_pressure():
@@ -161,65 +168,58 @@ def _spread(study):
             if len(loads) > 1 and loads[0] and loads[0] > 0 and loads[-1] is not None:
                 changes.append(loads[-1] / loads[0] - 1)
         if changes:
-            good.append(SPREAD[0] <= max(changes) <= SPREAD[1])
-            said.append(f"{card} {100 * max(changes):.0f} %")
-    return Statement.of(
-        text, said, good, f"needs two pressures of one diameter to {PLACES[0]:g} mm"
-    )
+            yield SPREAD[0] <= max(changes) <= SPREAD[1], f"{card} {100 * max(changes):.0f} %"
 
 
 def _buckling(study):
-    text = "150 mm: the buckling load at 140 kPa is almost twice that at 90 kPa (6.3)"
-    said, good = [], []
     for card in study.cards:
         ends = [run for _, run in study.of([study.case(150.0, p) for p in (0.09, 0.14)], card)]
         for kind, words in (("limit", "limit points"), ("knee", "knees")):  # like with like
             points = [getattr(run, kind) for run in ends]
             if len(points) == 2 and all(points):
                 first, second = (load for _, load in points)
-                good.append(RATIO[0] <= second / first <= RATIO[1])
-                said.append(f"{card} {second / first:.2f} ({words} {first:.0f}, {second:.0f} N)")
+                found = f"{card} {second / first:.2f} ({words} {first:.0f}, {second:.0f} N)"
+                yield RATIO[0] <= second / first <= RATIO[1], found
                 break
-    return Statement.of(text, said, good, "needs both cases, buckling with one card")
 
 
 def _linear(study):
     text = "Load over deflection is nearly linear before buckling (6.3)"
     lines = {key: m.straightness for key, m in study.runs.items() if m.straightness is not None}
-    good = [r2 >= LEAST_R2 and off <= MOST_OFF for r2, off in lines.values()]
     if not lines:
         return Statement(text, "needs runs with four frames before buckling", None)
     worst = min(lines, key=lambda key: lines[key][0])
     r2, off = lines[worst]
     tail = f"worst {worst[0]} with {worst[1]}: R² {r2:.4f}, {100 * off:.1f} % off a straight line"
-    return Statement.of(text, [f"to half of the buckling load; {tail}"], good, "")
+    checks = [(r2 >= LEAST_R2 and off <= MOST_OFF, "") for r2, off in lines.values()]
+    return Statement.of(text, checks, "", f"to half of the buckling load; {tail}")
 
 
 def _gas(study):
     text = "150 mm at 140 kPa: the pressure rises to 141.1 kPa at 240 mm (6.4, Fig. 6.11)"
-    said, good = [], []
-    for card in study.cards:
-        for _, run in study.of([study.case(150.0, 0.14)], card):
-            if run.reached >= PLACES[-1] * (1 - 1e-9):
-                good.append(abs(run.pressure_rise - RISE) <= CLOSE * RISE)
-                said.append(f"{card} +{run.pressure_rise:.2f} kPa")
+    rises = [
+        (card, run.pressure_rise)
+        for card in study.cards
+        for _, run in study.of([study.case(150.0, 0.14)], card)
+        if run.reached >= PLACES[-1] * (1 - 1e-9)
+    ]
+    words = "; ".join(f"{card} +{rise:.2f} kPa" for card, rise in rises)
     # The thesis does not say with which card: one is enough.
-    near = [True] if any(good) else good[:1]
-    return Statement.of(text, said, near, "needs this case to 240 mm")
+    near = any(abs(rise - RISE) <= CLOSE * RISE for _, rise in rises)
+    return Statement.of(text, [(near, words)] * bool(rises), "needs this case to 240 mm")
 
 
 def _soft(study):
-    text = "The uniaxial card makes the beam softer than every bubble card (6.5)"
-    said, good = [], []
+    checks = []
     pairs = product(study.cylinders, study.named("uniaxial"), study.named("bubble"))
     for case, soft, stiff in pairs:
         loads = [run.loads[0] for card in (soft, stiff) for _, run in study.of([case.name], card)]
         if len(loads) == 2 and None not in loads:
-            good.append(loads[0] < loads[1])
-            if not good[-1]:
-                said.append(f"not in {case.name}: {loads[0]:.0f} N, {stiff} {loads[1]:.0f} N")
-    said.insert(0, f"{sum(good)} of {len(good)} pairs at {PLACES[0]:g} mm")
-    return Statement.of(text, said, good, "needs a uniaxial and a bubble card")
+            words = f"not in {case.name}: {loads[0]:.0f} N, {stiff} {loads[1]:.0f} N"
+            checks.append((loads[0] < loads[1], "" if loads[0] < loads[1] else words))
+    text = "The uniaxial card makes the beam softer than every bubble card (6.5)"
+    head = f"{sum(good for good, _ in checks)} of {len(checks)} pairs at {PLACES[0]:g} mm"
+    return Statement.of(text, checks, "needs a uniaxial and a bubble card", head)
 
 
 def _against(text, study, test, good):
@@ -227,28 +227,25 @@ def _against(text, study, test, good):
     errors = [run.mean_error for run in runs if run.mean_error is not None]
     if not errors:
         return Statement(text, f"needs measured loads and a {test} card", None)
-    right = [good(mean) for mean in errors]
+    right = [(good(mean), "") for mean in errors]
     spread = f"mean {min(errors):+.0f} to {max(errors):+.0f} N"
-    return Statement.of(text, [f"{sum(right)} of {len(right)} runs; {spread}"], right, "")
+    head = f"{sum(well for well, _ in right)} of {len(right)} runs; {spread}"
+    return Statement.of(text, right, "", head)
 
 
 def _order(text, study, groups, need):
     """Check that the stiffness rises along each group, with each card."""
-    said, good, changes = [], [], []
+    checks, changes = [], []
     for group, card in product(groups, study.cards):
         for (one, low), (other, high) in pairwise(study.of(group, card)):
             first, second = low.stiffness, high.stiffness
-            if first is None or second is None:
-                continue
-            good.append(second > first)
-            changes.append(second / first - 1)
-            if not second > first:
-                words = f"{first:.2f} and {second:.2f} N/mm"
-                said.append(f"not {one} to {other} with {card}: {words}")
-    if good:
-        low, high = 100 * min(changes), 100 * max(changes)
-        said.insert(0, f"{sum(good)} of {len(good)} steps, {low:+.0f} to {high:+.0f} %")
-    return Statement.of(text, said, good, f"needs {need}")
+            if first is not None and second is not None:
+                words = f"not {one} to {other} with {card}: {first:.2f} and {second:.2f} N/mm"
+                checks.append((second > first, "" if second > first else words))
+                changes.append(100 * (second / first - 1))
+    steps = f"{sum(good for good, _ in checks)} of {len(checks)} steps"
+    head = f"{steps}, {min(changes):+.0f} to {max(changes):+.0f} %" if checks else ""
+    return Statement.of(text, checks, f"needs {need}", head)
 
 
 def read_study(folder):
