@@ -76,10 +76,7 @@ def correlated(points):
     return NOISE * np.linalg.cholesky(whole)
 
 
-def noisy(
-    pressures, points, exact, root,
-    seed,
-):  # fmt: skip
+def noisy(pressures, points, exact, root, seed):
     random = np.random.default_rng(seed)
     return tuple(
         DisplacementField(p, points, u + root @ random.standard_normal(u.shape))

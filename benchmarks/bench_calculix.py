@@ -180,15 +180,8 @@ def tolerances(models="bubble"):
     model = BubbleModel(disk, base.thickness, base.pressures, base.increments)
     cases = [("bubble, 48 S8R", "TOLERANCES", OF_BUBBLE, "mm", "S8R", model, known)]
     if models == "all":
-        pulled = (
-            "bias strip, 300 S4",
-            "TOLERANCES_STRIP",
-            OF_STRIP,
-            "of the end load",
-            "S4",
-            bias(100, 1),
-        )
-        cases.append((*pulled, LAW_3_2))
+        strip = ("bias strip, 300 S4", "TOLERANCES_STRIP", OF_STRIP, "of the end load", "S4")
+        cases.append((*strip, bias(100, 1), LAW_3_2))
     for what, name, pairs, unit, element, model, law in cases:
         shipped, exact = getattr(sheets, name), None
         for pair in pairs:

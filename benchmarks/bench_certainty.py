@@ -150,12 +150,9 @@ def plan(sets=250, repetitions=10, ranked=30):
         rows = designs(scale, noise, ranked, number)
         by_plan, by_simulation = (min(rows, key=lambda row, k=k: row[k]) for k in (1, 2))
         first += by_plan[0] == by_simulation[0]
-        print(
-            f"law {number}, noise {noise['bubble']:.4f} mm, {noise['strips']:.2f} N: first "
-            f"{by_plan[0]} ({100 * by_plan[1]:.2f} %), "
-            f"by simulation {by_simulation[0]} ({100 * by_simulation[2]:.2f} %)",
-            flush=True,
-        )
+        print(f"law {number}, noise {noise['bubble']:.4f} mm, {noise['strips']:.2f} N: first "
+              f"{by_plan[0]} ({100 * by_plan[1]:.2f} %), by simulation "
+              f"{by_simulation[0]} ({100 * by_simulation[2]:.2f} %)", flush=True)  # fmt: skip
     if repetitions:
         print(f"the first in rank is first by simulation: {first} of {repetitions}")
 

@@ -65,10 +65,7 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
  shear = [0.0, 0.1, 0.3, 0.6, 0.883] }"""
 
 
-def project(
-    law, tests, data, frames, elements,
-    modes, starts, strip_increments,
-):  # fmt: skip
+def project(law, tests, data, frames, elements, modes, starts, strip_increments):
     """Return a project of measured tests by name and, unless 0, of the published strips."""
     table = pd.read_csv(data / "grid_pressures.csv")
     said = {"pressures": [float(table["p_bar"][k]) for k in frames], "frames": list(frames)}

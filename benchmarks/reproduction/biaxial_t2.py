@@ -34,9 +34,7 @@ def lines_of_file(path):
     return [line_of(one.ratio, one.load, one.since) for one in cut]
 
 
-def compared(
-    lines,
-):
+def compared(lines):
     """Of each choice: its name, published, ours, whether ours is near enough."""
     found = []
     for name, (options, published) in PUBLISHED.items():
