@@ -15,7 +15,7 @@ from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from common import BENDING, LAW_4_2, THICKNESS, known_law, start_on
+from common import BENDING, LAW_4_2, THICKNESS, start_on
 from threadpoolctl import threadpool_limits
 
 SHOWN = 20.0
@@ -137,7 +137,7 @@ def levels(what="elements", count=2):
     project = bf.read_project(BENDING).with_solver("membrane", {}, ["wall=tension field"])
     deflections = tuple(map(float, np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:]))
     cylinder = replace(project.tests[NAME], size=SIZE, deflections=deflections)
-    card = MaterialCard(known_law(), project.fabric.thickness, "Table 4.2")
+    card = MaterialCard(LAW_4_2, project.fabric.thickness, "Table 4.2")
     project = replace(project, tests={NAME: cylinder})
     print("\n".join(refine(project, card, NAME, what, count, coarser=0).lines()))
 

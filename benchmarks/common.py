@@ -48,10 +48,6 @@ def known_model_and_law():
     return prepared.test.models()["bubble"], prepared.known
 
 
-def known_law():
-    return known_model_and_law()[1]
-
-
 def objectives_of(solver, heard):
     """Return a listener of a fit that appends e of each run of the solver to `heard`."""
 
