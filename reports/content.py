@@ -235,13 +235,17 @@ def beside(one: Named, other: Named) -> Report:
         sections.append(Section(title, list(_merged(names, *parts))))
     summary = " ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True))
     warnings = [f"{n}: {w}" for n, r in zip(names, reports, strict=True) for w in r.warnings]
-    facts = [
-        (f"{name}: {label}", value)
-        for name, report in zip(names, reports, strict=True)
-        for label, value in report.facts
-    ]
+    about, facts = (
+        [
+            (f"{name}: {label}", value)
+            for name, report in zip(names, reports, strict=True)
+            for label, value in getattr(report, pairs)
+        ]
+        for pairs in ("about", "facts")
+    )
     title = f"{names[0]} beside {names[1]}"
-    return Report(title, summary, facts, warnings, sections, versions=reports[0].versions)
+    versions = reports[0].versions
+    return Report(title, summary, facts, warnings, sections, versions=versions, about=about)
 
 
 def _with_folder(report: Report, name: str) -> Report:

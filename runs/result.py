@@ -374,7 +374,7 @@ def next_step(fit: Fit) -> str:
     if "G12" in short and not any("bias" in c.name for c in fit.problem.comparisons):
         return "add strips at 45 degrees (bias), which shear the fabric"
     if short:
-        return f"rank the tests that narrow {' and '.join(short)} (bubblefit plan)"
+        return f"rank the tests that narrow {', '.join(short)} (bubblefit plan)"
     return "predict a test that was not fitted (bubblefit validate)"
 
 
