@@ -96,6 +96,13 @@ class BubbleModel:
                 problem = f"expected finite numbers {wanted}, got {self.rim_motion.shape}"
                 raise InputError(None, "rim_motion", problem)
 
+    def until(self, frame: int) -> Self:
+        """Return the model as far as a frame, by its number."""
+        end = int(self.reported[frame]) + 1
+        motion = None if self.rim_motion is None else self.rim_motion[:end]
+        levels = self.pressures[: frame + 1], self.increments[:end]
+        return replace(self, pressures=levels[0], increments=levels[1], rim_motion=motion)
+
     @property
     def parameters(self) -> tuple[str, ...]:
         return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)

@@ -117,6 +117,10 @@ class PreparedBubble:
         except InputError as error:
             raise test.place.error(error.field, error.problem) from None
         nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
+        if masks and all(target.frame is not None for target in targets):
+            # What lies above the last frame that counts strains nothing.
+            last = max(sheet.since or 0, *(target.frame or 0 for target in targets))
+            model = model.until(last)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
 
     @property

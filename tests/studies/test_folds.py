@@ -265,7 +265,8 @@ def test_a_frame_is_foretold_by_the_others(bubble, monkeypatch):
     found = fit_without(bubble, second, 1)
     measured = bubble.tests[0].fields[1].displacement
     off = measured - measured / 1.1
-    assert found.test == "bubble: 59 kPa"
+    # The law is known no further than the frame at 22 kPa strains the fabric.
+    assert found.test == "bubble: 59 kPa" and {n.kind for n in found.notes} == {BEYOND_CARD}
     assert found.rms == {"bubble": pytest.approx(np.sqrt(np.mean(off**2)), rel=1e-4)}
     relative = np.sqrt(np.mean(off**2, axis=0)) / np.abs(measured).max(axis=0)
     assert found.error == pytest.approx(relative.mean(), rel=1e-4)
