@@ -8,11 +8,15 @@ tables by the kinds of its notes (`marks`).
 
 from __future__ import annotations
 
+import functools
+import inspect
 import re
+import types
+import typing
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, ParamSpec, TypeVar
 
 #: Letters of a field and of a message that are shown: a key may be as long as its file.
 LONGEST, LONGEST_LINE = 200, 4000
@@ -49,6 +53,60 @@ class InputError(BubblefitError):
     def __reduce__(self) -> tuple:
         # Exceptions cross process borders: rebuild from the fields, not from the text.
         return type(self), (self.path, self.field, self.problem)
+
+
+P, R = ParamSpec("P"), TypeVar("R")
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Check the arguments of every call against the annotations; InputError names the argument."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        expected = _annotations(function)
+        for name, value in signature.bind(*args, **kwargs).arguments.items():
+            if name in expected and not _fits(value, expected[name]):
+                words = inspect.formatannotation(expected[name])
+                words = re.sub(r"\b(\w+\.)+(?=\w)", "", words).replace(" | None", "")
+                problem = f"expected {words}, got {repr(value)[:FEW_LETTERS]}"
+                raise InputError(None, name, problem + MADE_BY.get(words, ""))
+        return function(*args, **kwargs)
+
+    return wrapped
+
+
+#: How to get an argument of a class, by its name.
+MADE_BY = {
+    "Project": "; read_project(FILE) reads one",
+    "Test": "; project.tests[NAME] is one",
+    "MaterialCard": "; read_card(FILE) reads one",
+}
+#: Letters of a value that are shown.
+FEW_LETTERS = 60
+_annotations = functools.cache(typing.get_type_hints)
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Return True if a value is of an annotation, looking into sequences and at keys."""
+    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        return any(_fits(value, one) for one in inside)
+    if origin is typing.Literal:
+        return value in inside
+    if origin is Sequence:  # a text is no sequence of texts
+        several = hasattr(value, "__len__") and not isinstance(value, (str, bytes, Mapping))
+        return several and all(_fits(one, inside[0]) for one in value)
+    if origin is Mapping:
+        pairs = value.items() if isinstance(value, Mapping) else [(None, None)]
+        return all(_fits(key, inside[0]) and _fits(one, inside[1]) for key, one in pairs)
+    if kind in (int, float):
+        return hasattr(value, f"__{'index' if kind is int else 'float'}__")
+    whole = origin or kind
+    if getattr(whole, "_is_protocol", False):  # a plug-in's may have some of its methods only
+        methods = [name for name, one in vars(whole).items() if inspect.isfunction(one)]
+        return any(hasattr(value, name) for name in methods if not name.startswith("_"))
+    return isinstance(value, whole) if isinstance(whole, type) else True
 
 
 class OutputError(BubblefitError):

@@ -134,6 +134,24 @@ def process_context() -> Any:
     return multiprocessing.get_context(chosen or ("fork" if forks else "spawn"))
 
 
+#: Whoever sets one of these has said how many threads there are.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let BLAS use one thread within the block, unless the environment says how many.
+
+    The matrices are too small to share: on two busy cores `check` of 80,000 points took 22 s of
+    processor time with a thread a core, 5 s with one.
+    """
+    from threadpoolctl import threadpool_limits
+
+    said = any(os.environ.get(name) for name in THREADS)
+    with threadpool_limits(None if said else 1, user_api="blas"):
+        yield
+
+
 def ends(call: Callable[[], object], seconds: float) -> bool:
     """Return whether a call ends within `seconds`, in any way but a crash of its process.
 
@@ -195,7 +213,11 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Write a file whole, in UTF-8, onto the disk; OutputError as of `replacing`."""
+    """Write a file whole, in UTF-8, onto the disk; OutputError as of `replacing`.
+
+    Bytes of a file's name that are no text in UTF-8 are shown as question marks.
+    """
+    text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as stream:
         stream.write(text)
         stream.flush()

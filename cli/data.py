@@ -37,8 +37,10 @@ from ..reports.run_pages import write_constants
 from ..reports.vega import save
 from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run
+from ..runs.starts import timed
 from . import options as given
 from .options import check_out, columns_named, frame_options
+from .progress import NamedProgress
 from .terminal import FILE, command, group, show, written_to
 
 
@@ -53,6 +55,7 @@ from .terminal import FILE, command, group, show, written_to
 @given.DATA
 @given.TRUST
 @click.option("--json", "as_json", is_flag=True, help="Print check.json on stdout.")
+@given.QUIET
 def check_command(**options: Any) -> None:
     """Check the data of PROJECT.toml, as every fit does before it begins.
 
@@ -62,9 +65,11 @@ def check_command(**options: Any) -> None:
     the output folder. Exit code 2 where a fit would not begin.
     """
     read = read_project(options["project"], given.data_folders(options["data"]))
-    found = check(read, options["tests"] or None, options["trust"])
     folder = given.folder_of(options, "check")
-    found.report(folder)
+    with NamedProgress("steps", given.quiet(options)) as progress:
+        found = check(read, options["tests"] or None, options["trust"], progress=progress.saw)
+        with timed(f"tables and figures in {folder}"):
+            found.report(folder)
     show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
     if not found.sound:
         sys.exit(InputError.exit_code)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from typing import Any
 
 import click
@@ -51,6 +53,13 @@ COMMANDS = {
 
 class LazyGroup(Suggesting):
     """Import a command only when it is called, and print usage errors in one line."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run as click does; in a locale of ASCII alone, as Python's UTF-8 mode."""
+        if not (args or kwargs) and sys.getfilesystemencoding() == "ascii":  # umlauts in paths
+            again = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
+            os.execv(sys.executable, again)  # noqa: S606
+        return super().main(*args, **kwargs)
 
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any

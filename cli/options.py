@@ -15,7 +15,7 @@ from ..readers.frames import QUANTITIES
 from ..readers.sections import LENGTH_UNITS
 from ..solvers.registry import ANY
 from ..solvers.registry import command_line as solver_options
-from .terminal import COMMAND_LINE, FILE, Decorator
+from .terminal import COMMAND_LINE, FILE, FOLDER, Decorator
 
 if TYPE_CHECKING:
     from ..materials.card import MaterialCard
@@ -63,7 +63,7 @@ def fail_above_option(words: str) -> Decorator:
 
 def out_option(usual: str = "out/NAME") -> Decorator:
     """Return --out, with the usual output folder in its help."""
-    return click.option("--out", type=FILE, help=f"Output folder [{usual}].")
+    return click.option("--out", type=FOLDER, help=f"Output folder [{usual}].")
 
 
 def with_options(*decorators: Decorator) -> Decorator:

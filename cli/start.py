@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -200,6 +201,14 @@ def title_of(page: Path) -> str:
     return next((line[2:] for line in lines if line.startswith("# ")), page.stem)
 
 
+def laid_out(page: str, width: int) -> str:
+    """Return a page as text without colours, which many pagers would show as codes."""
+    console = Console(file=StringIO(), width=width)
+    with console.capture() as captured:
+        console.print(Markdown(page, hyperlinks=False))
+    return captured.get()
+
+
 @command(
     "docs",
     "bubblefit docs",
@@ -227,8 +236,6 @@ def docs_command(topic: str | None, path: bool) -> None:
     if path:
         click.echo(str(known[name]))
     elif sys.stdout.isatty():
-        console = Console()
-        with console.pager(styles=True):
-            console.print(Markdown(known[name].read_text(encoding="utf-8")))
+        click.echo_via_pager(laid_out(known[name].read_text(encoding="utf-8"), Console().width))
     else:
         click.echo(known[name].read_text(encoding="utf-8"), nl=False)

@@ -10,6 +10,7 @@ import difflib
 import functools
 import json
 import logging
+import os
 import re
 import sys
 import time
@@ -21,10 +22,36 @@ from typing import IO, Any
 import click
 
 from ..errors import BubblefitError, OutputError
-from ..files import __version__, json_text, output_errors
+from ..files import __version__, json_text, one_blas_thread, output_errors
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-FILE = click.Path(path_type=Path)
+
+
+class Place(click.Path):
+    """Take a path that may exist; of an output folder, what is there so far has to be a folder."""
+
+    def __init__(self, folder: bool = False) -> None:
+        super().__init__(path_type=Path)
+        self.folder = folder
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Return the path; what is wrong with it is said before the command begins."""
+        path, words = Path(value), "expected a path, got nothing"
+        try:
+            there = next(place for place in (path, *path.absolute().parents) if place.exists())
+            words = "" if str(value) else words
+            if self.folder and not there.is_dir():
+                words = f"{there} is a file; name a folder"
+            elif self.folder and not os.access(there, os.W_OK):
+                words = f"{there} cannot be written; name another folder"
+        except (OSError, ValueError) as error:  # too long, or with a NUL in it
+            words = f"no path: {getattr(error, 'strerror', None) or error}"
+        if words:
+            self.fail(words, param, ctx)
+        return super().convert(value, param, ctx)
+
+
+FILE, FOLDER = Place(), Place(folder=True)
 PAGE = "report.html"
 #: Where click keeps the words that were typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
@@ -63,7 +90,8 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         code, said = 1, None
         try:
-            done = command(*args, **kwargs)
+            with one_blas_thread():
+                done = command(*args, **kwargs)
             code = 0
             return done
         except BubblefitError as error:

@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from ..errors import InputError, OutputError, SolverFailure, rows
-from ..files import replacing
+from ..files import write_text
 from ..materials.card import read_card
 from ..materials.exports.base import Export, Option, options_of
 from ..reports.content import beside
@@ -306,8 +306,7 @@ def export_command(
         if path.exists() and not force:
             raise OutputError(f"{path}: is already there; use --force or another --out")
     for path, text in zip(paths, export.files.values(), strict=True):
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_text(path, text)
     files = [str(path) for path in paths]
     said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
     said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}

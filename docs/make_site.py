@@ -36,6 +36,24 @@ STYLE, CSS = (
 .wy-nav-content { max-width: 1100px }
 """,
 )
+#: A page that is opened as a file may neither start a worker nor read JSON: the search of mkdocs
+#: (lunr, worker and main; the index as text) runs as one script.
+SEARCH = """%s
+window.Worker = function () {
+  var self = this, onmessage
+  var postMessage = data => setTimeout(() => self.onmessage({data: data}))
+  var importScripts = () => {}
+  var XMLHttpRequest = function () {
+    this.addEventListener = (_, loaded) => { this.loaded = loaded }
+    this.open = () => { this.responseText = %s }
+    this.send = () => this.loaded()
+  }
+%s
+  // The index is made on the page that searches only.
+  this.postMessage = data =>
+    document.getElementById("mkdocs-search-query") && onmessage({data: data})
+}
+%s"""
 #: Comment before the title of a generated page.
 WRITTEN = re.compile(r"\A<!--.*?-->\s*", re.DOTALL)
 
@@ -133,7 +151,13 @@ def build(out: Path, root: Path = ROOT) -> subprocess.CompletedProcess[str]:
         config = Path(folder) / "mkdocs.yml"
         config.write_text(json.dumps(settings(source, out.resolve())), encoding="utf-8")  # is YAML
         command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--clean"]
-        return subprocess.run([*command, "-f", config], capture_output=True, text=True)
+        done = subprocess.run([*command, "-f", config], capture_output=True, text=True)
+    if done.returncode == 0:
+        names = ("lunr.js", "search_index.json", "worker.js", "main.js")
+        lunr, index, *scripts = ((out / "search" / n).read_text(encoding="utf-8") for n in names)
+        script = SEARCH % (lunr, json.dumps(index), *scripts)
+        (out / "search" / "main.js").write_text(script, encoding="utf-8")
+    return done
 
 
 def main(arguments: Sequence[str]) -> int:

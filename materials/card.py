@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from ..errors import InputError
-from ..files import replacing, toml_of
+from ..errors import InputError, checked
+from ..files import toml_of, write_text
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
 from .forms.base import (
     COMPONENTS,
@@ -186,8 +186,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         content["certainty"] = {"of": sure.words, "directions": directions}
     words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
     header = "".join(f"# {line}\n" for line in words)
-    with replacing(path) as temporary:
-        temporary.write_text(header + tomli_w.dumps(content), encoding="utf-8")
+    write_text(path, header + tomli_w.dumps(content))
 
 
 def _numbers(value: Any) -> list[float]:
@@ -253,7 +252,8 @@ class CardFile(Section):
     certainty: CertaintyFile | None = None
 
 
-def read_card(path: Path) -> MaterialCard:
+@checked
+def read_card(path: Path | str) -> MaterialCard:
     """Read a card of any format; raise InputError that names the file and the field."""
     path = Path(path)
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -39,12 +40,15 @@ def write_project(
     tests : how many of each kind. name, thickness : of the fabric, mm. said : `USUAL` values that
     are otherwise; mm and kPa. InputError: what is said makes no project. OutputError.
     """
-    write_text(path, project_text(tests, name, thickness, form, **said))
-    try:
-        read_project(path, need_data=False)
-    except InputError:
-        path.unlink()
-        raise
+    text = project_text(tests, name, thickness, form, **said)
+    with tempfile.TemporaryDirectory() as folder:  # so that a wrong one leaves no folder
+        tried = Path(folder) / path.name
+        tried.write_text(text, encoding="utf-8")
+        try:
+            read_project(tried, need_data=False)
+        except InputError as error:
+            raise InputError(None, error.field, error.problem) from None
+    write_text(path, text)
 
 
 def project_text(

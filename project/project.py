@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
+from pydantic import ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.registry import kinds
 from ..files import content_of, is_file
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import form_settings
-from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside
+from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside, first_error
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
@@ -178,7 +179,10 @@ class Project:
 
     def __post_init__(self) -> None:
         name = self.fit.method
-        if self.fit.constraints == "boolean" and name in method_names():
+        if name not in method_names():
+            problem = f"expected one of {', '.join(method_names())}, got {name!r}"
+            raise InputError(self.path, "fit.method", problem)
+        if self.fit.constraints == "boolean":
             if not method_named(name).boolean:
                 others = [other for other in method_names() if method_named(other).boolean]
                 problem = f"boolean flags have no slope: use 'margin' with method {name!r}, or "
@@ -206,9 +210,16 @@ class Project:
         return self if address is None else replace(self, scheduler=address)
 
     def with_fit(self, **changes: Any) -> Project:
-        """Return the project with other settings of its fit; None leaves a setting as it is."""
+        """Return the project with other settings of its fit; None leaves a setting as it is.
+
+        InputError : names the setting that is not possible.
+        """
         given = {key: value for key, value in changes.items() if value is not None}
-        return replace(self, fit=self.fit.model_copy(update=given))
+        try:
+            valid = FitSection.model_validate(given, strict=False)
+        except ValidationError as errors:
+            raise first_error(None, errors, FitSection) from None
+        return replace(self, fit=self.fit.model_copy(update={k: getattr(valid, k) for k in given}))
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
         """Return the project with another form of the moduli; its settings stay unless given."""
@@ -254,13 +265,16 @@ class Project:
         return tests
 
 
-def read_project(path: Path | str, data: Folders | None = None, need_data: bool = True) -> Project:
+@checked
+def read_project(
+    path: Path | str, data: Folders | str | None = None, need_data: bool = True
+) -> Project:
     """Read a project file (TOML).
 
     data : folder of the measured files, or of each test by name, instead of the file's. need_data :
     they must be there. InputError: in one line, the file and the dotted key.
     """
-    path = Path(path)
+    path, data = Path(path), Path(data) if isinstance(data, str) else data
     file = parse(path)
     said, units = file.fabric, file.units
     length, names = LENGTH_UNITS[units.length], (units.modulus, units.pressure, units.length)
@@ -350,6 +364,8 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
         if not is_file(Path(given)):
             problem = f"there is no card (and no file) {str(given)!r}; the project has: "
             raise InputError(project.path, "--card", problem + (", ".join(own) or "none"))
+        if list(map(str, cards)).count(str(given)) > 1:
+            raise InputError(Path(given), "--card", "is given twice")
         card = read_card(Path(given))
         name = card.name or Path(given).stem
         chosen[f"{name} ({given})" if name in chosen else name] = card

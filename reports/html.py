@@ -24,7 +24,7 @@ from PIL import Image, UnidentifiedImageError
 
 from ..errors import OutputError
 from ..errors import percent as percent
-from ..files import TEMPLATES, environment, replacing
+from ..files import TEMPLATES, environment, replacing, write_text
 from . import maps, vega
 from .charts import Charts
 from .content import Report, Table, round_trip, write_page_data
@@ -49,8 +49,7 @@ def write_report(folder: Path | str, report: Report) -> Path:
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     """Write only the page: report.html of the folder, or another file; raises OutputError."""
     path = folder / PAGE if path is None else path
-    with replacing(path) as temporary:
-        temporary.write_text(page_text(folder, report), encoding="utf-8", newline="")
+    write_text(path, page_text(folder, report))
     return path
 
 

@@ -125,7 +125,6 @@ def _notes(predictions: Predictions) -> list[Table]:
 
 def write_check(check: Check, folder: Path) -> Path:
     """Write check.json, the tests' own figures and report.html; return the page's path."""
-    folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "check.json", json_text(check.result))
     several = len(check.setup.tests) > 1
     exhibits: list[tuple[str, Exhibit]] = []

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, NoteKind, percent, rows
+from ..errors import InputError, Note, NoteKind, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
 from ..files import __version__
@@ -32,7 +32,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .folder import Presented, Store
+from .folder import Presented, Store, check_asked
 from .setup import fingerprints
 from .simulation import StudyRecord
 from .validation import TESTS, name_of, parts_of
@@ -231,6 +231,7 @@ class Bootstrap(Presented):
         return [*lines, *note_lines(self.notes)]
 
 
+@checked
 def bootstrap(
     project: Project, over: str, samples: int = COUNT, card: Card = None,
     tests: str | Sequence[str] | None = None, *, seed: int | None = None,
@@ -248,6 +249,7 @@ def bootstrap(
     units; OutputError: the folder is used or cannot be written; SolverFailure: the tests cannot be
     run with the card.
     """
+    check_asked(out, resume, overwrite)
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")
     project = project.with_fit(seed=seed)

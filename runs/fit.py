@@ -6,16 +6,17 @@ import functools
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, NoFeasibleStart, SolverFailure
+from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
 from ..experiments.kinds import Expected, FittableTest, Judgement, judged
 from ..experiments.registry import kinds
-from ..files import __version__
+from ..files import __version__, one_blas_thread
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, plain, settings_of
@@ -26,12 +27,13 @@ from .folder import (
     NAMES,
     Record,
     Store,
+    check_asked,
     failure_page,
     solver_facts,
     write_report,
 )
 from .result import Fit
-from .setup import UNCOUNTED, FitSetup, coarse_problem, fingerprints, prepare_fit
+from .setup import UNCOUNTED, FitSetup, Saw, coarse_problem, fingerprints, prepare_fit
 from .starts import (
     HISTORY,
     STARTS,
@@ -118,6 +120,7 @@ def every_start(
         for mesh in ("full", "coarse")
     )
     if not fit.coarse_to_fine or coarse_problem(setup) is None:
+        told(Stage("starts", fit.starts))
         for record in full.values():
             told(record)
         missing = [n for n in range(fit.starts) if n not in full]
@@ -207,6 +210,7 @@ FitEvent = EvaluationRecord | StartRecord | Stage
 Progress = Callable[[FitEvent | None], None]
 
 
+@checked
 def fit(
     project: Project,
     tests: str | Sequence[str] | None = None,
@@ -240,12 +244,15 @@ def fit(
         does not run again or gives another objective: then the page in `out` says so.
     """
     begun = time.perf_counter()
+    check_asked(out, resume, overwrite)
     project = project.with_fit(
         starts=starts, seed=seed, method=method, jobs=jobs, trust=[*project.fit.trust, *trust],
         starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute()),
     ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    tell = progress or (lambda record: None)
+    tell(Stage("tests to read", len(chosen)))
     with timed("tests and their data made ready"):
         setup = prepare_fit(project, chosen)
     problem = setup.problem()
@@ -261,7 +268,8 @@ def fit(
         store = Store(Path(out))
         facts = facts_of(setup, problem.solver, record.data)
         parts = fingerprints(setup, problem)
-        if store.begin(parts, resume, overwrite, (STARTS, HISTORY), facts):
+        resume = store.begin(parts, resume, overwrite, (STARTS, HISTORY), facts)
+        if resume:
             record = record.after(store.path)
         record.write(store.path)
         unknowns, scales = problem.unknowns, project.scales
@@ -271,8 +279,8 @@ def fit(
         done = files.begin(resume)
     with failure_page(None if out is None else Path(out), project.title):
         with timed("all starts"):
-            records = _records(setup, files, done, progress or (lambda record: None))
-        with timed("the best fit once more, and how sure it is"):
+            records = _records(setup, files, done, tell)
+        with one_blas_thread(), timed("the best fit once more, and how sure it is"):
             best = with_certainty(setup, problem, _best(problem, records, project))
     return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
 
@@ -354,7 +362,7 @@ def expected_of(setup: FitSetup) -> Expected:
     return Expected({n: (least[n], max(high[n], least[n])) for n in COMPONENTS})
 
 
-def judge(setup: FitSetup) -> tuple[Judgement, ...]:
+def judge(setup: FitSetup, saw: Saw = lambda words: None) -> tuple[Judgement, ...]:
     """Return the doubts of each test; raises InputError if the project trusts an unknown one."""
     trust = setup.project.fit.trust
     known = sorted({name for kind in kinds().values() for name in getattr(kind, "doubts", ())})
@@ -362,12 +370,14 @@ def judge(setup: FitSetup) -> tuple[Judgement, ...]:
         if name not in known:
             problem = f"there is no doubt {name!r}; there are: {', '.join(known)}"
             raise InputError(setup.project.path, "fit.trust", problem)
-    expected = expected_of(setup)
-    return tuple(
-        judged(one.test.name, look(expected), trust)
-        for one in setup.tests
-        if (look := getattr(one, "doubts", None)) is not None
-    )
+    expected, judgements = expected_of(setup), []
+    for one in setup.tests:
+        name = one.test.name
+        saw(f"looking at {name}")
+        if (look := getattr(one, "doubts", None)) is not None:
+            with one_blas_thread(), timed(f"{name}, looked at for doubts"):
+                judgements.append(judged(name, look(expected), trust))
+    return tuple(judgements)
 
 
 NOTHING = "nothing doubtful"
@@ -423,17 +433,28 @@ class Check:
         return write_report(self, folder)
 
 
+@checked
 def check(
-    project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = ()
-) -> Check:
+    project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = (),
+    *, progress: Callable[[int, int, str], None] | None = None,
+) -> Check:  # fmt: skip
     """Look at the data of tests, by default of all that can be fitted.
 
-    trust : names of doubts to ignore, beside those of the project. InputError : unreadable data, an
-    unknown doubt. SolverFailure : a known solution does not run.
+    trust : names of doubts to ignore, beside those of the project. progress : receives steps done,
+    their number, and the one that begins. InputError : unreadable data, an unknown doubt.
+    SolverFailure : a known solution does not run.
     """
     project = project.with_fit(trust=[*project.fit.trust, *trust])
-    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
-    return Check(setup, judge(setup))
+    chosen, done = cast(Sequence[FittableTest], project.chosen(tests, fitted=True)), count()
+
+    def saw(words: str) -> None:
+        if progress is not None:
+            progress(next(done), 2 * len(chosen) + 1, words)
+
+    setup = prepare_fit(project, chosen, saw)
+    found = Check(setup, judge(setup, saw))
+    saw("writing the page")
+    return found
 
 
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

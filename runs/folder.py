@@ -9,6 +9,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
+import logging
 import os
 import platform
 import re
@@ -47,6 +48,7 @@ DIGITS = 12
 #: Differences of lists that are listed one by one; length of texts.
 FEW, LONG = 3, 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
+log = logging.getLogger(__name__)
 
 #: All that results depend on, in plain values: `version` of bubblefit; `solver`, name and
 #: identity; `settings` of the project file; `tests`, settings by name; `files`, name and sha256 of
@@ -126,7 +128,17 @@ OUTDATED = (RESULT, "report.html", "page.json", "material.toml")
 PARTS, FACTS = "parts", "facts"
 
 
-NOTHING_THERE = "holds nothing to go on with; leave --resume out, or name another with --out"
+#: A job that a queue killed before its first result is started again with the same words.
+NOTHING_THERE = "%s: holds nothing to go on with (--resume); beginning afresh"
+
+
+def check_asked(out: Path | str | None, resume: bool, overwrite: bool) -> None:
+    """Check that `resume` and `overwrite` make sense; raises InputError."""
+    if resume and overwrite:
+        raise InputError(None, "resume, overwrite", "give one of them, not both")
+    if out is None and (resume or overwrite):
+        name = "resume" if resume else "overwrite"
+        raise InputError(None, name, "means nothing without out, the folder of the results")
 
 
 class Store:
@@ -148,18 +160,19 @@ class Store:
         records: Sequence[str] = (),
         facts: Facts | None = None,
     ) -> bool:
-        """Make the folder ready; return `resume`.
+        """Make the folder ready; return whether it holds anything to go on with.
 
         parts : digests of what must be the same to resume, by name; empty if every record carries
         one. records : files below the folder to remove unless resumed. facts : behind the digests,
         to describe a difference. OutputError : the folder cannot be written, or is used without
-        `resume` or `overwrite`. InputError : nothing to resume, something else, or not readable.
+        `resume` or `overwrite`. InputError : something else to resume, or not readable.
         """
         if self.used and not (resume or overwrite):
             problem = "already holds results; go on with --resume, replace them with --overwrite"
             raise OutputError(f"{self.path}: {problem}, or name another folder with --out")
         if resume and not self.used:
-            raise InputError(self.path, "", NOTHING_THERE)
+            log.warning(NOTHING_THERE, self.path)
+            resume = False
         if resume:
             self._check(parts, facts or {})
         remove_unfinished(self.path)
@@ -235,15 +248,16 @@ class RunRecords:
     def __init__(self, path: Path) -> None:
         self.store = Store(path)
 
-    def begin(self, resume: bool, overwrite: bool) -> None:
-        """Make the folder ready, without `resume` empty of runs; raises as `Store.begin`."""
+    def begin(self, resume: bool, overwrite: bool) -> bool:
+        """Make the folder ready, without `resume` empty of runs; as `Store.begin`."""
         folder = self.store.path / RUNS
         # A name with a dot before it is a file whose writing was cut off.
         cut = list(folder.glob(".*.npz"))
         held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz") if path not in cut]
-        self.store.begin({}, resume, overwrite, held)
+        resume = self.store.begin({}, resume, overwrite, held)
         for path in cut:
             path.unlink(missing_ok=True)
+        return resume
 
     def write(self, mark: str, record: RunRecord) -> None:
         """Write a run unless it failed: that is tried again next time; raises OutputError."""
@@ -289,14 +303,13 @@ FOLDER = "analyses"
 class KeptAnalyses(RunCache):
     """The analyses of a study that writes into `folder`, each under a key of all it depends on.
 
-    Before the first analysis, unless `resume`, earlier ones are removed. Raises InputError if there
-    is nothing to resume.
+    Before the first analysis, unless `resume`, earlier ones are removed.
     """
 
     def __init__(self, folder: Path, resume: bool) -> None:
         super().__init__(folder / FOLDER)
         if resume and not self.folder.is_dir():
-            raise InputError(folder, "", NOTHING_THERE)
+            log.warning(NOTHING_THERE, folder)
         self._resume, self._begun = resume, False
 
     def read(self, key: str) -> History | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, Note, SolverFailure, percent, rows
+from ..errors import InputError, Note, SolverFailure, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     BEYOND_LAW,
@@ -260,6 +260,7 @@ def _law(setup: FitSetup, card: MaterialCard) -> HypoelasticLaw:
     return replace(setup.law, beta=card.law.beta, nu12=card.law.nu12)
 
 
+@checked
 def plan(
     project: Project, card: MaterialCard | Path | str | None = None,
     tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, Note, SolverFailure, as_note, marks
+from ..errors import InputError, Note, SolverFailure, as_note, checked, marks
 from ..errors import lines as note_lines
 from ..errors import rows as note_rows
 from ..experiments.kinds import (
@@ -38,6 +38,7 @@ from .folder import (
     PROVENANCE,
     Record,
     RunRecords,
+    check_asked,
     failure_page,
     versions,
     write_report,
@@ -215,6 +216,7 @@ class RunEvent:
 Progress = Callable[[RunEvent | None], None]
 
 
+@checked
 def predict(
     project: Project,
     tests: str | Sequence[str] | None = None,
@@ -247,6 +249,7 @@ def predict(
         OutputError. SolverFailure : the solver is not there, or no run ended well.
     """
     begun = time.perf_counter()
+    check_asked(out, resume, overwrite)
     project = project.with_scheduler(scheduler)
     executor_of(project).check()
     chosen = predicted_tests(project, tests)
@@ -262,8 +265,7 @@ def predict(
     records = None
     if out is not None:
         records = RunRecords(Path(out))
-        records.begin(resume, overwrite)
-        if resume:
+        if records.begin(resume, overwrite):
             record = record.after(Path(out))
         record.write(Path(out))
     with failure_page(None if out is None else Path(out), project.title) as said:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, rows
+from ..errors import InputError, Note, NoteKind, checked, rows
 from ..errors import lines as note_lines
 from ..inference.likelihood import (
     BOUND,
@@ -217,6 +217,7 @@ class Profiles(Presented):
         return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
 
 
+@checked
 def profile(
     project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
     tests: str | Sequence[str] | None = None, *, progress: Progress | None = None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import functools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from ..experiments.kinds import (
     Weighting,
 )
 from ..experiments.registry import kind_named
+from ..files import one_blas_thread
 from ..inference.comparison import Comparison, Nuisance
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
@@ -43,7 +44,7 @@ from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .folder import PARTS, RUN
-from .starts import HEADER, HISTORY, StartRecord
+from .starts import HEADER, HISTORY, StartRecord, timed
 
 #: Smallest modulus allowed anywhere on the strain range (MPa), unless the file says otherwise.
 MARGIN_E, MARGIN_G = 5.0, 0.5
@@ -384,7 +385,13 @@ class FitSetup:
         return FitOptions(fit.method, fit.gradient, fit.constraints, fit.tolerance, most)
 
 
-def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
+#: Receives the words of a step of a command as it begins.
+Saw = Callable[[str], object]
+
+
+def prepare_fit(
+    project: Project, tests: Sequence[FittableTest], saw: Saw = lambda words: None
+) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
 
     Raises
@@ -404,8 +411,12 @@ def prepare_fit(project: Project, tests: Sequence[FittableTest]) -> FitSetup:
         raise InputError(project.path, "law.form", error.problem) from None
     bounds = bounds_of(project, law.form)
     make = functools.partial(make_solver, project)
-    ready = tuple(kind_named(test.kind).prepare(test, law, make) for test in tests)
-    setup = FitSetup(project, law, bounds, ready)
+    ready = []
+    for test in tests:
+        saw(f"reading {test.name}")
+        with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
+            ready.append(kind_named(test.kind).prepare(test, law, make))
+    setup = FitSetup(project, law, bounds, tuple(ready))
     return replace(setup, starts=_starts(setup))
 
 

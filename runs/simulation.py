@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, rows
+from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     CardRun,
@@ -96,6 +96,7 @@ class Analyses:
                 self.solver.progress = None
 
 
+@checked
 def simulate(
     test: Test, card: MaterialCard, solver: str = "membrane", **options: Any
 ) -> dict[str, History]:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import ast
 import re
 import runpy
+import time
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
+from urllib.parse import unquote, urlsplit
 
 import bubblefit
 import pytest
 from bubblefit.cli.start import find_document, pages, title_of
 
+from .browser import browser
 from .commands import in_process, one_line
 from .complaints import complaint
 from .places import ROOT
@@ -159,6 +163,15 @@ def test_the_site_has_every_document_the_notebook_and_the_interface(tmp_path):
         text = page.read_text()
         loaded = re.findall(r'<(?:script|img|link|iframe)[^>]*(?:src|href)="([^"]+)"', text)
         assert not [address for address in loaded if re.match(r"(https?:)?//", address)], page
+    with browser(tmp_path / "home") as opened:  # as a file, without a server
+        opened.call("Page.navigate", url=(site / "search.html").as_uri() + "?q=crosshead")
+        end = time.monotonic() + 30
+        links = "[...document.querySelectorAll('article a')].map(String)"
+        while not (found := opened.run(links)) and time.monotonic() < end:
+            time.sleep(0.1)
+    assert found and opened.complaints == []
+    places = [Path(unquote(urlsplit(address).path)) for address in found]
+    assert all(place.is_file() and "rosshead" in place.read_text() for place in places)
 
 
 def test_a_link_that_leads_nowhere_is_an_error(tmp_path):

@@ -109,7 +109,7 @@ def test_a_fit_tells_its_starts_and_its_end(tmp_path):
     assert end == {**end, "event": "end", "exit_code": 0, "error": None}
     assert begin["event"] == "begin" and begin["command"].endswith(" fit")
     assert {one["event"] for one in progress} == {"progress"}
-    assert {one["what"] for one in progress} == {"starts"}
+    assert {one["what"] for one in progress} == {"tests to read", "starts"}
     assert [one["done"] for one in progress][-1] == progress[-1]["total"] == 2
     assert json.loads(done.stdout)["objective"] < 1
     # It is there already: a line for people and one for machines.

@@ -1,19 +1,25 @@
 """What was mistyped, help and its examples, completion, --verbose."""
 
+import contextlib
+import json
 import os
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import bubblefit as bf
 import click
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.cli.terminal import HEAD, LOGGER
+from bubblefit.errors import InputError
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.law import HypoelasticLaw
 from click.testing import CliRunner
 
 from .. import needs
-from ..commands import every_command, in_process
+from ..commands import every_command, in_process, one_line
 from ..places import ROOT
 from ..projects import with_form
 
@@ -45,6 +51,120 @@ def test_what_was_mistyped_is_one_line_as_any_bad_input(typed, said):
     done = run(*typed.split())
     assert (done.exit_code, done.stdout) == (2, "")
     assert done.stderr.startswith(f"bubblefit: {said}") and done.stderr.count("\n") == 1
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """Two examples, a card, a file, an empty file and an empty folder."""
+    place = tmp_path_factory.mktemp("desk")
+    for name in ("known", "uniaxial", "biaxial", "bend"):
+        in_process("init", name, "--example", name, cwd=place)
+    MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.81).write(place / "card.toml")
+    (place / "file").write_text("x")
+    (place / "empty.csv").write_text("")
+    (place / "bytes.toml").write_bytes(b"\x00\xff" * 9)
+    (place / "folder").mkdir()
+    return place
+
+
+FIT, CARD, BEND = "fit known/project.toml", "--card card.toml", "simulate bend --diameter 150"
+
+
+@pytest.mark.parametrize(
+    ("typed", "field"),
+    [
+        (f"{FIT} --method lmm", "fit.method"), (f"{FIT} --method ''", "method"),
+        (f"{FIT} --out file", "--out"), (f"{FIT} --out file/below", "--out"),
+        (f"{FIT} --out ''", "--out"), (f"{FIT} --out {'x' * 300}", "--out"),
+        (f"{FIT} --out 'a\0b'", "--out"), (f"{FIT} --resume --overwrite", "--overwrite"),
+        (f"{FIT} --test nobody", "--test"), (f"{FIT} --trust weather", "fit.trust"),
+        (f"{FIT} --earlier folder", "earlier"), (f"{FIT} --data folder", "bubble[0].data"),
+        (f"{FIT} --starts-from proposed --earlier file", "file"), (f"{FIT} --solver sofa", "sofa"),
+        (f"{FIT} --solver-option x=1", "x"), (f"{FIT} --fail-above nan", "--fail-above"),
+        ("fit folder", "folder"), ("fit bytes.toml", "bytes.toml"), ("fit ''", "PROJECT"),
+        ("bubble uniaxial/project.toml", "bubble"), ("check known/project.toml --out file", "--out"),
+        ("biaxial biaxial/project.toml --ratio 0:0", "ratio"),
+        ("biaxial biaxial/project.toml --out file", "--out"),
+        ("compare uniaxial/project.toml --form septic", "septic"),
+        ("compare uniaxial/project.toml --method lmm", "fit.method"),
+        ("validate known/project.toml --method lmm", "fit.method"),
+        (f"profile known/project.toml {CARD} --modulus E9", "E9"),
+        (f"bootstrap known/project.toml {CARD} --over people", "--over"),
+        (f"plan known/project.toml {CARD} --noise bubble=-1", "--noise"),
+        (f"study nu12 known/project.toml {CARD} --nu12 nan", "nu12"),
+        (f"simulate bubble known/project.toml {CARD} {CARD}", "--card"),
+        (f"simulate bubble known/project.toml {CARD} --out file", "--out"),
+        ("simulate bubble known/project.toml --card empty.csv", "empty.csv"),
+        (f"{BEND} --pressure -1 {CARD}", "--pressure"),
+        (f"{BEND} --pressure 100 {CARD} --measured folder", "folder"),
+        ("bend bend/project.toml --card nobody", "nobody"), ("report folder", "folder"),
+        ("export card.toml --format table --out card.toml", "--out"),
+        ("init new --own --bubble 1 --thickness -1", "thickness"), ("init ''", "FOLDER"),
+        ("init new --own --bubble 1 --pressures 60,20", "pressures"), ("docs nowhere", "nowhere"),
+        ("gauge empty.csv --lower 0 0 --upper 0 9 --out g.csv", "empty.csv"),
+        ("dic sphere folder", "folder"), ("schema --out folder", "folder"),
+    ],
+)  # fmt: skip
+def test_a_run_that_cannot_begin_is_one_line_and_leaves_nothing(desk, typed, field):
+    before = sorted(desk.rglob("*"))
+    words = [word.replace("\\0", "\0") for word in shlex.split(typed)]
+    done = in_process(*words, cwd=desk, code=2)
+    one_line(done, field)
+    assert done.stderr.startswith("bubblefit: ") and done.stdout == ""
+    assert sorted(desk.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("starts", lambda p, c: bf.fit(p, starts=0)), ("jobs", lambda p, c: bf.fit(p, jobs=-1)),
+        ("starts", lambda p, c: bf.fit(p, starts=2.5)), ("seed", lambda p, c: bf.fit(p, seed=-1)),
+        ("project", lambda p, c: bf.fit("x.toml")), ("tests", lambda p, c: bf.fit(p, 3)),
+        ("method", lambda p, c: bf.fit(p, method="lmm")), ("out", lambda p, c: bf.fit(p, out=3)),
+        ("starts_from", lambda p, c: bf.fit(p, starts_from="x")),
+        ("trust", lambda p, c: bf.fit(p, trust="preload")),
+        ("resume", lambda p, c: bf.fit(p, resume=True)),
+        ("overwrite", lambda p, c: bf.fit(p, out="o", resume=True, overwrite=True)),
+        ("progress", lambda p, c: bf.fit(p, progress=3)),
+        ("test", lambda p, c: bf.simulate("bubble", c)),
+        ("card", lambda p, c: bf.simulate(p.tests["bubble"], "card.toml")),
+        ("solver", lambda p, c: bf.simulate(p.tests["bubble"], c, solver=3)),
+        ("cards", lambda p, c: bf.predict(p, cards={"a": "card.toml"})),
+        ("jobs", lambda p, c: bf.predict(p, cards={"a": c}, jobs="2")),
+        ("over", lambda p, c: bf.bootstrap(p, 3)), ("card", lambda p, c: bf.plan(p, 3)),
+        ("strain", lambda p, c: bf.plan(p, c, strain=0.1)), ("path", lambda p, c: bf.read_card(3)),
+        ("moduli", lambda p, c: bf.profile(p, {"E1": 0.1})),
+        ("path", lambda p, c: bf.read_project(None)),
+        ("data", lambda p, c: bf.read_project("p.toml", data=3)),
+    ],
+)  # fmt: skip
+def test_arguments_that_cannot_be_are_named(desk, field, call):
+    with contextlib.chdir(desk):
+        before = sorted(desk.rglob("*"))
+        project, card = bf.read_project("known/project.toml"), bf.read_card("card.toml")
+        with pytest.raises(InputError) as caught:
+            call(project, card)
+    assert caught.value.field.split(".")[-1].split(", ")[-1] == field, caught.value
+    assert sorted(desk.rglob("*")) == before
+
+
+def test_umlauts_in_paths_where_the_locale_is_ascii(tmp_path):
+    """In the file system's bytes: also a name in Latin-1 keeps no page from being written."""
+    for name in ("Prüfung".encode(), "Prüfung".encode("latin-1")):
+        (place := tmp_path / os.fsdecode(name)).mkdir()
+        (place / "project.toml").write_text(with_form("constant"))
+        plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+        done = subprocess.run(
+            [sys.executable, "-m", "bubblefit", "fit", place / "project.toml", "--out",
+             place / "out", "--starts", "1", "--jobs", "1"],
+            capture_output=True, env={**os.environ, **plain}, cwd=tmp_path,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        told = json.loads((place / "out" / "provenance.json").read_text())["project"]["file"]
+        assert told == str(place / "project.toml").encode(errors="surrogateescape").decode(
+            errors="replace"
+        )
+        assert (place / "out" / "report.html").is_file()
 
 
 EVERY = {"": main, **{" ".join(path): command for path, command in every_command(main)}}

@@ -18,7 +18,7 @@ from bubblefit.runs.best import best_fit, noise_of, with_certainty
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import notes_of_fit
 from bubblefit.runs.setup import prepare_fit, shared_unknowns
-from bubblefit.runs.starts import StartRecord
+from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers import registry
 
 from ..commands import in_process, result_in
@@ -57,7 +57,7 @@ def test_one_objective_everywhere(fitted, bubble):
     assert f"{fitted.objective:.3g}" in bubble.page
     assert fitted.starts()["objective"].min() == fitted.objective
     starts = [r for r in bubble.heard if isinstance(r, StartRecord)]
-    analyses = sum(r is not None and not isinstance(r, StartRecord) for r in bubble.heard)
+    analyses = sum(isinstance(r, EvaluationRecord) for r in bubble.heard)
     assert analyses == sum(s.analyses for s in starts) == fitted.result["analyses"]
 
 

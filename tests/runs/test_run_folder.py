@@ -348,10 +348,17 @@ def test_a_damaged_middle_line_or_fingerprint_is_an_error(tmp_path):
             begin(Folder(tmp_path), resume=True)
 
 
-def test_resume_where_nothing_is_says_so(tmp_path):
-    with pytest.raises(InputError, match=r"new: holds nothing to go on with.*--resume"):
-        begin(Folder(tmp_path / "new"), resume=True)
-    assert not (tmp_path / "new").exists()
+def test_resume_where_nothing_is_begins_afresh_and_says_so(tmp_path, caplog):
+    for name, left in (("new", []), ("empty", [STARTS]), ("early", [RUN])):
+        place = tmp_path / name
+        if left != []:  # what a job left that was killed early
+            begin(Folder(place))
+            for file in {STARTS, HISTORY, RUN} - {*left}:
+                (place / file).unlink()
+        caplog.clear()
+        assert begin(Folder(place), resume=True) == {}
+        assert len(caplog.records) == (RUN not in left)
+        assert {file.name for file in place.iterdir()} == {STARTS, HISTORY, RUN}
     for name in (STARTS, HISTORY):  # bytes that are no text
         study(tmp_path / name).close()
         with open(tmp_path / name / name, "ab") as stream:
