@@ -44,8 +44,8 @@ class Place(click.Path):
                 words = f"{there} is a file; name a folder"
             elif self.folder and not os.access(there, os.W_OK):
                 words = f"{there} cannot be written; name another folder"
-        except (OSError, ValueError) as error:  # too long, or with a NUL in it
-            words = f"no path: {getattr(error, 'strerror', None) or error}"
+        except OSError as error:  # a name that is too long, a folder that may not be read
+            words = f"no path: {error.strerror}"
         if words:
             self.fail(words, param, ctx)
         return super().convert(value, param, ctx)

@@ -114,7 +114,7 @@ def test_a_fit_tells_its_starts_and_its_end(tmp_path):
     assert json.loads(done.stdout)["objective"] < 1
     # It is there already: a line for people and one for machines.
     done = in_process(*run, cwd=tmp_path, code=2)
-    begin, end = told(tmp_path / "e")
+    begin, *_, end = told(tmp_path / "e")
     assert end["exit_code"] == 2 and "already holds" in end["error"] and not done.stdout
 
 
