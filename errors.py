@@ -55,7 +55,8 @@ class InputError(BubblefitError):
         return type(self), (self.path, self.field, self.problem)
 
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
