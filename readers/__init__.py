@@ -12,6 +12,7 @@ from typing import Any
 _PLACES = {
     "format_names": "registry",
     "read_bending_curves": "bending",
+    "read_field": "fields",
     "read_fields": "fields",
     "read_frames": "frames",
     "read_load_curves": "curves",

@@ -25,18 +25,23 @@ from .machine_tables import (
     source_of,
 )
 from .registry import read_file
-from .tables import LENGTH_UNITS, LOAD_UNITS, WIDTH_LOAD_UNITS
+from .tables import (
+    DIRECTION_ALIASES,
+    LENGTH_UNITS,
+    LOAD_UNITS,
+    STRAIN_UNITS,
+    WIDTH_LOAD_UNITS,
+    distance_to_strip,
+    is_between_grips,
+)
 
 Array = NDArray[np.float64]
+#: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
+LoadUnit = Literal["N", "kN", "kN/m", "N/mm", "N/5cm"]
+LengthUnit = Literal["mm", "cm", "m", "%"]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 #: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")
-#: How files may name the three directions of test; case, spaces and signs do not matter. "0" and
-#: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
-DIRECTION_ALIASES: Mapping[str, str] = {
-    **{"warp": "warp", "fill": "fill", "weft": "fill"},
-    **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias".split(), "bias"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,8 @@ class LoadCurve:
 
     specimen : its name in the file, else the series', else the file's. time : (n,) only where asked
     for. frame : (n,) number of the frame from 0, of a strain gauge. notes : choices that were made.
+    between_grips : the column of elongation where it is the machine's travel. cut : number of rows
+    that were left out after the largest load.
     """
 
     direction: str
@@ -56,6 +63,15 @@ class LoadCurve:
     frame: NDArray[np.intp] | None = None
     notes: tuple[str, ...] = ()
     source: FrameSource | None = None
+    between_grips: str = ""
+    cut: int = 0
+
+    def until_largest_load(self) -> LoadCurve:
+        """Return the curve without the rows after its largest load."""
+        end = int(np.argmax(self.load)) + 1
+        kept = {n: v[:end] for n in ("elongation", "load", "time", "frame")
+                if (v := getattr(self, n)) is not None}  # fmt: skip
+        return replace(self, **kept, cut=len(self.load) - end)
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
@@ -71,20 +87,24 @@ def read_load_curves(
     path: Path | str,
     *,
     columns: Mapping[str, str] | None = None,
-    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None,
-    length_unit: Literal["mm", "cm", "m"] | None = None,
+    load_unit: LoadUnit | None = None,
+    length_unit: LengthUnit | None = None,
     width: float | None = None,
+    gauge_length: Mapping[str, float] | None = None,
     comment: str = "#",
     direction: str | None = None,
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
+    sheet: str | None = None,
 ) -> tuple[LoadCurve, ...]:
     """Read the curves of one export: one a direction and specimen, in the order of the file.
 
     columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with or
     without unit; time is read only when named. load_unit, length_unit : where the file names none.
-    width : mm of the strip, for loads per width. direction : of a file without such a column; else
-    the rows to keep. decimal : needed where 1,234 may be a thousand or little more than one.
+    width : mm of the strip, for loads per width. gauge_length : mm, by direction, for files
+    that hold an engineering strain. direction : of a file without such a column; else the
+    rows to keep. decimal : needed where 1,234 may be a thousand or little more than one. sheet : of
+    a workbook.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in QUANTITIES]
@@ -94,10 +114,11 @@ def read_load_curves(
     if decimal not in (None, ".", ","):
         raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
     wanted = None if direction is None else direction_named(direction)
-    options = TableOptions(named, comment=comment, decimal=decimal)
+    options = TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
     found = read_machine_table(path, options, format)
     column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
-    elongation = measured(found, column["elongation"], "length", LENGTH_UNITS, length_unit)
+    said = column["elongation"]
+    elongation = measured(found, said, "length", LENGTH_UNITS | STRAIN_UNITS, length_unit)
     units, own = dict(LOAD_UNITS), found.units[column["load"]]
     if own in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
         if width is None:
@@ -106,19 +127,33 @@ def read_load_curves(
         units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
     load = measured(found, column["load"], "load", units, load_unit)
     notes = found.notes + choice_of(found, "elongation", named)
+    if notes != found.notes and not np.ptp(elongation):
+        problem = "does not move: name another column of elongation with columns"
+        raise InputError(path, f"line {found.header}, column {said!r}", problem)
+    grips = said if is_between_grips(said, "elongation" in named) else ""
     asked = {"elongation": length_unit, "load": load_unit}
-    source = source_of(found, column, asked, format, notes)
     time = found.table.numbers(column["time"]) if column["time"] else None
     labels = _labels(found, column, wanted)
+    if (found.units[said] or length_unit) in STRAIN_UNITS:
+        gauges = gauge_length or {}
+        lacks = [d for d, _ in labels if d not in gauges and wanted in (None, d)]
+        if lacks:
+            problem = f"is a strain, no elongation: say the {lacks[0]} strip's gauge_length"
+            raise InputError(path, f"line {found.header}, column {said!r}", problem)
+        elongation = elongation * np.array([gauges.get(d, np.nan) for d, _ in labels])
+        doubtful = "; its name does not say of what" if distance_to_strip(said) else ""
+        words = f"{path.name}: the elongation is the strain of column {said!r} times gauge_length"
+        notes = (*notes, words + doubtful)
     places: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
         places.setdefault(label, []).append(row)
+    source = source_of(found, column, asked, format, notes)
     curves = []
     for key, rows in places.items():
         if wanted in (None, key[0]):
             taken = None if time is None else time[rows]
             values = elongation[rows], load[rows]
-            curves.append(LoadCurve(*key, *values, path, taken, notes=notes, source=source))
+            curves.append(LoadCurve(*key, *values, path, taken, None, notes, source, grips))
     if not curves:
         there = ", ".join(dict.fromkeys(key[0] for key in places))
         raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")

@@ -80,6 +80,16 @@ def read_fields(
     return tuple(_field_of(*one) for one in zip(read, map(float, pressures), strict=True))
 
 
+def read_field(
+    path: Path | str,
+    pressure: float,
+    options: FrameOptions | None = None,
+    format: str | None = None,
+) -> DisplacementField:
+    """Read the field of one file, at a pressure in MPa."""
+    return read_fields([path], [pressure], options=options, format=format)[0]
+
+
 def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]

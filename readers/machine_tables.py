@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .frames import FrameSource
 from .registry import format_of, read_file
-from .tables import LOAD_UNITS, TIME_UNITS, TextTable, columns_of, nearest_to_strip, scale_of
+from .tables import (
+    LOAD_UNITS,
+    STRAIN_UNITS,
+    TIME_UNITS,
+    TextTable,
+    columns_of,
+    distance_to_strip,
+    nearest_to_strip,
+    scale_of,
+)
 
 Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
@@ -22,12 +31,13 @@ NEEDED = ("elongation", "load")
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Names of columns, quantities that a table must hold, comment, decimal mark."""
+    """Names of columns, quantities that a table must hold, comment, decimal mark, sheet."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     quantities: Sequence[str] = NEEDED
     comment: str = "#"
     decimal: str | None = None
+    sheet: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +72,8 @@ def column_of(
     which = columns_of(names, quantity, named)
     if quantity == "elongation" and quantity not in named:
         which = nearest_to_strip(names, which)
+        lengths = [i for i in which if found.units[names[i]] not in STRAIN_UNITS]
+        which = lengths or which
     if len(which) == 1 or (not which and may_lack):
         return names[which[0]] if which else ""
     there = ", ".join(name for name in names if name)[:300]
@@ -81,8 +93,9 @@ def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> t
         return ()
     chosen = column_of(found, quantity, named)
     others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
+    why = "" if distance_to_strip(chosen) else ", measured on the strip"
     return (
-        f"{found.table.path.name}: the {quantity} is column {chosen!r}, not {others};"
+        f"{found.table.path.name}: the {quantity} is column {chosen!r}{why}, not {others};"
         f" columns = {{ {quantity} = ... }} names another",
     )
 
@@ -178,7 +191,8 @@ def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...
         at = f"line {found.header}, column {name!r}"
         problem = f"unit {unit[:20]!r} is not one of {', '.join(TIME_UNITS)}; convert the column"
         raise InputError(found.table.path, at, problem)
-    return found.table.numbers(name) * TIME_UNITS[unit]
+    stamps = found.table.stamps(name)
+    return found.table.numbers(name) * TIME_UNITS[unit] if stamps is None else stamps
 
 
 @dataclass(frozen=True)
@@ -204,6 +218,8 @@ def channel_values(
 ) -> Array:
     """Return a column (rows,), converted by the table `units`."""
     path, at = found.table.path, f"line {found.header}, column {column!r}"
+    if units is TIME_UNITS and (stamps := found.table.stamps(column)) is not None:
+        return stamps
     return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
 
 

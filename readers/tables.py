@@ -8,7 +8,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import date
 from io import StringIO
 from itertools import permutations
 from pathlib import Path
@@ -58,6 +60,30 @@ class TextTable:
                 problem += f"; so in {more} more row{'s' * (more > 1)}"
             raise InputError(self.path, f"line {self.lines[first]}, column {column!r}", problem)
         return value
+
+    def stamps(self, column: str) -> NDArray[np.float64] | None:
+        """Return times of a wall clock, (rows,) s since the first day's midnight; None of others.
+
+        Of stamps without a date, one half a day earlier than the one before is of the next day.
+        """
+        text = [cell.strip() for cell in self.text(column)]
+        if not text or not is_stamp(text[0]):
+            return None
+        found = [_STAMP.fullmatch(cell) for cell in text]
+        if None in found:
+            row = found.index(None)
+            problem = f"expected a time as {text[0]!r}, found {text[row][:40]!r}"
+            raise InputError(self.path, f"line {self.lines[row]}, column {column!r}", problem)
+        known = [one for one in found if one is not None]
+        clock, dates = np.array([_of_day(one) for one in known]), [one["date"] for one in known]
+        day = np.cumsum(np.diff(clock, prepend=clock[0]) < -HALF_A_DAY, dtype=np.intp)
+        if any(dates):
+            try:
+                day = _day_numbers(dates)
+            except (TypeError, ValueError):
+                problem = "expected a date before each time, of day, month and year"
+                raise InputError(self.path, f"column {column!r}", problem) from None
+        return np.asarray(clock + 2 * HALF_A_DAY * day)
 
     def constant(self, column: str) -> float:
         """Return one column that holds the same number in each row."""
@@ -202,6 +228,37 @@ def is_number(cell: str) -> bool:
     return bool(_NUMBER.fullmatch(cell))
 
 
+HALF_A_DAY = 43200.0
+#: "12.03.2021 14:02:11,500", "2021-03-12T14:02:11.5Z", "2:02:11 PM".
+_STAMP = re.compile(
+    r"(?:(?P<date>\d{1,4}[./-]\d{1,2}[./-]\d{1,4})[T,]? ?)?"
+    r"(?P<h>\d{1,2}):(?P<m>[0-5]\d):(?P<s>[0-5]\d(?:[.,]\d+)?)"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?: ?(?:Z|UTC|[+-]\d\d:?\d\d))?"
+)
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell holds a time of a wall clock, with or without its date."""
+    return bool(_STAMP.fullmatch(cell))
+
+
+def _of_day(stamp: re.Match[str]) -> float:
+    """Return seconds since midnight."""
+    hour, half = int(stamp["h"]), stamp["half"]
+    hour = hour % 12 + 12 * (half in "Pp") if half else hour
+    return 3600.0 * hour + 60.0 * int(stamp["m"]) + float(stamp["s"].replace(",", "."))
+
+
+def _day_numbers(dates: Sequence[str]) -> NDArray[np.intp]:
+    """Return days since the first; of the orders of day and month that of the shorter time."""
+    parts, found = [[int(part) for part in re.split("[./-]", one)] for one in dates], []
+    for order in ((0, 1, 2), (2, 1, 0), (2, 0, 1)):
+        with suppress(ValueError):
+            days = [date(*(one[i] for i in order)).toordinal() for one in parts]
+            found.append(np.array(days) - days[0])
+    return min(found, key=np.ptp)
+
+
 def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
     """Return the decimal mark of cells that should be numbers: (line, column, text)."""
     commas = [one for one in cells if _COMMA.fullmatch(one[2])]
@@ -221,7 +278,8 @@ WORDS = {
     for quantity, words in {
         "elongation": "elongation extension displacement disp crosshead stroke travel position"
         " weg standardweg traversenweg verfahrweg kolbenweg längenänderung",
-        "load": "load force kraft standardkraft prüfkraft", "time": "time zeit prüfzeit",
+        "load": "load force kraft standardkraft prüfkraft",
+        "time": "time zeit prüfzeit zeitstempel timestamp uhrzeit datetime",
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
     }.items()
@@ -237,34 +295,57 @@ PAIRS = {
     for what, words in (("load", LOADS), ("strain", STRAINS))
     for yarn, along in (("warp", WARP), ("fill", FILL))
 }
-#: Words of columns of elongation: those measured on the strip, then those of the machine's travel,
-#: which holds the slip in the grips and the machine's own give too.
+#: Words of columns of elongation: those measured on the strip, which are elongations (or strains)
+#: by themselves; then those of the machine's travel, which holds the slip in the grips and the
+#: machine's own give too; then those that are mostly its travel ("Extension" of Instron,
+#: "Axial Displacement" of MTS, "Standardweg" of Zwick).
 ON_THE_STRIP = frozenset(
-    "extensometer gauge gage video längenänderung feindehnung wegaufnehmer".split()
+    "extensometer videoextensometer laserextensometer gauge gage video ave dic längenänderung"
+    " feindehnung feindehnungsaufnehmer feinweg wegaufnehmer feinwegaufnehmer dehnungsaufnehmer"
+    " ansetzaufnehmer extensometerweg videoxtens laserxtens makroxtens multixtens lightxtens"
+    " optixtens".split()
 )
 OF_THE_MACHINE = frozenset(
-    "crosshead stroke position travel traversenweg traverse verfahrweg kolbenweg".split()
+    "crosshead stroke position travel actuator traversenweg traversenposition traverse verfahrweg"
+    " kolbenweg".split()
 )
+BETWEEN_GRIPS = frozenset("extension displacement disp weg standardweg".split())
+#: "Extension (Strain 1)" is of the first transducer of strain, "(Extension)" of the crosshead.
+_TRANSDUCER = re.compile(r"\((?:strain|dehnung) ?\d*\)")
+STRAIN_WORDS = frozenset(("strain", "dehnung"))
 #: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
-OTHERS = frozenset(
-    "strain stress rate speed velocity time cell cycle"
-    " dehnung spannung zeit geschwindigkeit".split()
+OTHERS = STRAIN_WORDS | frozenset(
+    "stress rate speed velocity time cell cycle spannung zeit geschwindigkeit".split()
+)
+#: A column with one of these words is no elongation and no strain along the strip.
+NEVER = (OTHERS - STRAIN_WORDS) | frozenset(
+    "true wahre log logarithmic transverse lateral width quer querdehnung".split()
 )
 #: Whole names of the columns that say which specimen and which direction a row belongs to.
 LABELS = {
     "specimen": {"specimen", "specimen id", "specimen label", "sample id", "specimen name"}
+    | {"sample", "probe nr", "proben nr", "probennummer", "probenkennung", "prüfling", "versuch"}
     | {"specimen number", "specimen no", "sample name", "probe"},
     "ratio": {"ratio", "load ratio", "stress ratio", "lastverhältnis", "verhältnis"},
     "repetition": {"repetition", "repeat", "run", "trial", "wiederholung"},
     "direction": {"direction", "series", "test direction", "orientation", "richtung"},
 }
+#: How files may name the three directions of strips; case, spaces and signs do not matter. "0" and
+#: "90" are not here: whether 0 degrees is warp or fill differs between laboratories.
+DIRECTION_ALIASES: Mapping[str, str] = {
+    **{"warp": "warp", "fill": "fill", "weft": "fill", "kette": "warp", "schuss": "fill"},
+    **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias diagonal".split(), "bias"),
+}
 #: mm in one of each unit of length, N in one of each unit of load.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
 LOAD_UNITS = {"N": 1.0, "kN": 1e3}
 #: N/mm in one of each unit of load per width of the strip.
-WIDTH_LOAD_UNITS = {"kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02}
+WIDTH_LOAD_UNITS = {
+    "kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02, "N/5cm": 0.02,
+    "daN/5cm": 0.2,
+}  # fmt: skip
 #: One in each unit of strain.
-STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "-": 1.0, "1": 1.0}
+STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0, "1": 1.0}
 #: MPa in one of each unit of pressure.
 PRESSURE_UNITS = {
     "Pa": 1e-6, "hPa": 1e-4, "mbar": 1e-4, "kPa": 1e-3, "psi": 6.894757293168e-3, "bar": 0.1,
@@ -274,11 +355,20 @@ PRESSURE_UNITS = {
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 #: Letters of a name, and names of a table: what is longer is none, and would take its time.
 LONGEST, MOST_NAMES = 300, 2000
-_KNOWN = r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar|psi"
+_KNOWN = (
+    r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/5cm|daN/5cm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar"
+    "|psi"
+)
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
-_UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,5}"
+_UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"
+_PER_WIDTH = re.compile(r"N ?/ ?(50?) ?([cm]m)\b")
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
 _AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")
+
+
+def plain_unit(text: str) -> str:
+    """Return a text with a load per 5 cm of width, "N / 5 cm", in one word."""
+    return _PER_WIDTH.sub(r"N/\1\2", text)
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -289,6 +379,7 @@ def split_unit(name: str) -> tuple[str, str]:
     """
     if len(name) > LONGEST:
         return name, ""
+    name = plain_unit(name)
     found = _IN_BRACKETS.match(name) or _AT_THE_END.match(name)
     return (found[1].strip(), found[2].strip()) if found else (name, "")
 
@@ -300,7 +391,9 @@ def means(name: str, quantity: str) -> bool:
     plain = split_unit(name)[0].casefold()
     if quantity in LABELS:
         return re.sub(r"[\W_]+", " ", plain).strip() in LABELS[quantity]
-    listed = re.split(r"[\W\d_]+", plain)
+    listed = _listed(plain)
+    if quantity == "elongation" and (_measured_on_strip(plain) or NEVER & {*listed}):
+        return NEVER.isdisjoint(listed)
     if quantity not in PAIRS:
         return not (ours := WORDS[quantity]).isdisjoint(listed) and not (OTHERS - ours) & {*listed}
     what, along = PAIRS[quantity]
@@ -311,9 +404,13 @@ def means(name: str, quantity: str) -> bool:
 
 def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
     """Return the columns that hold a quantity, by the name given for it, else by meaning."""
-    if quantity not in named:
-        return [i for i, name in enumerate(names) if name and means(name, quantity)]
-    return called(names, named[quantity].strip())
+    if quantity in named:
+        return called(names, named[quantity].strip())
+    found = [i for i, name in enumerate(names) if name and means(name, quantity)]
+    if not found and quantity == "elongation":  # a strain alone
+        return [i for i, name in enumerate(names) if STRAIN_WORDS & (own := _words(name))
+                and NEVER.isdisjoint(own)]  # fmt: skip
+    return found
 
 
 def called(names: Sequence[str], asked: str) -> list[int]:
@@ -322,15 +419,39 @@ def called(names: Sequence[str], asked: str) -> list[int]:
     return exact or [i for i, name in enumerate(names) if split_unit(name)[0] == asked]
 
 
+def _words(name: str) -> set[str]:
+    """Return the words of a name without its unit, in small letters; none of one too long."""
+    return set() if len(name) > LONGEST else set(_listed(split_unit(name)[0].casefold()))
+
+
+def _listed(plain: str) -> list[str]:
+    return re.split(r"[\W\d_]+", plain)
+
+
+def _measured_on_strip(plain: str) -> bool:
+    return not ON_THE_STRIP.isdisjoint(_listed(plain)) or bool(_TRANSDUCER.search(plain))
+
+
+def distance_to_strip(name: str) -> int:
+    """Return where a column of elongation was measured: 0 on the strip, 2 by the machine, else 1.
+
+    2 is the crosshead or piston for certain, 1 what is not known by the name.
+    """
+    if _measured_on_strip(split_unit(name)[0].casefold()):
+        return 0
+    return 2 if _words(name) & OF_THE_MACHINE else 1
+
+
 def nearest_to_strip(names: list[str], which: list[int]) -> list[int]:
     """Return those columns of elongation that were measured nearest to the strip."""
+    best = min((distance_to_strip(names[i]) for i in which), default=0)
+    return [i for i in which if distance_to_strip(names[i]) == best]
 
-    def rank(index: int) -> int:
-        words = set(re.split(r"[\W\d_]+", split_unit(names[index])[0].casefold()))
-        return 0 if words & ON_THE_STRIP else 2 if words & OF_THE_MACHINE else 1
 
-    best = min((rank(i) for i in which), default=0)
-    return [i for i in which if rank(i) == best]
+def is_between_grips(name: str, chosen: bool) -> bool:
+    """Return whether a column of elongation is the machine's travel; chosen : by a user."""
+    rank = distance_to_strip(name)
+    return rank == 2 or (rank == 1 and not chosen and bool(_words(name) & BETWEEN_GRIPS))
 
 
 def scale_of(unit: str, units: Mapping[str, float]) -> float | None:

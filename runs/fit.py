@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
-from ..experiments.kinds import Expected, FittableTest, Judgement, judged
+from ..experiments.kinds import Expected, FittableTest, Judgement, files_of, judged
 from ..experiments.registry import kinds
 from ..files import __version__, one_blas_thread
 from ..inference.problem import FitProblem
@@ -406,11 +406,20 @@ class Check:
             ]
             for j in self.judgements
         }  # fmt: skip
-        return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests}
+        return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests,
+                "choices": self.choices}  # fmt: skip
+
+    @property
+    def choices(self) -> dict[str, list[str]]:
+        """Return the choices that were made in reading the files of each test, in words."""
+        return {
+            one.test.name: list(dict.fromkeys(n for f in files_of(one) for n in f.source.notes))
+            for one in self.setup.tests
+        }
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """Return (test, severity, doubt, text), a row a doubt, one for a test without."""
-        rows = []
+        """Return (test, severity, doubt, text): a row a doubt, one for none; choices as notes."""
+        rows, choices = [], self.choices
         for judgement in self.judgements:
             for doubt in judgement.doubts:
                 severity = "error" if doubt.sure else "warning"
@@ -419,6 +428,7 @@ class Check:
                 rows.append((judgement.test, severity, doubt.name, doubt.text))
             if not judgement.doubts:
                 rows.append((judgement.test, "fine", "", NOTHING))
+            rows += [(judgement.test, "note", "", words) for words in choices[judgement.test]]
         return rows
 
     def lines(self) -> list[str]:

@@ -19,7 +19,7 @@ from ...errors import InputError
 from ...materials.designers import RATIOS, shares
 from ...readers import machine_tables as machine
 from ...readers.frames import FrameSource
-from ...readers.tables import PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS
+from ...readers.tables import LOAD_UNITS, PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 
 Array = NDArray[np.float64]
 #: Ratios that a pair of loads may be taken for.
@@ -55,7 +55,7 @@ def nearest_ratio(loads: Sequence[float]) -> str:
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
 
 
-LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm"]
+LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "N", "kN"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
 #: What a table has to hold, and by which key of a project its column is named.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
@@ -79,6 +79,8 @@ def read_biaxial_table(
     columns: Mapping[str, str] | None = None,
     load_unit: LoadUnit | None = None,
     strain_unit: StrainUnit | None = None,
+    width: float | None = None,
+    sheet: str | None = None,
     decimal: Literal[".", ","] | None = None,
     comment: str = "#",
     format: str | None = None,
@@ -86,7 +88,7 @@ def read_biaxial_table(
     """Read a table; names, units, separator and decimal mark are found as for load curves.
 
     columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
-    file names none.
+    file names none. width : mm of the arms, for forces. sheet : of a workbook.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
@@ -95,14 +97,21 @@ def read_biaxial_table(
         raise InputError(None, "columns", problem)
     asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
     wanted = tuple(QUANTITIES.values())
-    options = machine.TableOptions(asked, wanted, comment, decimal)
+    options = machine.TableOptions(asked, wanted, comment, decimal, sheet)
     found = machine.read_machine_table(path, options, format)
     column = {name: machine.column_of(found, name, asked, wanted) for name in (*wanted, "ratio")}
+    loads, own = dict(WIDTH_LOAD_UNITS), found.units[column["warp load"]] or load_unit or ""
+    if scale_of(own, LOAD_UNITS) is not None:
+        if width is None:
+            problem = f"{own} is a force; say the width of the arms, [biaxial] width"
+            at = f"line {found.header}, column {column['warp load']!r}"
+            raise InputError(path, at, problem)
+        loads |= {unit: scale / width for unit, scale in LOAD_UNITS.items()}
     load, strain = (
         np.column_stack([machine.measured(found, column[f"{yarn} {kind}"], kind, units, unit)
                          for yarn in ("warp", "fill")])
         for kind, units, unit in (
-            ("load", WIDTH_LOAD_UNITS, load_unit), ("strain", STRAIN_UNITS, strain_unit),
+            ("load", loads, load_unit), ("strain", STRAIN_UNITS, strain_unit),
         )
     )  # fmt: skip
     units_asked = {name: load_unit if name.endswith("load") else strain_unit for name in wanted}

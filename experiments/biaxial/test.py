@@ -57,18 +57,21 @@ class TablesSection(Section):
     load_unit: LoadUnit | None = None
     strain_unit: StrainUnit | None = None
     decimal: Literal[".", ","] | None = None
+    sheet: str | None = None
     comment: str = "#"
 
 
 class BiaxialSection(Section):
     """Section [[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
 
-    range : kN/m of the larger load. cycle : of each ratio. conditioning : cycles at the beginning
-    of each file that count for nothing. noise : of one measured strain, in %.
+    width : of the arms, where files hold forces. range : kN/m of the larger load. cycle : of each
+    ratio. conditioning : cycles at the beginning of each file that count for nothing. noise : of
+    one measured strain, in %.
     """
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    width: Positive | None = None
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     cycle: Literal["last"] | Annotated[int, Field(ge=1)] = "last"
@@ -105,6 +108,8 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
                 columns=columns,
                 load_unit=data.load_unit,
                 strain_unit=data.strain_unit,
+                width=section.width and section.width * place.scales.length,
+                sheet=data.sheet,
                 decimal=data.decimal,
                 comment=data.comment,
                 format=named_format(place, "data.format", "machine table", data.format),

@@ -19,7 +19,10 @@ class Strips:
     folder_key = "data.folder"
     fitted = True
     predicted = None
-    doubts = ("elongation-unit", "load-unit", "preload", "after-failure", "swapped")
+    doubts = (
+        "elongation-unit", "load-unit", "preload", "after-failure", "swapped", "grip-travel",
+        "gauge-still",
+    )  # fmt: skip
     read = staticmethod(read)
     candidates = staticmethod(candidates)
     studied = Studied(

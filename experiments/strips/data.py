@@ -22,6 +22,7 @@ from ...readers.curves import (
 )
 from ...readers.frames import FrameSource
 from ...readers.registry import format_of
+from ...readers.tables import STRAIN_UNITS
 from ..kinds import DataFile, Doubt, Expected
 
 Array = NDArray[np.float64]
@@ -118,6 +119,7 @@ def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
 LOAD_CELL = 0.005
 #: Why points are not matched.
 BELOW, BEYOND = "elongation below zero", "beyond the final length"
+CUT = "after the largest load"
 PLACES = 200  # at which a polynomial is asked for its regions
 
 
@@ -192,6 +194,7 @@ class Strip:
             below, beyond = int((curve.elongation < 0).sum()), int((curve.elongation > end).sum())
             dropped = {BELOW: below, BEYOND: beyond} if points else {}
             used = len(curve.load) - sum(dropped.values())
+            dropped |= {CUT: curve.cut} if curve.cut else {}
             files.append(DataFile(curve.path, curve.source or FrameSource(), used, dropped))
         return files
 
@@ -233,8 +236,12 @@ LEAST_END, MOST_END = 0.002, 1.5
 PRELOAD = 0.05
 #: Of the elongation: where a curve is taken to begin.
 BEGINNING = 0.01
-#: Of the largest load: a fall below while the strip is pulled further is a failure.
-FAILED = 0.7
+#: Of the largest load: a fall below while the strip is pulled further is a failure; one below the
+#: second may be.
+FAILED, FALLEN = 0.7, 0.9
+#: Of the largest load and of the elongation: a strip that takes up so much load while its gauge
+#: moves no further than that at its end has lost its extensometer.
+TAKEN_UP, STILL = 0.2, 0.002
 #: Of the end strain: where the modulus of a curve is taken.
 SLOPE_AT = 0.5
 #: The modulus along the yarns whose bounds a direction's curve can be held against.
@@ -244,12 +251,17 @@ STIFFER = 1.15
 
 
 def doubts_of_strips(
-    strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected
+    strips: Mapping[str, Strip],
+    width: float,
+    thickness: float,
+    expected: Expected,
+    grip_distance: float,
 ) -> Sequence[Doubt]:
-    """Return the doubts about the strips of a test, by direction; widths and thickness mm."""
+    """Return the doubts about the strips of a test, by direction; lengths mm."""
     found: list[Doubt] = []
     moduli: dict[str, list[float]] = {}
     for direction, strip in strips.items():
+        found += _between_grips(direction, strip, grip_distance)
         for name, elongation, load in curves_of(strip):
             what = f"{direction}, {name}" if name else direction
             found += _of_curve(what, strip, elongation, load)
@@ -284,6 +296,29 @@ def curves_of(strip: Strip) -> list[tuple[str, Array, Array]]:
     return [("", elongation, strip.polynomial(elongation))]
 
 
+def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Doubt]:
+    """Yield the doubt about elongations of the machine; distance : of the grips, mm."""
+    columns = list(dict.fromkeys(c.between_grips for c in strip.curves if c.between_grips))
+    if not columns:
+        return
+    strain = any(
+        c.source and c.source.units.get("elongation") in STRAIN_UNITS for c in strip.curves
+    )
+    share, modulus = strip.gauge_length / distance, ALONG.get(direction, "G12")
+    what = f"{modulus} comes out too low by the slip in the grips and the machine's own give"
+    if share < 0.95 and not strain:
+        what = (
+            f"over a gauge of {strip.gauge_length:.4g} mm between grips {distance:.4g} mm apart "
+            f"{modulus} comes out at about {share:.0%} of what it is, and lower still by the slip"
+        )
+    text = (
+        f"{direction}: the elongation, column {' and '.join(map(repr, columns))}, is by its name"
+        f" the machine's travel from grip to grip: {what}; name one that was measured on the strip "
+        "(columns = { elongation = ... }), or say the grips' distance as the gauge_length"
+    )
+    yield Doubt("grip-travel", False, text)
+
+
 def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterator[Doubt]:
     """Yield doubts about one curve: units of elongation, a preload, rows after failure."""
     strain = elongation[-1] / strip.gauge_length
@@ -304,17 +339,29 @@ def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterat
             "load does"
         )
         yield Doubt("preload", False, text)
-    largest, end = 0.0, strip.elongation
-    for u, f in zip(elongation, load, strict=True):
-        if u > end * (1 + 1e-9):
-            break
-        largest = max(largest, float(f))
-        if f < FAILED * largest and u > SLOPE_AT * end:
+    end = float(elongation[elongation <= strip.elongation * (1 + 1e-9)].max(initial=0.0))
+    still = load[(elongation >= (1 - STILL) * end) & (elongation <= end)]
+    if still.max() - still[0] > TAKEN_UP * largest:
+        text = (
+            f"{what}: the load rises from {still[0]:.3g} to {still.max():.3g} N while the "
+            f"elongation stands still at {end:.3g} mm: the extensometer was taken off or is at its "
+            "end; say a shorter final_length"
+        )
+        yield Doubt("gauge-still", True, text)
+    end = strip.elongation
+    beyond = np.flatnonzero(elongation > end * (1 + 1e-9))
+    rows = slice(0, beyond[0] if len(beyond) else None)
+    top = np.maximum.accumulate(np.maximum(load[rows], 0.0))
+    for share in (FAILED, FALLEN):
+        fallen = np.flatnonzero((load[rows] < share * top) & (elongation[rows] > SLOPE_AT * end))
+        if len(fallen):
+            row = fallen[0]
             text = (
-                f"{what}: the load falls from {largest:.3g} to {f:.3g} N at an elongation of "
-                f"{u:.3g} mm: rows after failure; cut them off, or say a shorter final_length"
+                f"{what}: the load falls from {top[row]:.3g} to {load[row]:.3g} N at an elongation "
+                f"of {elongation[row]:.3g} mm: rows after failure; cut them off with "
+                "until_largest_load = true, or say a shorter final_length"
             )
-            yield Doubt("after-failure", True, text)
+            yield Doubt("after-failure", share == FAILED, text)
             break
 
 

@@ -341,7 +341,8 @@ class PreparedStrips:
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the load curves."""
         test = self.test
-        return doubts_of_strips(test.strips, test.width, test.thickness, expected)
+        sizes = test.width, test.thickness
+        return doubts_of_strips(test.strips, *sizes, expected, test.grip_distance)
 
 
 def loads_to_match(test: StripsTest, strip: Strip, model: UniaxialModel) -> tuple[Array, Array]:

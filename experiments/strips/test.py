@@ -25,8 +25,10 @@ from ...meshes.strip_models import (
 )
 from ...readers.curves import (
     DIRECTIONS,
+    LengthUnit,
     LoadCurve,
     LoadPolynomial,
+    LoadUnit,
     fit_load_polynomial,
     read_load_curves,
     read_published_polynomials,
@@ -83,10 +85,12 @@ class CurvesSection(Section):
     folder: str = ""
     format: str | None = None
     columns: ColumnsSection = ColumnsSection()
-    load_unit: Literal["N", "kN", "kN/m", "N/mm"] | None = None
-    length_unit: Literal["mm", "cm", "m"] | None = None
+    load_unit: LoadUnit | None = None
+    length_unit: LengthUnit | None = None
     decimal: Literal[".", ","] | None = None
     comment: str = "#"
+    sheet: str | None = None
+    until_largest_load: bool = False
     order: Annotated[int, Field(ge=1, le=10)] = 4
     through_origin: bool = True
     specimens: Annotated[int, Field(ge=1, le=10000)] | None = None
@@ -273,22 +277,28 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
 
 
 def measured_curves(
-    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float
+    place: Place,
+    data: CurvesSection,
+    listed: Sequence[ListedFile],
+    width: float,
+    gauges: Mapping[str, float],
 ) -> dict[str, tuple[LoadCurve, ...]]:
     """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
 
     A file with one curve in a direction perhaps lists several specimens, one after the other and
-    not named: it is split where the elongation starts again. width : of the strips, mm.
+    not named: it is split where the elongation starts again. width : of the strips, gauges : by
+    direction, mm.
     """
     format = named_format(place, "data.format", "machine table", data.format)
     columns = data.columns.model_dump(exclude_none=True)
-    said = {n: getattr(data, n) for n in ("load_unit", "length_unit", "comment", "decimal")}
+    keys = ("load_unit", "length_unit", "comment", "decimal", "sheet")
+    said = {name: getattr(data, name) for name in keys}
     by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
     first: dict[Path, LoadCurve] = {}
     for file in listed:
         curves = read_load_curves(
             file.path, columns=columns or None, width=width, direction=file.direction,
-            format=format, **said,
+            gauge_length=gauges, format=format, **said,
         )  # fmt: skip
         before = first.setdefault(file.path, curves[0])
         if before.direction != curves[0].direction and all(
@@ -300,7 +310,10 @@ def measured_curves(
         for direction in DIRECTIONS:
             own = [curve for curve in curves if curve.direction == direction]
             parts = split_at_restarts(own[0]) if len(own) == 1 else ()
-            by_direction[direction] += parts if len(parts) > 1 else own
+            own = list(parts) if len(parts) > 1 else own
+            if data.until_largest_load:
+                own = [curve.until_largest_load() for curve in own]
+            by_direction[direction] += own
     return {direction: tuple(curves) for direction, curves in by_direction.items() if curves}
 
 
@@ -370,7 +383,8 @@ def _measured(
 ) -> dict[str, Strip]:
     said = {file.direction for file in listed}
     strips, length = {}, place.scales.length
-    for direction, curves in measured_curves(place, data, listed, width).items():
+    gauges = {d: t.gauge_length * length for d, t in tables.items() if t.gauge_length is not None}
+    for direction, curves in measured_curves(place, data, listed, width, gauges).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
         if tables and direction not in tables and direction not in said:
             continue

@@ -22,6 +22,7 @@ from ...errors import InputError
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
 from ..tables import (
+    DIRECTION_ALIASES,
     LENGTH_UNITS,
     LOAD_UNITS,
     MOST_NAMES,
@@ -32,6 +33,8 @@ from ..tables import (
     columns_of,
     decimal_mark,
     is_number,
+    is_stamp,
+    plain_unit,
     read_lines,
     split_unit,
 )
@@ -114,7 +117,7 @@ def find_blocks(
         letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
         if letters and not any(_is_number(below, i) for i in needed):
             for name, cell in zip(names, below, strict=False):
-                unit = cell.strip("()[]<>{} ")
+                unit = plain_unit(cell.strip("()[]<>{} "))
                 if unit and units[name] not in ("", unit):
                     problem = f"unit {unit!r} here, but {units[name]!r} in the column's name"
                     at = f"line {rows[body][0]}, column {name!r}"
@@ -123,14 +126,19 @@ def find_blocks(
             body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
         # What stands between two tables begins with a word: the title of the second.
-        while end < len(rows) and inside and not is_number(next(filter(None, inside[-1][1]), "")):
+        while end < len(rows) and inside and not is_reading(next(filter(None, inside[-1][1]), "")):
             inside.pop()
         blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
     return blocks
 
 
 def _is_number(row: list[str], column: int) -> bool:
-    return column < len(row) and is_number(row[column])
+    return column < len(row) and is_reading(row[column])
+
+
+def is_reading(cell: str) -> bool:
+    """Return whether a cell holds a number or a time of a wall clock."""
+    return is_number(cell) or is_stamp(cell)
 
 
 def nothing_found(
@@ -159,8 +167,6 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     names come again), rows longer than the header, a decimal mark that may be a mark
     of thousands.
     """
-    import pandas as pd
-
     named, quantities = options.columns, options.quantities
     lines = read_lines(path, options.comment, any_encoding=True)
     found = []
@@ -172,6 +178,16 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     if not found:
         raise InputError(path, "", nothing_found(lines, named, quantities))
     _, rows, index, separator = max(found, key=lambda one: one[0])
+    return table_of(path, rows, index, options, separator)
+
+
+def table_of(
+    path: Path, rows: Rows, index: int, options: TableOptions, separator: str | None = None
+) -> MachineTable:
+    """Return the table whose names stand in the row `index`, or one below that has more rows."""
+    import pandas as pd
+
+    named, quantities = options.columns, options.quantities
     blocks = find_blocks(path, rows, index, named, quantities)
     chosen = max(blocks, key=lambda names: sum(len(one.rows) for one in blocks[names]))
     names, several = list(chosen), blocks.pop(chosen)
@@ -182,7 +198,10 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     for number, row in rest:
         check_row(path, number, row, width, separator, f"line {header}")
     check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
-    cells = pd.DataFrame([(row + [""] * width)[:width] for _, row in rest], columns=names)
+    rest = [(number, (row + [""] * width)[:width]) for number, row in rest]
+    above = dict(rows).get(max((n for n, _ in rows if n < header), default=0), [])
+    names, rest, notes = _stacked(path, several[0], names, rest, above, options)
+    cells = pd.DataFrame([row for _, row in rest], columns=names)
     needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
     numbers = [(n, names[i], row[i]) for n, row in rest for i in needed if i < len(row)]
     decimal = options.decimal or decimal_mark(path, numbers)
@@ -192,7 +211,59 @@ def read(path: Path, options: TableOptions) -> MachineTable:
         f"{path.name}: the table with its names in line {header}, which has most rows, is read; not"
         f" that of line {' and '.join(others)}"
     )
-    return MachineTable(table, units, header, (note,) if others else ())
+    return MachineTable(table, units, header, (*notes, note) if others else notes)
+
+
+def _plain(name: str) -> str:
+    """Return a name without its unit and numbers: that of the same column of another specimen."""
+    return re.sub(r"[\W\d_]+", " ", split_unit(name)[0].casefold()).strip()
+
+
+def _stacked(
+    path: Path,
+    block: Block,
+    names: list[str],
+    rows: Rows,
+    above: Sequence[str],
+    options: TableOptions,
+) -> tuple[list[str], Rows, tuple[str, ...]]:
+    """Return names, rows and a note of specimens side by side as of one below the other.
+
+    Names and rows are as given where there is one. above : the row above, perhaps of their titles.
+    """
+    loads = columns_of(names, "load", options.columns)
+    apart = {b - a for a, b in pairwise(loads)}
+    if "elongation" not in options.quantities or len(apart) != 1:
+        return names, rows, ()
+    (wide,), units = apart, {**block.units, "": ""}
+    padded, count = [*names, *[""] * wide], len(loads)
+    for first in range(loads[0], max(-1, loads[0] - wide), -1):
+        groups = [range(first + k * wide, first + (k + 1) * wide) for k in range(count)]
+        own = padded[first : first + wide]
+        alike = len({tuple(_plain(padded[i]) for i in group) for group in groups}) == 1
+        if alike and all(columns_of(own, q, options.columns) for q in options.quantities):
+            break
+    else:
+        return names, rows, ()
+    for i, j in ((groups[0][k], group[k]) for group in groups for k in range(wide)):
+        if units[padded[i]] != units[padded[j]]:
+            problem = f"another unit than column {padded[i]!r} of the specimen beside it"
+            raise InputError(path, f"line {block.line}, column {padded[j]!r}", problem)
+    titles = [[above[i] for i in group if i < len(above) and above[i]] for group in groups]
+    said = [one[0] for one in titles if len(one) == 1 and not is_reading(one[0])]
+    labels = said if len({*said}) == count else [f"{path.stem} {k + 1}" for k in range(count)]
+    shared = [i for i in range(len(names)) if not first <= i < first + count * wide]
+    stacked = [
+        (number, [*(row[i] for i in shared), *own, label])
+        for group, label in zip(groups, labels, strict=True)
+        for number, row in rows
+        if any(own := [*row, *[""] * wide][group.start : group.stop])
+    ]
+    ways = {re.sub(r"[\W_]+", "", one.casefold()) for one in labels} <= {*DIRECTION_ALIASES}
+    what = "direction" if ways else "specimen"
+    block.units.update({"": "", what: ""})
+    note = f"{path.name}: {count} {what}s side by side are read: {', '.join(labels)}"
+    return [*(names[i] for i in shared), *padded[first : first + wide], what], stacked, (note,)
 
 
 def _units(path: Path, several: Sequence[Block]) -> dict[str, str]:

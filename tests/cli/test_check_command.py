@@ -120,6 +120,23 @@ def test_strips_are_looked_at_too(tmp_path):
     assert (tmp_path / "c" / "curves.png").is_file()
 
 
+def test_choices_and_the_travel_of_the_machine_are_listed(tmp_path):
+    text = (EXAMPLES / "uniaxial-valmex7318" / "project.toml").read_text()
+    files = '[strips.warp]\ngauge_length = 20.0\n\n[strips.data]\nfiles = { warp = ["w.csv"] }'
+    text = text.replace('[strips.data]\npolynomials = "curves.csv"', files)
+    (tmp_path / "p.toml").write_text(text.replace("# strain_range", "strain_range"))
+    rows = "".join(f"{3 * k},{0.3 * k},{100 * k}\n" for k in range(9))
+    for head in ("Axial Displacement,Extensometer", "Axial Displacement,Temperature"):
+        (tmp_path / "w.csv").write_text(f"{head},Axial Force\nmm,mm,N\n{rows}")
+        out = in_process("check", "p.toml", "--json", "--out", "c", cwd=tmp_path)
+        told, page = json.loads(out.stdout), (tmp_path / "c" / "report.html").read_text()
+        names = [doubt["name"] for doubt in told["tests"]["strips"]]
+        (choice,) = told["choices"]["strips"] or [""]
+        assert ("not 'Axial Displacement'" in choice) == ("Extensometer" in head)
+        assert ("grip-travel" in names) == ("Extensometer" not in head)
+        assert "Axial Displacement" in page
+
+
 def test_the_document_lists_every_doubt_and_its_limits():
     """Every doubt has a trap that provokes it, and a row with its severity and limits."""
     text = (ROOT / "docs" / "reference" / "doubts.md").read_text()

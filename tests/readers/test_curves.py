@@ -1,13 +1,19 @@
 """Load curves of strips from what test machines export."""
 
+import zipfile
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 from bubblefit.experiments.bubble.registration import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
+from bubblefit.readers.formats import workbook as xlsx
 from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
+from bubblefit.readers.pressure_log import read_pressure_log
+from bubblefit.readers.tables import split_unit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -162,16 +168,62 @@ def test_names_given_settle_what_is_ambiguous(scratch):
     assert curve.notes == ()
 
 
+#: Names and units of two columns; which is the elongation, mm for a reading, between the grips.
+ORIGINS = [
+    ("Standardweg [mm]", "Feindehnung [mm]", 1, 1.0, 0),
+    ("Weg [mm]", "Videoextensometer [mm]", 1, 1.0, 0),
+    ("Axial Displacement (mm)", "Extensometer (mm)", 1, 1.0, 0),
+    ("Extension (mm)", "Extension (Strain 1) (mm)", 1, 1.0, 0),
+    ("Standardweg [mm]", "Feindehnung [%]", 1, 0.2, 0),
+    ("Elongation [%]", "Stroke [mm]", 0, 0.2, 0),
+    ("Position (mm)", "Strain(8800:Extensometer) (mm/mm)", 1, 20.0, 0),
+    ("Extensometer [%]", "Extensometer travel [mm]", 1, 1.0, 0),
+    ("Dehnung [%]", "t [s]", 0, 0.2, 0),
+    ("Tensile strain (Extension) (%)", "t", 0, 0.2, 1),
+    ("Standardweg [mm]", "Dehnung [%]", 0, 1.0, 1),
+    ("Video transverse [mm]", "Crosshead [mm]", 1, 1.0, 1),
+    ("Axial Displacement (mm)", "t", 0, 1.0, 1),
+    ("elongation_mm", "True strain [%]", 0, 1.0, 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("first", "second", "which", "factor", "grips"), ORIGINS)
+def test_what_is_measured_on_the_strip_wins(scratch, first, second, which, factor, grips):
+    text = f"Load [N];{first};{second}\n0;0;0\n10;1;3\n20;2;5\n"
+    (curve,) = read(scratch, text, gauge_length={"warp": 20.0})
+    expected = factor * np.array([[0, 1, 2], [0, 3, 5]][which])
+    np.testing.assert_allclose(curve.elongation, expected, rtol=1e-14)
+    name = split_unit((first, second)[which])[0]
+    assert split_unit(curve.between_grips)[0] == name * grips
+    assert curve.source.notes == curve.notes and curve.source.columns["elongation"].startswith(name)
+    # Naming it settles what a name leaves open; a crosshead stays one.
+    columns = {"elongation": (first, second)[which]}
+    (named,) = read(scratch, text, gauge_length={"warp": 20.0}, columns=columns)
+    assert bool(named.between_grips) == (name == "Crosshead")
+    if factor != 1.0:
+        assert "say the warp strip's gauge_length" in complaint(read, scratch, text)
+
+
+def test_an_extensometer_that_was_not_there(scratch):
+    text = "Load [N];Standardweg [mm];Feindehnung [mm]\n0;0;0\n10;1;0\n20;2;0\n"
+    assert "column 'Feindehnung [mm]': does not move" in complaint(read, scratch, text)
+    (curve,) = read(scratch, text, columns={"elongation": "Standardweg"})
+    assert curve.elongation.tolist() == [0, 1, 2]
+
+
 @pytest.mark.parametrize(
     ("unit", "newton"),
-    [("kN/m", 25.0), ("N/mm", 25.0), ("N/m", 0.025), ("N/cm", 2.5), ("N/50mm", 0.5)],
-)
+    [
+        ("kN/m", 25.0), ("N/mm", 25.0), ("N/m", 0.025), ("N/cm", 2.5), ("N/50mm", 0.5),
+        ("N/5 cm", 0.5), ("daN/5cm", 5.0),
+    ],
+)  # fmt: skip
 def test_loads_per_width_are_those_of_the_whole_strip(scratch, unit, newton):
     for name in (f"Force [{unit}]", f"Force in {unit}"):
         text = f"Weg [mm];{name}\n0,5;2\n1,5;4,0\n"
         (curve,) = read(scratch, text, width=25.0)
         np.testing.assert_allclose(curve.load, [2 * newton, 4 * newton], rtol=1e-14)
-    assert f"{unit} is a load per width" in complaint(read, scratch, text)
+    assert f"{unit.replace(' ', '')} is a load per width" in complaint(read, scratch, text)
     (curve,) = read(scratch, "Load,disp_mm\n2,1\n", load_unit="kN/m", width=50.0)
     assert curve.load == [100.0]
 
@@ -290,6 +342,133 @@ def test_tables_of_the_same_names_have_the_same_units(scratch, first, second, wo
     else:
         loads = [curve.load for curve in read(scratch, text)]
         assert np.concatenate(loads) == pytest.approx([0.0, 100.0, 200.0] * 2)
+
+
+LONG = (
+    "Probe;Richtung;Kraft [N/5cm];Dehnung [%]\nA;Kette;0;0\nA;Kette;100;1\n"
+    "B;Kette;0;0\nB;Kette;110;1,5\nC;Schuss;50;2\n"
+)
+#: Tables of several specimens; direction, specimen, mm, N of each, of strips 50 mm wide and gauges
+#: of 20 and 30 mm.
+SEVERAL = {
+    "long": (LONG, [("warp", "A", [0, 0.2], [0, 100]), ("warp", "B", [0, 0.3], [0, 110]),
+                    ("fill", "C", [0.6], [50])]),
+    "pairs": ("Extension (mm),Load (N),Extension (mm),Load (N)\n0,0,0,0\n1,10,1,12\n2,20,,\n",
+              [("warp", "strip 3 1", [0, 1, 2], [0, 10, 20]),
+               ("warp", "strip 3 2", [0, 1], [0, 12])]),
+    "titles": ("P 7;;;;P 9;;;\nZeit [s];Weg [mm];Kraft [N];;Zeit [s];Weg [mm];Kraft [N];\n"
+               "0;0;0;;0;0;0;\n1;1,5;10;;1;1;12;\n",
+               [("warp", "P 7", [0, 1.5], [0, 10]), ("warp", "P 9", [0, 1], [0, 12])]),
+    "directions": ("Kette;;Schuss;\nWeg;Kraft;Weg;Kraft\nmm;kN;mm;kN\n0;0;0;0\n1,5;0,1;1;0,2\n",
+                   [("warp", "Kette", [0, 1.5], [0, 100]), ("fill", "Schuss", [0, 1], [0, 200])]),
+    "numbers": ("t,Load 1 (N),Stroke 1 (mm),Load 2 (N),Stroke 2 (mm)\n0,0,0,0,0\n1,10,1,12,2\n",
+                [("warp", "strip 3 1", [0, 1], [0, 10]), ("warp", "strip 3 2", [0, 2], [0, 12])]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_specimens_below_and_beside_each_other(scratch, name):
+    text, expected = SEVERAL[name]
+    own = {"width": 50.0, "gauge_length": {"warp": 20.0, "fill": 30.0}}
+    direction = None if {"fill"} & {one[0] for one in expected} else "warp"
+    curves = read(scratch, text, direction=direction, **own)
+    assert [(c.direction, c.specimen) for c in curves] == [one[:2] for one in expected]
+    for curve, (*_, elongation, load) in zip(curves, expected, strict=True):
+        np.testing.assert_allclose(curve.elongation, elongation, atol=1e-14)
+        np.testing.assert_allclose(curve.load, load, atol=1e-12)
+    assert any("side by side" in note for note in curves[0].notes) == (name != "long")
+    # A file of two directions listed for one gives that one.
+    assert {c.direction for c in read(scratch, text, direction="warp", **own)} == {"warp"}
+
+
+def test_columns_beside_each_other_that_are_no_specimens(scratch):
+    head = "Load 1 (N),Load 2 (N),Extension 1 (mm),Extension 2 (mm)\n"
+    assert "may be 'Ext" in complaint(read, scratch, head + "0,0,0,0\n1,2,3,4\n")
+    head = "Extension 1 (mm),Load 1 (N),Extension 2 (mm),Load 2 (kN)\n"
+    words = "column 'Load 2 (kN)': another unit than column 'Load 1 (N)'"
+    assert words in complaint(read, scratch, head + "0,0,0,0\n1,2,3,4\n")
+    names = {"elongation": "Extension 2 (mm)", "load": "Load 2 (kN)"}
+    (curve,) = read(scratch, head + "0,0,0,0\n1,2,3,4\n", columns=names)
+    assert curve.load.tolist() == [0, 4000]
+
+
+def test_rows_after_the_largest_load_are_cut():
+    u, load = np.arange(6.0), np.array([0, 5, 9, 10, 3, 1.0])
+    cut = LoadCurve("warp", "1", u, load, None, time=u, frame=np.arange(6)).until_largest_load()
+    assert cut.elongation.tolist() == [0, 1, 2, 3] and cut.load.max() == cut.load[-1] == 10
+    assert (cut.cut, len(cut.time), len(cut.frame)) == (2, 4, 4)
+
+
+def workbook(path: Path, **sheets) -> Path:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+TABLE = [["Standardweg", "Feindehnung", "Standardkraft"], ["mm", "mm", "N"], [0, 0, 0],
+         [3.5, 1.25, 10], [5, 2, 20.5]]  # fmt: skip
+
+
+def test_a_workbook(tmp_path):
+    facts = [["Prüfer", "X"], ["Breite", 25, "mm"]]
+    path = workbook(tmp_path / "a.xlsx", Facts=facts, K1=[["Kette 1"], *TABLE])
+    (curve,) = read_load_curves(path, direction="warp")
+    assert curve.elongation.tolist() == [0, 1.25, 2] and curve.load.tolist() == [0, 10, 20.5]
+    assert curve.source.format == "xlsx" and len(curve.notes) == 1
+    two = workbook(tmp_path / "b.xlsx", K1=TABLE, K2=[*TABLE, [6, 2.5, 30]])
+    complaint_with(["b.xlsx", "'K1', 'K2'", "sheet"], read_load_curves, two, direction="warp")
+    (curve,) = read_load_curves(two, direction="warp", sheet="K2")
+    assert curve.load.tolist() == [0, 10, 20.5, 30]
+    own = {"direction": "warp", "sheet": "K3"}
+    complaint_with(["b.xlsx: sheet", "'K3'", "'K1', 'K2'"], read_load_curves, two, **own)
+    # Formulas have the value that was stored with them, or none: nothing is computed.
+    formula = workbook(tmp_path / "c.xlsx", a=[["Weg [mm]", "Kraft [N]"], [0, 0], ["=1+1", 3]])
+    said = complaint(read_load_curves, formula, direction="warp")
+    assert "line 3, column 'Weg [mm]': expected a number, found nothing" in said
+    times = [datetime(2021, 3, 12, 23, 59, 59, 500000), datetime(2021, 3, 13, 0, 0, 1)]
+    rows = [["Zeitstempel", "Druck [kPa]"], *([t, 1.5 * i] for i, t in enumerate(times))]
+    log = read_pressure_log(workbook(tmp_path / "d.xlsx", a=rows))
+    assert log.time.tolist() == [86399.5, 86401.0] and log.pressure.tolist() == [0, 0.0015]
+
+
+def test_workbooks_that_are_none_or_too_large(tmp_path, monkeypatch):
+    path = tmp_path / "a.xlsx"
+    path.write_bytes(b"PK\x03\x04 nonsense")
+    assert "is no workbook" in complaint(read_load_curves, path, direction="warp")
+    workbook(path, a=[["x", "y"], [1, 2]])
+    assert "no sheet has a row of names" in complaint(read_load_curves, path, direction="warp")
+    monkeypatch.setattr(xlsx, "MOST_CELLS", 4)
+    assert "more than 4 cells" in complaint(read_load_curves, path, direction="warp")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/workbook.xml", b"\0" * (2**20 + 1))
+    monkeypatch.setattr(xlsx, "UNPACKED", 2**20)
+    assert "unpacks to more than 1 MiB" in complaint(read_load_curves, path, direction="warp")
+
+
+#: The clock of a log: the heading, two stamps, seconds since midnight of the first.
+CLOCKS = [
+    ("Zeitstempel", "12.03.2021 14:02:11,500", "12.03.2021 14:02:12,000", 50531.5, 50532.0),
+    ("Timestamp", "2021-03-12T23:59:59.5Z", "2021-03-13T00:00:00.5Z", 86399.5, 86400.5),
+    ("Time", "12:00:01 AM", "2:02:11 PM", 1.0, 50531.0), ("Uhrzeit", "23:59:59,5", "0:00:00,5",
+     86399.5, 86400.5), ("Time", "2/28/2021 12:00:00 PM", "3/1/2021 12:00:00 PM", 43200, 129600),
+    ("Zeit", "30.12.21 00:00:01", "01.01.22 00:00:01", 1, 172801),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "first", "second", "start", "end"), CLOCKS)
+def test_the_clock_on_the_wall(scratch, name, first, second, start, end):
+    scratch.write_text(f"{name};Load [N];Druck [bar]\n{first};1,5;0,1\n{second};2;0,2\n")
+    assert read_times(scratch).tolist() == [start, end]
+    assert read_machine_loads(scratch, timed=True).time.tolist() == [start, end]
+    log = read_pressure_log(scratch)
+    assert log.time.tolist() == [start, end] and log.pressure == pytest.approx([0.01, 0.02])
+    scratch.write_text(scratch.read_text() + "14.2;1;0,3\n")
+    assert f"line 4, column '{name}': expected a time" in complaint(read_times, scratch)
 
 
 NEEDED = ("elongation", "load")

@@ -43,6 +43,7 @@ def test_units_of_columns_are_those_of_si():
     assert tables.LENGTH_UNITS == {"mm": 1.0, "cm": 10.0, "m": 1000.0}
     assert tables.LOAD_UNITS == {"N": 1.0, "kN": 1000.0}
     per_metre = {"kN/m": 1e3, "N/mm": 1e3, "N/m": 1.0, "N/cm": 1e2, "N/50mm": 20.0}
+    per_metre |= {"N/5cm": 20.0, "daN/5cm": 200.0}
     found = {k: 1e3 * v for k, v in tables.WIDTH_LOAD_UNITS.items()}
     assert found == pytest.approx(per_metre)
     assert tables.TIME_UNITS == {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}

@@ -149,6 +149,18 @@ def test_other_names_and_units_mean_the_same(tmp_path, head, load, strain):
     np.testing.assert_allclose(found.strain, wanted, rtol=1e-9)
 
 
+def test_forces_on_the_arms_of_a_cruciform(tmp_path):
+    head = "ratio;Kraft Kette [kN];Kraft Schuss [kN];Dehnung Kette [%];Dehnung Schuss [%]\n"
+    path = tmp_path / "arms.csv"
+    path.write_text(head + "1:1;0;0;0;0\n1:1;1;0,5;0,5;1\n")
+    complaint_with(["arms.csv", "Kraft Kette", "width"], read_biaxial_table, path)
+    found = read_biaxial_table(path, width=100.0)
+    np.testing.assert_allclose(found.load, [[0, 0], [10, 5]])
+    path.write_text(head.replace("[kN]", "") + "1:1;0;0;0;0\n1:1;1000;500;0,5;1\n")
+    found = read_biaxial_table(path, width=50.0, load_unit="N")
+    np.testing.assert_allclose(found.load, [[0, 0], [20, 10]])
+
+
 def test_what_a_file_does_not_say_has_to_be_said(tmp_path):
     bare = write_rows(tmp_path / "bare.csv", ROWS[:5], "ratio,a,b,c,d")
     complaint_with(["bare.csv", "header row", "columns"], read_biaxial_table, bare)

@@ -173,6 +173,36 @@ def test_columns_and_units_of_exports(small, tmp_path):
     np.testing.assert_allclose(curve.load, 800 * u)
 
 
+def test_the_modulus_at_rest_of_a_file_with_crosshead_and_extensometer(small, tmp_path):
+    """818 MPa on the strip; over the crosshead it would be a third of it."""
+    e = np.linspace(0, 0.14, 60)
+    load = 818.0 * 25.0 * 0.81 * (np.log1p(e) - 1.2 * np.log1p(e) ** 2)
+    stroke = 75.0 * 1.35 * e + 2e-3 * load
+    heads = {
+        "Standardweg [mm]\tFeindehnung [mm]": 20.0 * e,
+        "Standardweg [mm]\tFeindehnung [%]": 1e2 * e,
+    }
+    for head, gauge in heads.items():
+        text = f"Prüfzeit [s]\tStandardkraft [N]\t{head}\n{rows(chr(9), e, load, stroke, gauge)}\n"
+        (tmp_path / "w1.csv").write_text(text)
+        warp = small(('["w1.csv", "w2.csv"]', '["w1.csv"]')).strips["warp"]
+        assert 20.0 * warp.polynomial.slope(0.0) / (25.0 * 0.81) == pytest.approx(818.0, rel=0.01)
+        assert "not 'Standardweg" in warp.curves[0].notes[0] and not warp.curves[0].between_grips
+
+
+def test_rows_after_failure_are_cut_where_asked(small, tmp_path):
+    u = np.linspace(0, 4, 21)
+    load = np.where(u < 3.5, 200.0 * u, 20.0)
+    (tmp_path / "w1.csv").write_text(HEAD + rows(",", u, load))
+    one = ('["w1.csv", "w2.csv"]', '["w1.csv"]')
+    assert len(small(one).strips["warp"].points[0]) == 21
+    said = ("[data]", "[data]\nuntil_largest_load = true")
+    warp = small(one, said).strips["warp"]
+    assert warp.points[0][-1] == pytest.approx(3.4) and warp.final_length == pytest.approx(23.4)
+    (file,) = warp.data_files(points=False)
+    assert (file.used, file.dropped) == (18, {"after the largest load": 3})
+
+
 def test_data_folder(small, tmp_path):
     other = tmp_path / "other"
     other.mkdir()

@@ -32,8 +32,8 @@ GOOD = {direction: curve(direction) for direction in MODULI}
 WARP, FILL = GOOD["warp"], GOOD["fill"]
 
 
-def doubts(strips, thickness=THICKNESS, expected=EXPECTED):
-    return list(doubts_of_strips(strips, WIDTH, thickness, expected))
+def doubts(strips, thickness=THICKNESS, expected=EXPECTED, grips=75.0):
+    return list(doubts_of_strips(strips, WIDTH, thickness, expected, grips))
 
 
 def names(curves, **ends):
@@ -44,6 +44,7 @@ def changed(direction: str, **parts):
     return {**GOOD, direction: replace(GOOD[direction], **parts)}
 
 
+STILL = np.minimum(GOOD["bias"].elongation, 7.0)
 BROKEN = changed("fill", load=FILL.load * np.where(np.arange(60) < 50, 1.0, 0.2))
 TRAPS = {
     "percent for mm": (
@@ -62,6 +63,12 @@ TRAPS = {
     ),
     "preload": (
         changed("fill", load=FILL.load + 150.0), {}, ("preload", False, "fill, 1: the load"),
+    ),
+    "travel of the crosshead": (
+        changed("warp", between_grips="Stroke"), {}, ("grip-travel", False, "'Stroke'"),
+    ),
+    "extensometer taken off": (
+        changed("bias", elongation=STILL), {"bias": 7.0}, ("gauge-still", True, "at 7 mm"),
     ),
     "rows after failure": (BROKEN, {}, ("after-failure", True, "falls from")),
     "warp and fill swapped": (
@@ -104,7 +111,7 @@ NEAR = [
     ([0.0, 2.0, 4.0], [-195.0, -100.0, 0.0], 20, None, "", ""),
     *(([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, low, 20.0], 20, 3.0, name,
        f"falls from 100 to {low:.3g} N at an elongation of 3 mm")
-      for low, name in ((70.0, ""), (69.9, F))),
+      for low, name in ((90.0, ""), (89.9, F), (69.9, F))),
     # In the first half of the way it is an early slip, and beyond the end nobody asks.
     ([0.0, 1.0, 2.0, 4.0], [0.0, 100.0, 9.9, 200.0], 20, None, "", ""),
     ([0.0, 2.0, 3.0, 4.0], [0.0, 100.0, 9.9, 20.0], 20, 2.99, "", ""),
@@ -119,6 +126,36 @@ def test_just_below_each_limit_and_at_it(elongation, load, gauge, end, name, wor
     found = doubts({"bias": Strip("bias", gauge, length, None, (one,))})
     assert [d.name for d in found] == [name] * bool(name)
     assert all(words in d.text for d in found)
+
+
+@pytest.mark.parametrize(("grips", "words"), [(75.0, "about 27% of"), (21.0, "by the slip in")])
+def test_what_the_travel_of_the_machine_does_to_a_modulus(grips, words):
+    curves = {d: replace(c, between_grips="Standardweg") for d, c in GOOD.items()}
+    found = doubts({d: strip(c) for d, c in curves.items()}, grips=grips)
+    assert [(d.name, d.sure) for d in found] == [("grip-travel", False)] * 3
+    for doubt, modulus in zip(found, ("E1", "E2", "G12"), strict=True):
+        assert words in doubt.text and modulus in doubt.text and "'Standardweg'" in doubt.text
+
+
+def test_an_extensometer_that_stands_still_within_the_gauge():
+    good = GOOD["bias"]
+    for at, end, doubt in ((9.4, 9.4, 0), (7.0, 7.0, 1), (7.0, 6.9, 0)):
+        one = replace(good, elongation=np.minimum(good.elongation, at))
+        found = doubts({"bias": strip(one, end)})
+        assert {d.name for d in found} == set(["gauge-still"] * doubt)
+
+
+@pytest.mark.parametrize(("low", "sure"), [(89.0, False), (70.0, False), (69.9, True)])
+def test_a_load_that_falls_may_be_a_failure(low, sure):
+    one = LoadCurve("bias", "1", np.array([0, 2, 3, 4.0]), np.array([0, 50, 100, low]), None)
+    (found,) = doubts({"bias": Strip("bias", GAUGE, GAUGE + 4.0, None, (one,))})
+    assert (found.name, found.sure) == ("after-failure", sure)
+    assert "until_largest_load" in found.text
+    cut = Strip("bias", GAUGE, GAUGE + 3.0, None, (one.until_largest_load(),))
+    assert not doubts({"bias": cut})
+    # One that falls slowly at first has failed all the same.
+    one = replace(one, load=np.array([0, 100, 85, low]))
+    assert doubts({"bias": Strip("bias", GAUGE, GAUGE + 4.0, None, (one,))})[0].sure == sure
 
 
 def line(direction: str, modulus: float) -> Strip:
