@@ -267,6 +267,19 @@ def lines(notes: Sequence[Note]) -> list[str]:
     return said
 
 
+def apart(one: float, other: float, digits: int = 3) -> tuple[str, str]:
+    """Return two numbers, with more significant digits where they would look alike.
+
+    >>> apart(21.96, 22.0), apart(15.3, 10)
+    (('21.96', '22'), ('15.3', '10'))
+    """
+    for count in range(digits, 10):  # beyond it, rounding
+        pair = f"{one:.{count}g}", f"{other:.{count}g}"
+        if pair[0] != pair[1]:
+            break
+    return pair
+
+
 def percent(value: float) -> str:
     """Return a fraction as percent with two significant digits, whole from 100 % on."""
     return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"

@@ -198,8 +198,8 @@ def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
     end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
     lines = [
         f"gauge length {length} mm; {result['frames']} frames, lost in {len(result['lost'])}",
-        f"elongation up to {end['elongation_mm']:.5g} mm: strain {end['strain']:.4g},"
-        f" log strain {end['log_strain']:.4g}",
+        f"elongation up to {end['elongation_mm']:.5g} mm: strain"
+        f" {100 * end['strain']:.4g} %, log strain {100 * end['log_strain']:.4g} %",
     ]
     if result["lost"]:
         more = f" and {len(result['lost']) - 8} more" if len(result["lost"]) > 8 else ""

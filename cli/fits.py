@@ -165,8 +165,9 @@ def modulus_lines(fit: Fit) -> list[str]:
     sure = fit.best.certainty
     of = "noise alone" if sure is not None and sure.mesh is None else "noise and mesh"
     lines = [
-        f"{fit.project.title}: tangent moduli at logarithmic strains, with what {of} leave open "
-        f"within the bounds; kN/m: times {fit.thickness:.4g} mm",
+        f"{fit.project.title}:",
+        f"tangent moduli at logarithmic strains; 1 sigma and band: {of};",
+        f"within the bounds of the fit; kN/m: times {fit.thickness:.4g} mm",
         f"{'':18}{'strain':>8}{'MPa':>10}{'1 sigma':>10}"
         f"{f'{percent(LEVEL)} band, MPa':>20}{'kN/m':>10}",
     ]
@@ -207,7 +208,7 @@ def sure_lines(fit: Fit) -> list[str]:
             f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
             for name, s in sigmas.items()
         )
-        lines.append(f"1 sigma from {source}: {parts}")
+        lines.append(f"1 sigma by the noise, from {source}: {parts}")
     return lines
 
 

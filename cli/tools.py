@@ -265,7 +265,7 @@ def _values(known: Option) -> click.ParamType:
 #: The options of all formats.
 format_options = with_options(
     *(
-        click.option(f"--{name}", type=_values(known), help=known.help)
+        click.option(f"--{name.replace('_', '-')}", type=_values(known), help=known.help)
         for name, known in options_of(FORMATS.values()).items()
     )
 )

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, as_note
+from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
 from ..materials.card import MaterialCard, positive, thickness_difference
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
@@ -488,11 +488,16 @@ def beyond(reached: Array, ends: Array) -> list[tuple[str, float, float]]:
     ]
 
 
+def in_percent(strain: float, end: float) -> tuple[str, str]:
+    """Return two strains in % with enough digits to differ, where they do."""
+    return apart(100 * strain, 100 * end)
+
+
 def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
     """Note where strains (3,) leave the range that a card is valid for."""
-    words = "{} strain {:.3f} is beyond the card's valid range {:.3f}: modulus held there"
+    words = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
     found = beyond(reached, card.law.strain_range)
-    return [Note(BEYOND_CARD, words.format(*one)) for one in found]
+    return [Note(BEYOND_CARD, words.format(name, *in_percent(*two))) for name, *two in found]
 
 
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
@@ -505,10 +510,11 @@ def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
 def beyond_range(reached: Array, ends: Array) -> list[Note]:
     """Note where strains (3,) of a fitted test leave the range that its law was given."""
     words = (
-        "{} strain reached {:.3f}, beyond law.strain_range {:.4g}: the modulus was held at its "
+        "{} strain reached {} %, beyond law.strain_range of {} %: the modulus was held at its "
         "end value there; a wider range would let it vary"
     )
-    return [Note(BEYOND_LAW, words.format(*one)) for one in beyond(reached, ends)]
+    found = beyond(reached, ends)
+    return [Note(BEYOND_LAW, words.format(name, *in_percent(*two))) for name, *two in found]
 
 
 def notes_of(history: History, card: MaterialCard) -> list[Note]:

@@ -1,7 +1,7 @@
 """Assess a fit: moduli against a known solution, uncertainty, and what lies on a bound."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -116,29 +116,32 @@ def certainty(
     which = f"at {noise.level[first.name]:.2g} {first.objective.unit} noise"
     if len(problem.comparisons) > 1:
         which = "with the tests' noise"
-    words = [
-        Note(
-            UNCERTAIN,
-            f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
-            f"worst at strain {strains[name][relative.argmax()]:.3f}",
-        )
-        for name, relative in sigmas.items()
-        if relative.max() > LARGEST_SIGMA
-    ]
+    if limit is not None:
+        which += " and the mesh"
     left = best.residual if limit is None else limit.residual
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
     wrong |= differences_of_all(problem, left, best.jacobian)
-    notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)
         there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
         mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
     bands = bands_of(fine or posterior, law, strains)
-    return Certainty(
-        noise.level, strains, sigmas, notes, mesh, noise.alike, posterior, fine, noise.rows, bands,
+    sure = Certainty(
+        noise.level, strains, sigmas, (), mesh, noise.alike, posterior, fine, noise.rows, bands,
         discrepancy=wrong, second=second,
     )  # fmt: skip
+    words = [
+        Note(
+            UNCERTAIN,
+            f"{name} is uncertain by up to {100 * relative.max():.0f} % (1 sigma {which}), "
+            f"worst at {100 * strains[name][relative.argmax()]:.3g} % of strain",
+        )
+        for name, relative in sure.total.items()
+        if relative.max() > LARGEST_SIGMA
+    ]
+    notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
+    return replace(sure, notes=notes)
 
 
 def uncertainty_from(

@@ -75,7 +75,8 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
                 break
         trial, _ = law.increment(old, new, stress)
         if not np.isfinite(trial).all():
-            problem = f"a modulus or 1 - nu12 nu21 is not positive at log strain {end:.4g} of a bar"
+            what = f"at {100 * end:.4g} % of log strain of a bar"
+            problem = f"a modulus or 1 - nu12 nu21 is not positive {what}"
             raise InputError(None, "beta", problem)
         old, stress = new, trial
         strains[i], stresses[i] = new, trial[0]

@@ -158,7 +158,10 @@ def write_check(check: Check, folder: Path) -> Path:
                 [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
             ),
         ],
-        files=[("check.json", "the doubts in plain values")], versions={"bubblefit": __version__},
+        files=[
+            ("check.json", "the doubts in plain values"), *(f for _, e in exhibits for f in e.files)
+        ],
+        versions={"bubblefit": __version__},
     )  # fmt: skip
     return write_report(folder, report)
 

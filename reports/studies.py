@@ -213,7 +213,7 @@ def weights_charts(
         series: list[Series] = []
         for rank, ((strain, moved), bar) in enumerate(zip(by_strain.items(), bars, strict=True)):
             own = float(np.interp(AS_WRITTEN, counts, moved))
-            series.append(line(f"at {strain:.3g}", counts, moved, dashes=rank, marks=True))
+            series.append(line(f"at {100 * strain:.3g} %", counts, moved, dashes=rank, marks=True))
             if bar:
                 ends = [own * (1 - bar)], [own * (1 + bar)]
                 series.append(dots("1 sigma", [AS_WRITTEN], [own], ends, colour=7))

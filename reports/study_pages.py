@@ -262,7 +262,7 @@ def write_plan(study: plan.Plan, folder: Path) -> Path:
     along = [
         Table(
             f"1 sigma of {name}",
-            ["test", *(f"at strain {strain:.3g}" for strain in study.strains[name])],
+            ["test", *(f"at {100 * strain:.3g} %" for strain in study.strains[name])],
             [[title, *map(words, study.at(p)[name])] for title, p in every],
         )
         for name in COMPONENTS

@@ -183,8 +183,9 @@ def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
         if beyond[worst] > 0:
             strain, by = sure.strain[name][worst], 100 * mesh[name][worst]
             words = (
-                f"on a fine mesh {name} would be {by:+.2g} % at strain {strain:.3f}, more than the "
-                f"noise makes uncertain ({100 * sure.sigma[name][worst]:.2g} %): more elements help"
+                f"on a fine mesh {name} would be {by:+.2g} % at {100 * strain:.3g} % of strain, "
+                f"more than the noise makes uncertain ({100 * sure.sigma[name][worst]:.2g} %): "
+                "more elements help"
             )
             notes.append(Note(MESH, words))
     return notes

@@ -23,6 +23,7 @@ from ..experiments.kinds import (
     Weighting,
     beyond,
     by_strain,
+    in_percent,
     strains_of,
     unstable_words,
 )
@@ -184,8 +185,9 @@ class Plan(Presented):
         wide = max(len(test.title) for test in every) + 2
         head = "".join(f"{name:>10}" for name in COMPONENTS)
         lines = [
-            f"1 sigma of the moduli up to strain {', '.join(f'{e:.3g}' for e in self.ends)} (warp, "
-            f"fill, shear), with one more test beside {', '.join(self.tests) or 'none'}",
+            "1 sigma of the moduli up to strains of "
+            f"{', '.join(f'{100 * e:.3g}' for e in self.ends)} % (warp, fill, shear),",
+            f"with one more test beside {', '.join(self.tests) or 'none'}",
             f"{'':4}{'test':<{wide}}{head}   noise",
         ]
         for place, test in enumerate(every):
@@ -359,7 +361,8 @@ def _added(
         size = round(np.mean(objective.sizes))
         said.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
         for strain, at, end in beyond(strains_of(history), law.strain_range):
-            words = f"{strain} strain {at:.3f} is beyond {end:.3f}: the modulus is held there"
+            at, end = in_percent(at, end)
+            words = f"{strain} strain {at} % is beyond {end} %: the modulus is held there"
             notes.append(Note(BEYOND_LAW, words, candidate.name))
         if comparison.must_be_stable:
             notes += [note.about(candidate.name) for note in unstable_words(history.unstable)]

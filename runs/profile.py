@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, checked, rows
+from ..errors import InputError, Note, NoteKind, apart, checked, rows
 from ..errors import lines as note_lines
 from ..inference.likelihood import (
     BOUND,
@@ -76,7 +76,7 @@ class Profile:
     @property
     def name(self) -> str:
         """The modulus and its strain in words."""
-        return f"{self.modulus} at strain {self.strain:.4g}"
+        return f"{self.modulus} at {100 * self.strain:.4g} % of strain"
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
@@ -278,7 +278,8 @@ def _places(found: Optimum, asked: Mapping[str, Sequence[float]]) -> list[tuple[
         reached = float(found.best.valid[component])
         for strain in strains:
             if strain > reached * (1 + 1e-9):
-                problem = f"{name} is fitted up to strain {reached:.4g}; got {strain:g}"
+                end, given = apart(reached, strain, 4)
+                problem = f"{name} is fitted up to a strain of {end}; got {given}"
                 raise InputError(found.setup.project.path, "--modulus", problem)
         places += [(name, strain) for strain in strains or (SHARE * reached,)]
     return places

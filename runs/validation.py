@@ -25,6 +25,7 @@ from ..experiments.kinds import (
     PreparedTest,
     Weighting,
     beyond,
+    in_percent,
     strains_of,
     unstable_words,
 )
@@ -138,11 +139,12 @@ def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[
         words = [
             Note(
                 BEYOND_CARD,
-                f"{strain} strain {at:.3f} is beyond {end:.3f}, up to which the law is known: "
-                "modulus held there",
+                f"{strain} strain {at} % is beyond {end} %, up to which the law is known: modulus "
+                "held there",
                 part,
             )
-            for strain, at, end in beyond(strains_of(history), law.strain_range)
+            for strain, *two in beyond(strains_of(history), law.strain_range)
+            for at, end in [in_percent(*two)]
         ]
         unstable = [Note(n.kind, str(n), part) for n in unstable_words(history.unstable)]
         notes += [*words, *unstable]

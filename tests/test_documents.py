@@ -35,6 +35,21 @@ TEST = re.compile(r"`(tests/[\w/]+\.py)::(\w+)`")
 NAMES = {"rel", "abs", "rtol", "atol", "tolerance"}
 
 
+SAMPLES = [(p, s) for p in DOCUMENTS for s in re.findall(r"```text\n(.*?)```", p.read_text(), re.S)]
+
+
+@pytest.mark.parametrize(("path", "sample"), SAMPLES, ids=lambda x: getattr(x, "stem", ""))
+def test_samples_of_output_are_those_of_runs(path, sample):
+    """Every line stands in one golden file, in its order; an error is that of its command."""
+    lines = [line for line in sample.splitlines() if line != "..."]
+    if lines[0].startswith("bubblefit: bubbel:"):
+        assert in_process("bubbel", cwd=ROOT, code=2).stderr.splitlines() == lines
+        return
+    runs = [golden.read_text().splitlines() for golden in (ROOT / "tests" / "golden").iterdir()]
+    # `in` on an iterator goes on behind what it found.
+    assert any(all(line in left for line in lines) for left in map(iter, runs)), path
+
+
 def verified():
     """Row by row of the table of results: what, within, and asserted by."""
     section = RESULTS.read_text().split("\n## Verified against\n")[1].split("\n## ")[0]

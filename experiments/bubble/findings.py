@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import Note, NoteKind
+from ...errors import Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
 from ...readers.pressure_log import ClockOffset
 from ..kinds import Array, FittedTest
@@ -168,10 +168,9 @@ def recorded_lines(taken: RecordedFrames) -> list[str]:
     lines = [f"pressures from {taken.source}: {count}"]
     if taken.asked is not None:
         worst = int(np.argmax(np.abs(taken.pressure - taken.asked)))
-        lines[0] += (
-            f"; farthest from the pressure asked for: {1e3 * taken.pressure[worst]:.4g} in place of"
-            f" {1e3 * taken.asked[worst]:.4g} kPa"
-        )
+        found, asked = apart(1e3 * taken.pressure[worst], 1e3 * taken.asked[worst], 4)
+        if found != asked:
+            lines[0] += f"; farthest from the pressure asked for: {found} in place of {asked} kPa"
     return lines if taken.clock is None else [*lines, clock_words(taken.clock)]
 
 

@@ -127,7 +127,8 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         numbers["moduli_error"] = errors
         numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
         said = ", ".join(
-            f"{name} {percent(errors[name])} (strain 0 to {end:.3g})" for name, end in ends.items()
+            f"{name} {percent(errors[name])} (up to {100 * end:.3g} %)"
+            for name, end in ends.items()
         )
         lines.append(f"largest error of the moduli over the strain reached: {said}")
     if prepared.registration is not None:

@@ -373,17 +373,77 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
     if draw_orders([s.strip for s in strips], out.path("orders.png")):
         caption = "Error of load polynomials by order, and with a specimen left out"
         figures.append((out.name("orders.png"), caption))
+    record, more = show_standard(test, out)
     return Exhibit(
         facts=[("matched", MATCHED[test.match_by])],
         figures=figures,
         tables=[misfit_table(strips)],
-        files=files,
+        files=[*files, *more],
         parts=[charts],
+        record=record,
     )
 
 
+#: File of the table after EN ISO 1421, the width (mm) for which it gives forces, its quantities.
+STANDARD, PER_WIDTH = "en-iso-1421.csv", 50.0
+QUANTITIES = {
+    "max_force_N": "largest force, N",
+    "max_force_N_per_50mm": "N/50 mm",
+    "max_force_kN_per_m": "kN/m",
+    "elongation_at_max_force_percent": "elongation at it, %",
+}
+ABOUT = ("width_mm", "gauge_length_mm", "rate_mm_per_min", "conditioning")
+
+
+def standard_table(test: StripsTest) -> pd.DataFrame:
+    """Return what a report after EN ISO 1421 lists: a row a specimen, then mean, SD and CV (%)."""
+    parts = []
+    for direction, strip in test.strips.items():
+        rows = []
+        for curve in strip.curves:
+            top = int(np.argmax(curve.load))
+            force = float(curve.load[top])
+            strain = 100 * float(curve.elongation[top]) / strip.gauge_length
+            values = force, force * PER_WIDTH / test.width, force / test.width, strain
+            rows.append({"specimen": curve.specimen, **dict(zip(QUANTITIES, values, strict=True))})
+        table = pd.DataFrame(rows)
+        if len(table) > 1:
+            own = table[list(QUANTITIES)]
+            mean, deviation = own.mean(), own.std(ddof=1)
+            for name, row in (("mean", mean), ("standard deviation", deviation),
+                              ("coefficient of variation, %", 100 * deviation / mean)):  # fmt: skip
+                table.loc[len(table)] = [name, *row]
+        about = test.width, strip.gauge_length, test.rate, test.conditioning
+        parts.append(table.assign(direction=direction, **dict(zip(ABOUT, about, strict=True))))
+    found = pd.concat([part for part in parts if len(part)] or [pd.DataFrame()], ignore_index=True)
+    return found.reindex(columns=["direction", "specimen", *QUANTITIES, *ABOUT])
+
+
+def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tuple[str, str]]]:
+    """Write the table after EN ISO 1421; return it, and its file; nothing without specimens."""
+    found = standard_table(test)
+    if not len(found):
+        return [], []
+    with replacing(out.path(STANDARD)) as path:
+        found.to_csv(path, index=False, float_format="%.9g")
+    note = (
+        "The largest force in the data: that at break where the test went so far; elongation over "
+        "the gauge length. Mean, standard deviation and coefficient of variation by direction."
+    )
+    gauges = ", ".join(f"{d} {s.gauge_length:g}" for d, s in test.strips.items())
+    rate = "not given" if test.rate is None else f"{test.rate:g} mm/min"
+    note += (
+        f" Width {test.width:g} mm; gauge {gauges} mm; rate: {rate}; conditioning: "
+        f"{test.conditioning or 'not given'}."
+    )
+    header = ["direction", "specimen", *QUANTITIES.values()]
+    rows = found[["direction", "specimen", *QUANTITIES]].to_numpy(dtype=object).tolist()
+    table = Table("Report after EN ISO 1421", header, rows, note, text=(1,))
+    return [table], [(out.name(STANDARD), "forces and elongations after EN ISO 1421")]
+
+
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
-    """Draw the load curves as read; return a table of the specimens."""
+    """Draw the load curves as read; return tables of the specimens."""
     strips = prepared.test.strips
     curves = {direction: curves_of(strip) for direction, strip in strips.items()}
     save(out.path("curves.png"), specimen_charts(curves))
@@ -392,13 +452,15 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
         for name, u, load in specimens:
             strain = float(np.log1p(u[-1] / strips[direction].gauge_length))
             rows.append([direction, name or "polynomial", len(load), float(u[0]), float(u[-1]),
-                         strain, float(load[0]), float(load.max())])  # fmt: skip
+                         100 * strain, float(load[0]), float(load.max())])  # fmt: skip
     header = [
-        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last strain",
+        "direction", "specimen", "points", "first elongation, mm", "last, mm", "last log strain, %",
         "first load, N", "largest load, N",
     ]  # fmt: skip
     figures = [(out.name("curves.png"), "load curves as they were read")]
-    return Exhibit(figures=figures, tables=[Table("Load curves as read", header, rows, text=(1,))])
+    tables, files = show_standard(prepared.test, out)
+    as_read = Table("Load curves as read", header, rows, text=(1,))
+    return Exhibit(figures=figures, tables=[*tables, as_read], files=files)
 
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:

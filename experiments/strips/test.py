@@ -117,6 +117,8 @@ class StripsSection(Section):
     bias: GaugeSection | None = None
     data: CurvesSection
     noise: Positive | None = None
+    rate: Positive | None = None
+    conditioning: Name | None = None
     match: Match = "polynomial"
     objective: Unit = "N"
     weight: Weight = 1.0
@@ -128,7 +130,7 @@ class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
 
     strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
-    unknown.
+    unknown. rate : mm a minute, and conditioning in words: for the report only.
     """
 
     name: str
@@ -144,6 +146,8 @@ class StripsTest:
     objective: Unit
     noise: float | None = None
     specimens: int | None = None
+    rate: float | None = None
+    conditioning: str | None = None
     kind: str = "strips"
     reads_files = True
 
@@ -221,6 +225,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
         match_by=section.match,
         weights=weights,
         specimens=section.data.specimens,
+        rate=None if section.rate is None else section.rate * length,
+        conditioning=section.conditioning,
         **{key: getattr(section, key) for key in same},
     )
 

@@ -85,22 +85,24 @@ def check_positive(card: MaterialCard) -> None:
             values = law.modulus(name, strain, ratio)
             if not (values > 0).all():
                 worst = int(np.argmin(values))
-                problem = f"{name} is {values[worst]:.4g} MPa at log strain {strain[worst]:.4g}"
-                words = f"{problem}, where the card is to hold; expected > 0"
+                problem = f"{name} is {values[worst]:.4g} MPa at {100 * strain[worst]:.4g} % of"
+                words = f"{problem} log strain, where the card is to hold; expected > 0"
                 raise InputError(None, "beta", words)
     if not law.nu12**2 * float(law.E2(0.0) / law.E1(0.0)) < 1:
         problem = f"nu12 nu21 is not below 1 at zero strain, for nu12 = {law.nu12:g}"
         raise InputError(None, "nu12", f"{problem} and E2/E1 of the card")
 
 
-def heading(card: MaterialCard, what: str, says: Says, comment: str) -> str:
+def heading(
+    card: MaterialCard, what: str, says: Says, comment: str, units: str = "mm, N, MPa"
+) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses."""
     lines = [f"{what}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
         # One line each, whatever the card's text holds.
         words = one_line(" ".join(text.split()))
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
-    lines += [f"units: mm, N, MPa; thickness {card.thickness:g} mm", *says.lines()]
+    lines += [f"units: {units}; thickness {card.thickness:g} mm", *says.lines()]
     lines += band_lines(card)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
@@ -126,7 +128,9 @@ def band_lines(card: MaterialCard) -> list[str]:
     for name, strain in strains_of(law).items():
         at = strain[[0, len(strain) // 2, -1]] if len(strain) > 1 else strain
         ends = zip(at, *sure.band(law, name, at), strict=True)
-        band = ", ".join(f"{low:.4g} to {high:.4g} at {where:.3g}" for where, low, high in ends)
+        band = ", ".join(
+            f"{low:.4g} to {high:.4g} at {100 * where:.3g} %" for where, low, high in ends
+        )
         lines.append(f"  - {name}, MPa: {band}")
     return lines
 
@@ -153,8 +157,8 @@ def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
     if (card.law.strain_range < UNLIMITED).all():
         return ()
     return (
-        "the card has no valid_strain in at least one direction: there the curve ends at log "
-        f"strain {reach:g}, and the modulus is held beyond",
+        "the card has no valid_strain in at least one direction: there the curve ends at "
+        f"{100 * reach:g} % of log strain, and the modulus is held beyond",
     )
 
 
@@ -223,7 +227,9 @@ class Format:
         known = {entry.name for entry in fields(self.options)}
         for name in names:
             if name not in known:
-                raise InputError(None, f"--{name}", f"means nothing to the format {self.name}")
+                raise InputError(
+                    None, f"--{name.replace('_', '-')}", f"means nothing to the format {self.name}"
+                )
 
 
 def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:

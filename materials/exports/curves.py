@@ -9,6 +9,7 @@ not to count.
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ..card import MaterialCard
 from ..forms.base import UNLIMITED, Array
 from ..responses import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
 from .base import (
+    COMPRESSION,
     DENSITY,
     CurveOptions,
     Export,
@@ -151,20 +153,38 @@ class Mat34Options(CurveOptions):
     measure: Measure = option(  # noqa: RUF009
         MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
     )
+    compression: Literal["law", "none"] = option(
+        "law", "What a pushed yarn carries: as the law (CSE = 0), or none (CSE = 1) [law].", str,
+        choices=("law", "none"),
+    )  # fmt: skip
+
+
+#: By the choice of what a pushed yarn carries.
+PUSHED = {
+    "law": f"compression: CSE = 0, and one point of LCA and LCB at {100 * COMPRESSION:g} % of log "
+    "strain pushes a yarn as the card's law does: the fabric folds by its mesh only (--compression "
+    "none is the other choice)",
+    "none": "no compression: CSE = 1, and LCA and LCB begin at zero, so that the fabric goes "
+    "slack, and elements may collapse to a line",
+}
 
 
 def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     """Write *MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
-    measure = options.measure
+    measure, slack = options.measure, options.compression == "none"
     curves, law = fabric_curves(card, options, measure), card.law
+    strips = {"warp": curves.warp[slack:], "fill": curves.fill[slack:]}
+    lost = ("the stiffness of the law in compression",) if slack else ()
     says = Says(
         carries=(
             f"curves LCA (warp), LCB (fill), LCAB (shear): {NAMES[measure]}; of strips free to "
             "contract, and of shear with yarns held at their length",
             "EA, EB, GAB and the Poisson's ratios of no strain, which LS-DYNA needs for its time "
             "step and contact",
+            PUSHED[options.compression],
         ),
         loses=(
+            *lost,
             "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
             f"{curves.yarns:.3g} MPa in the card)",
@@ -178,7 +198,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
             "Green-Lagrange strain for FORM 2, 4, 12 and 14, a converter true strain); "
             "--measure green, nominal or true writes another; a strip of one element that is "
             "stretched far tells",
-            "that LCAB is taken as odd in the shear strain",
+            "that LCAB is taken as odd in the shear strain, and that CSE acts on curves of FORM 14",
         ),
     )
     e1, e2 = float(law.E1(0.0)), float(law.E2(0.0))
@@ -187,7 +207,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
         title=title_of(card, 80), material=MATERIAL,
         density=DENSITY if options.density is None else options.density, ea=e1, eb=e2,
         gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1, ids=CURVES,
-        curves={"warp": curves.warp, "fill": curves.fill, "shear": _odd(curves.shear)}, f10=_f10
+        curves={**strips, "shear": _odd(curves.shear)}, cse=float(slack), f10=_f10
     )  # fmt: skip
     return Export({".k": text}, says)
 

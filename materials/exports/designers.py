@@ -4,15 +4,17 @@ Oasys GSA takes stiffnesses per width (its reference on theory, "Fabric Material
 force over area and a thickness: the stiffness per width over that thickness (Dlubal, FAQ 004396).
 """
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
+
+import numpy as np
 
 from ...errors import InputError
 from ..card import MaterialCard
 from ..designers import (
     RATIOS,
+    STEPS,
     Evaluation,
     LawConstants,
     Options,
@@ -22,12 +24,13 @@ from ..designers import (
     spread_of,
 )
 from ..forms.base import UNLIMITED
-from ..responses import largest_load
+from ..responses import biaxial_response, largest_load
 from .base import Export, Format, Says, heading, option
 
 #: Shear strain to which G is averaged without a range; a range that ends before is of no shear.
 SHEAR, SHEARED = 0.1, 1e-3
 #: Constants with a spread.
+YARNS = ("warp", "fill")
 NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "nu_fill"}
 
 
@@ -52,6 +55,20 @@ class ConstantsOptions:
     minimise: Literal["strain", "load"] = option(
         "strain", "Whose squares are least [strain].", str, choices=("strain", "load")
     )
+
+
+def _yarn(what: str, yarn: str, **limits: float) -> Any:
+    return option(None, f"{what}, {yarn} [not given].", **limits)
+
+
+@dataclass(frozen=True)
+class SheetOptions(ConstantsOptions):
+    """What a design program wants beside the stiffness; the card knows neither."""
+
+    prestress_warp: float | None = _yarn("kN/m, prestress", "warp", least=0)
+    prestress_fill: float | None = _yarn("kN/m, prestress", "fill", least=0)
+    kept_warp: float | None = _yarn("%, strain kept after load cycles", "warp")
+    kept_fill: float | None = _yarn("%, strain kept after load cycles", "fill")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +101,18 @@ class Linear:
                 f"straight lines of load over strain from {self.lowest:g} to {self.highest:.4g} "
                 f"kN/m: least squares of the {found.evaluation.options.minimise}s of "
                 f"{found.evaluation.paths} paths of ratios {', '.join(found.lost)}, reciprocal",
-                f"G: mean tangent to a shear strain of {self.shear:.3g}",
+                f"G: mean tangent to a shear strain of {100 * self.shear:.3g} %",
             ),
             loses=(
                 *unknown,
                 f"what is not straight: RMS of strain, by ratio: {lost}; {found.rms:.3g} % over "
                 "all",
                 f"over {1 + len(found.others)} choices of paths, squares and reciprocity: {spread}",
-                f"G from {least:.4g} to {largest:.4g} kN/m along the shear",
+                *(
+                    []
+                    if f"{least:.4g}" == f"{largest:.4g}"
+                    else [f"G from {least:.4g} to {largest:.4g} kN/m along the shear"]
+                ),
             ),
         )
 
@@ -137,45 +158,75 @@ WHICH_NU = (
 
 
 def _sheet(
-    card: MaterialCard, what: str, says: Says, rows: Sequence[tuple[str, str, str]]
-) -> Export:
-    lines = [f"{name:34s}{value:>14s}  {unit}" for name, value, unit in rows]
-    text = "\n".join([heading(card, what, says, "#"), *lines]) + "\n"
+    linear: Linear, what: str, stiffness: Sequence[tuple[str, float | None, str]],
+    options: SheetOptions, *confirm: str,
+) -> Export:  # fmt: skip
+    """Return the stiffness, then prestress and compensation, each row with its unit."""
+    card, says, missing = linear.card, linear.says, "not given"
+    loads = options.prestress_warp, options.prestress_fill
+    kept = options.kept_warp, options.kept_fill
+    strain: Sequence[float | None] = (None, None)
+    for words, pair in (("prestress", loads), ("kept", kept)):
+        if sum(value is None for value in pair) == 1:
+            field = f"--{words}-warp, --{words}-fill"
+            raise InputError(None, field, "expected both yarns, got one")
+    carries, loses = says.carries, says.loses
+    if None in loads:
+        loses += ("prestress: a card has none (--prestress-warp, --prestress-fill)",)
+    else:
+        path = np.linspace(0.0, 1.0, STEPS + 1)[1:, None] * np.array(loads, dtype=float)
+        found = biaxial_response(card.law, path, card.thickness)
+        if found.reached < len(path):
+            problem = "the law does not carry it: choose a lower prestress"
+            raise InputError(None, "--prestress-warp", problem)
+        strain = (100 * found.elongation[-1]).tolist()
+        carries += ("strain at the prestress: of the law itself, from the unloaded fabric",)
+    if None in kept:
+        loses += (
+            "compensation: a card knows no strain kept after load cycles; `bubblefit biaxial` "
+            "measures it (--kept-warp, --kept-fill)",
+        )
+    rows, compensation = [*stiffness], ("compensation (strain kept)", kept, "%")
+    elastic = [("strain at the prestress", strain, "%")] if None not in strain else []
+    for words, pair, unit in (("prestress", loads, "kN/m"), *elastic, compensation):
+        rows += [(f"{words}, {yarn}", value, unit) for yarn, value in zip(YARNS, pair, strict=True)]
+    lines = [
+        f"{name:34s}{missing if value is None else f'{value:.6g}':>14s}  {unit}"
+        for name, value, unit in rows
+    ]
+    says = Says(carries, loses, (*says.confirm, WHICH_NU, *confirm))
+    text = "\n".join([heading(card, what, says, "#", "as beside each value"), *lines]) + "\n"
     return Export({".txt": text}, says)
 
 
-def _with(says: Says, *confirm: str) -> Says:
-    return dataclasses.replace(says, confirm=(*says.confirm, *confirm))
-
-
-def gsa(card: MaterialCard, options: ConstantsOptions) -> Export:
+def gsa(card: MaterialCard, options: SheetOptions) -> Export:
     """Write the four fields of Oasys GSA's fabric: nu (warp-fill) is the fill's contraction."""
     linear = linear_card(card, options)
     c = linear.found.constants
     rows = [
-        ("Warp modulus", f"{c.warp:.6g}", "kN/m"),
-        ("Weft modulus", f"{c.fill:.6g}", "kN/m"),
-        ("Poisson's ratio (warp-weft)", f"{c.nu_fill:.6g}", ""),
-        ("Shear modulus", f"{c.shear:.6g}", "kN/m"),
+        ("Warp modulus", c.warp, "kN/m"),
+        ("Weft modulus", c.fill, "kN/m"),
+        ("Poisson's ratio (warp-weft)", c.nu_fill, "no unit"),
+        ("Shear modulus", c.shear, "kN/m"),
     ]
-    return _sheet(card, "Fabric of Oasys GSA", _with(linear.says, WHICH_NU), rows)
+    return _sheet(linear, "Fabric of Oasys GSA", rows, options)
 
 
-def rfem(card: MaterialCard, options: ConstantsOptions) -> Export:
+def rfem(card: MaterialCard, options: SheetOptions) -> Export:
     """Write an orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
     linear = linear_card(card, options)
     c, t = linear.found.constants, card.thickness
     assert c.shear is not None
     rows = [
-        ("E_x (warp)", f"{c.warp / t:.6g}", "N/mm^2"),
-        ("E_y (fill)", f"{c.fill / t:.6g}", "N/mm^2"),
-        ("nu_xy (fill contracts)", f"{c.nu_fill:.6g}", ""),
-        ("nu_yx (warp contracts)", f"{c.nu_warp:.6g}", ""),
-        ("G_xy", f"{c.shear / t:.6g}", "N/mm^2"),
-        ("thickness d of the surface", f"{t:.6g}", "mm"),
+        ("E_x (warp)", c.warp / t, "N/mm^2"),
+        ("E_y (fill)", c.fill / t, "N/mm^2"),
+        ("nu_xy (fill contracts)", c.nu_fill, "no unit"),
+        ("nu_yx (warp contracts)", c.nu_warp, "no unit"),
+        ("G_xy", c.shear / t, "N/mm^2"),
+        ("thickness d of the surface", t, "mm"),
     ]
-    says = _with(linear.says, WHICH_NU, "that the surface is a membrane, x along the warp")
-    return _sheet(card, "Orthotropic membrane of Dlubal RFEM", says, rows)
+    surface = "that the surface is a membrane, x along the warp"
+    return _sheet(linear, "Orthotropic membrane of Dlubal RFEM", rows, options, surface)
 
 
 COLUMNS = (
@@ -214,6 +265,6 @@ def _text(value: Any) -> str:
 
 FORMATS = (
     Format("constants", constants, ConstantsOptions, load_ratios=True),
-    Format("gsa", gsa, ConstantsOptions, load_ratios=True),
-    Format("rfem", rfem, ConstantsOptions, load_ratios=True),
+    Format("gsa", gsa, SheetOptions, load_ratios=True),
+    Format("rfem", rfem, SheetOptions, load_ratios=True),
 )

@@ -6,10 +6,12 @@ import re
 
 import bubblefit as bf
 import numpy as np
+import pandas as pd
 import pytest
 from bubblefit.experiments.registry import kinds
 from bubblefit.files import THREADS
 from bubblefit.runs import fit as fits
+from bubblefit.reports.content import read_page_data
 from bubblefit.runs.fit import check, expected_of
 from bubblefit.runs.setup import prepare_fit
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -73,6 +75,54 @@ def test_steps_times_and_one_blas_thread_unless_said_otherwise(folder, monkeypat
     assert seen and set(seen) == {said or 1}
     assert [step[:2] for step in steps] == [(0, 3), (1, 3), (2, 3)]
     assert [len(re.findall(r"^\S+ .*: \d+\.\d\d s$", done.stderr, re.MULTILINE))] == [3]
+
+
+LAB = """
+[fabric]
+name = "lab"
+thickness = 0.8
+[law]
+form = "constant"
+nu12 = 0.2
+[law.bounds]
+E1 = [0.02, 2.0]
+E2 = [0.02, 1.0]
+G12 = [0.001, 0.2]
+[[strips]]
+width = 25.0
+rate = 100.0
+warp.gauge_length = 20.0
+fill.gauge_length = 16.0
+data.files = ["loads.csv"]
+"""
+
+
+def test_strips_have_a_table_after_en_iso_1421(tmp_path):
+    """Warp: 1600 N (1 + 0.02 i) at 6 mm, a little less after it; fill: a single specimen."""
+    rows, u = ["direction,specimen,elongation_mm,load_N"], np.linspace(0.0, 6.0, 25)
+    for direction, i, most in (
+        ("warp", 0, 1600),
+        ("warp", 1, 1632),
+        ("warp", 2, 1664),
+        ("fill", 0, 400),
+    ):
+        own = [*zip(u, most * u / 6, strict=True), (6.2, 0.995 * most)]
+        rows += [f"{direction},{direction}{i},{a},{b}" for a, b in own]
+    (tmp_path / "loads.csv").write_text("\n".join(rows))
+    (tmp_path / "lab.toml").write_text(LAB)
+    in_process("check", "lab.toml", "--out", "out", cwd=tmp_path)
+    table = pd.read_csv(tmp_path / "out" / "en-iso-1421.csv").set_index("specimen")
+    one = table.loc["warp1"]
+    assert one.iloc[1:5].tolist() == pytest.approx([1632, 3264, 65.28, 30.0])
+    assert (one.width_mm, one.gauge_length_mm, one.rate_mm_per_min) == (25, 20, 100)
+    assert table.conditioning.isna().all() and table.loc["fill0"].iloc[4] == pytest.approx(37.5)
+    assert table.max_force_N["mean"] == pytest.approx(1632)
+    assert table.max_force_N["standard deviation"] == pytest.approx(32)
+    varied = table.loc["coefficient of variation, %"]
+    assert varied.iloc[1:5].tolist() == pytest.approx([100 / 51] * 3 + [0], abs=1e-6)
+    assert len(table) == 7
+    shown = next(t for t in read_page_data(tmp_path / "out").tables if "1421" in t.title)
+    assert len(shown.rows) == 7 and "100 mm/min" in shown.note
 
 
 def test_a_fit_of_doubtful_data_does_not_begin(folder):

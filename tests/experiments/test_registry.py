@@ -1,6 +1,7 @@
 """Kinds of test by name: folders of ours, those of plug-ins, and what is wrong with them."""
 
 import logging
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,6 +45,14 @@ class Kind:
 
 THING = Kind()
 """
+
+
+@pytest.mark.parametrize(
+    ("reached", "said"), [(0.1080004, ["10.80004", "10.8"]), (0.313, ["31.3", "10.8"])]
+)
+def test_a_strain_beyond_its_end_is_not_printed_as_the_end(reached, said):
+    (note,) = beyond_range(np.array([reached, 0.0, 0.0]), np.full(3, 0.108))
+    assert re.findall(r"([\d.]+) %", note) == said
 
 
 def test_ours_are_the_folders_fitted_ones_first():

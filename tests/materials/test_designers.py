@@ -148,7 +148,9 @@ def text_of(name, card=LINEAR, **options):
 
 def fields_of(text):
     rows = [line for line in text.splitlines() if line and not line.startswith("#")]
-    return {row[:34].strip(): float(row[34:48]) for row in rows}
+    cells = {row[:34].strip(): row[34:].split(maxsplit=1) for row in rows}
+    assert all(len(pair) == 2 for pair in cells.values() if pair[0] != "not")
+    return {name: float(value) for name, (value, _) in cells.items() if value != "not"}
 
 
 def test_gsa_is_told_stiffnesses_per_width_and_the_fill_s_contraction():
@@ -162,6 +164,20 @@ def test_gsa_is_told_stiffnesses_per_width_and_the_fill_s_contraction():
     # Coupled so strongly that both contractions multiply to more than one.
     strong = MaterialCard(HypoelasticLaw.linear(100.0, 99.9, 30.0, 0.99), 0.8, "")
     assert fields_of(text_of("gsa", strong, highest=1e-3)[0])[names[2]] < 1.0
+
+
+@pytest.mark.parametrize("name", ["gsa", "rfem"])
+def test_prestress_and_compensation_stand_beside_the_stiffness(name):
+    text, says = text_of(name, highest=1e-2)
+    assert text.count("not given") == 4
+    assert all(word in " ".join(says.loses) for word in ("prestress", "compensation"))
+    given = {"prestress_warp": 2.0, "prestress_fill": 1.5, "kept_warp": 0.4, "kept_fill": -1.2}
+    text, says = text_of(name, highest=1e-2, **given)
+    found = [*fields_of(text).values()][-6:]
+    elastic = [100 * (2 / 800 - 0.24 / 800 * 1.5), 100 * (1.5 / 640 - 0.24 / 800 * 2)]
+    np.testing.assert_allclose(found, [2, 1.5, *elastic, 0.4, -1.2], rtol=2e-3)
+    assert "not given" not in text and "prestress: a card" not in " ".join(says.loses)
+    complaint_with(["--kept-warp, --kept-fill", "both"], text_of, name, highest=1.0, kept_warp=1.0)
 
 
 def test_the_table_holds_every_choice_and_both_forms():

@@ -89,7 +89,7 @@ GONE = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
 
 
 def test_a_law_that_fails_on_the_way_has_no_curve():
-    with pytest.raises(InputError, match=r"is not positive at log strain 0\.0495"):
+    with pytest.raises(InputError, match=r"is not positive at 4\.95 % of log strain"):
         uniaxial_curve(GONE, 0, np.linspace(0, 0.1, 101), "true")
     weak = HypoelasticLaw(np.r_[0, 0, -1e3, 20.0, 0, 0, 0, 100.0, 0, 0, 0, 500.0])
     assert "trellis" in complaint(trellis_curve, weak, np.linspace(0, 0.2, 5), "true")
@@ -226,6 +226,8 @@ def read_k(text):
 def test_mat34_holds_the_strips_and_the_trellis(measure):
     given = {} if measure is None else {"measure": measure}
     made = export("ls-dyna-mat34", density=1.25e-9, **given)
+    lines = made.files[".k"].splitlines()
+    assert (lines[0], lines[-1]) == ("*KEYWORD", "*END")
     (names, curves), law = read_k(made.files[".k"]), LAWS["cubic"]
     wanted = {"form": 14, "cse": 0, "ro": 1.25e-9, "prab": 0.24}
     assert {name: names[name] for name in wanted} == wanted
@@ -250,6 +252,17 @@ def test_mat34_holds_the_strips_and_the_trellis(measure):
     np.testing.assert_allclose(shear, -shear[::-1], atol=1e-12)
     assert np.interp(1e-3, *shear.T) / 1e-3 == pytest.approx(float(law.G12(0)), rel=0.02)
     assert ("Green" in made.says.carries[0]) == (measure in (None, "green"))
+
+
+@pytest.mark.parametrize(("compression", "cse"), [("law", 0), ("none", 1)])
+def test_mat34_says_what_a_pushed_yarn_carries(compression, cse):
+    made = export("ls-dyna-mat34", compression=compression)
+    names, curves = read_k(made.files[".k"])
+    assert names["cse"] == cse and f"CSE = {cse}" in " ".join(made.says.carries)
+    for yarn in ("lca", "lcb"):
+        (x0, y0), (x1, _) = curves[int(names[yarn])][:2]
+        assert (x0 < 0, y0 < 0, x1 > 0) == (not cse, not cse, bool(cse))
+    assert curves[int(names["lcab"])][0, 0] < 0
 
 
 @pytest.mark.parametrize("name", ["cubic", "tri-linear, held"])

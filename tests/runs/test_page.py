@@ -657,7 +657,7 @@ def test_the_error_of_the_moduli_names_its_strains(bubble):
     for name, component in COMPONENTS.items():
         end = float(fit.best.reached[component])
         assert fit.result["moduli_error_range"][name] == [0.0, end]
-        assert f"(strain 0 to {end:.3g})" in line.split(name)[1].split(",")[0]
+        assert f"(up to {100 * end:.3g} %)" in line.split(name)[1].split(",")[0]
         assert f"<td>0</td><td>{number(end)}</td></tr>" in bubble.page
 
 

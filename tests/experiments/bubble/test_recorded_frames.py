@@ -99,6 +99,10 @@ def test_the_frames_nearest_to_the_pressures(folder, said):
     assert [f.path for f in fields] == list(test.data.files)
     (line,) = recorded_lines(test.data.recorded)
     assert "2 of 17 frames taken, 3 at no pressure" in line and "10 in place of 10.5 kPa" in line
+    near = replace(test.data.recorded, pressure=np.array([0.0105001, 0.06]))
+    assert "10.5001 in place of 10.5 kPa" in recorded_lines(near)[0]
+    same = replace(near, pressure=near.asked * (1 + 1e-15))
+    assert "in place of" not in recorded_lines(same)[0]
     table = recorded_table(test.data.recorded)
     assert table.header[1:4] == ["pressure, kPa", "asked for, kPa", "farther by, kPa"]
     assert table.rows[0][1:] == pytest.approx([10.0, 10.5, -0.5])
