@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from datetime import date
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -163,14 +163,15 @@ def known_solution_table(
 ) -> list[Table]:
     """Return the largest errors of the moduli, where the solution is known."""
     rows: list[list[object]] = [
-        [name, percent(error), *ranges.get(name, (None, None))] for name, error in errors.items()
+        [name, percent(error), *(100 * end for end in ranges.get(name, (nan, nan)))]
+        for name, error in errors.items()
     ]
     note = (
         "Against the known solution, over the range of logarithmic strain in the table, which is "
         "what the tests reached. Single coefficients are not compared: the highest powers hardly "
         "act at these strains, so quite different coefficients give the same moduli."
     )
-    header = ["modulus", "largest error", "from strain", "to strain"]
+    header = ["modulus", "largest error", "from strain, %", "to strain, %"]
     return [Table("Errors of the moduli", header, rows, note)] if rows else []
 
 
@@ -281,12 +282,14 @@ def answer_tables(fit: Fit) -> list[Part]:
 def reached_table(fit: Fit) -> Table:
     """Return the ends of the moduli beside the largest strains of the tests."""
     reached, valid = (by_strain(ends) for ends in (fit.best.reached, fit.best.valid))
-    rows: list[list[object]] = [[name, valid[name], strain] for name, strain in reached.items()]
+    rows: list[list[object]] = [
+        [name, 100 * valid[name], 100 * strain] for name, strain in reached.items()
+    ]
     note = (
         "Logarithmic strain. The material card holds up to the first of the two: beyond it a "
         "modulus keeps the value it has there, even where a test reached further."
     )
-    header = ["direction", "moduli fitted up to", "largest strain reached"]
+    header = ["direction", "moduli fitted up to, %", "largest strain reached, %"]
     return Table("Where they end", header, rows, note)
 
 

@@ -12,11 +12,12 @@ from .charts import Array, Chart, Charts, Series, dots, line, spans_a_decade
 
 #: Title and axis of E1, E2 and G12.
 PANELS = (
-    ("E1, along the warp", "logarithmic strain ε1"),
-    ("E2, along the fill", "logarithmic strain ε2"),
-    ("G12, in shear", "shear strain γ12"),
+    ("E1, along the warp", "logarithmic strain ε1, %"),
+    ("E2, along the fill", "logarithmic strain ε2, %"),
+    ("G12, in shear", "shear strain γ12, %"),
 )
 MODULUS = "tangent modulus, MPa"
+PERCENT = 100.0
 #: Deviation (%) below which curves are the same to machine precision, and decades drawn of it.
 SAME, DECADES = 1e-10, 7
 #: Percent; a modulus known no better than this is not determined.
@@ -48,6 +49,7 @@ def moduli_charts(
         raise ValueError(f"moduli_charts: {len(names)} names for {len(fits)} fits")
     if known is not None and given.ndim == 3:
         raise ValueError("moduli_charts: beside a known solution all fits need the same strains")
+    given = PERCENT * given
     x, truth = np.broadcast_to(given, fits.shape), None if known is None else np.asarray(known)
     ends = None if band is None else np.asarray(band, dtype=float)
     charts = []
@@ -65,7 +67,7 @@ def moduli_charts(
             drawn.append(truth[m].max())
         first, *_, last = fits[0, m]
         top, cut = _top(1.12 * float(max(drawn)), () if own is None else own[1])
-        alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[0, m, -1]:.3g}"
+        alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[0, m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
         charts += [_deviation(m, given[m], fits[:, m], truth[m], names) for m in range(3)]
@@ -115,7 +117,7 @@ def moduli_together(
     (3, k) MPa, one standard deviation, as bands; left out where it is not finite. The axis is
     logarithmic where the moduli are positive and span more than a decade.
     """
-    x, curves = np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
+    x, curves = PERCENT * np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
     series = []
     for m, name in enumerate(("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")):
         s = None if sigma is None else np.asarray(sigma, dtype=float)[m]
@@ -124,13 +126,13 @@ def moduli_together(
     log, high = spans_a_decade(curves), float(curves.max())
     alt = f"moduli from {float(curves.min()):.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
-    chart = Chart(title, "logarithmic strain", MODULUS, series, alt, log, not log, top)
+    chart = Chart(title, "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
     return Charts("moduli together", [chart], "")
 
 
 def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: str) -> Charts:
     """Return 1 sigma, % of the modulus, (3, k) by test; triangles above `NOT_DETERMINED`."""
-    x, charts = np.asarray(strains, dtype=float), []
+    x, charts = PERCENT * np.asarray(strains, dtype=float), []
     for m, (title, label) in enumerate(PANELS):
         series: list[Series] = []
         marks: list[Series] = []
@@ -159,7 +161,7 @@ def bootstrap_charts(
     """Return moduli (n,) MPa with the ends (2, n) of samples and of the fit's band."""
     charts = []
     for (title, label), name in zip(PANELS, strains, strict=True):
-        x, low, high = strains[name], samples[name][0], samples[name][1]
+        x, low, high = PERCENT * strains[name], samples[name][0], samples[name][1]
         series = [
             line("fit, with its band by the noise", x, best[name], (fit[name][0], fit[name][1])),
             line(SAMPLES, x, low, colour=1, dashes=1),

@@ -340,7 +340,7 @@ def bubble_solid(
     residual[residual < ROUNDING * largest] = 0.0
     shades = [Shade("residual, length", "mm", pack(residual))]
     fields = (
-        (STRAIN_LABELS, "1", np.array([sheet.strain for sheet in sheets])),
+        (STRAIN_LABELS, "%", np.array([100 * sheet.strain for sheet in sheets])),
         (STRESSES, "MPa", np.array([sheet.stress for sheet in sheets])),
     )
     for names, unit, values in fields:

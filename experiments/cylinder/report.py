@@ -377,7 +377,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         knee = " (knee)" if m.buckling_is == "knee" else ""
         buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
         wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
-        strain, rise = f"{max(m.body_strain):.3f}", f"{m.pressure_rise:+.2f}"
+        strain, rise = f"{100 * max(m.body_strain):.2g}", f"{m.pressure_rise:+.2f}"
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
         spread = outcome.sigma(i)
         loads = [(m.loads.get(place), spread.get(place)) for place in places]
@@ -386,7 +386,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
     header = [
         "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
         *(f"load at {place}, N" for place in places),
-        "inflation strain", "pressure, kPa", "ended", "marked", "notes", "s",
+        "inflation strain, %", "pressure, kPa", "ended", "marked", "notes", "s",
     ]  # fmt: skip
     slopes = _slopes(tests)
     note = (

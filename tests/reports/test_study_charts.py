@@ -130,10 +130,10 @@ def test_moduli(fits, known):
     names = ["best", *([f"next {fits - 1}"] * (fits > 1)), *(["known"] * known)]
     assert legend(charts) == names
     assert len(charts.charts) == (6 if known else 3) and charts.columns == 3
-    labels = ("logarithmic strain ε1", "logarithmic strain ε2", "shear strain γ12")
+    labels = ("logarithmic strain ε1, %", "logarithmic strain ε2, %", "shear strain γ12, %")
     for m, (top, label) in enumerate(zip(charts.charts[:3], labels, strict=True)):
         (best,), others = lines(top, "best"), lines(top, f"next {fits - 1}")
-        np.testing.assert_allclose(best, [strains[m], curves[0, m]], rtol=1e-5)
+        np.testing.assert_allclose(best, [100 * strains[m], curves[0, m]], rtol=1e-5)
         starts = [other[1, 0] for other in others]
         assert starts == pytest.approx(curves[1:, m, 0].tolist(), rel=1e-5)
         assert (top.x_label, top.y_label) == (label, "tangent modulus, MPa")
@@ -153,7 +153,7 @@ def test_named_laws_with_their_own_ranges():
     charts = moduli_charts(*both, names=["uniaxial", "bubble"], band=band)
     shear = charts.charts[2]
     for k, name in enumerate(("uniaxial", "bubble")):
-        expected = [both[0][k, 2], both[1][k, 2]]
+        expected = [100 * both[0][k, 2], both[1][k, 2]]
         np.testing.assert_allclose(lines(shear, name)[0], expected, rtol=1e-5)
     first = named(shear)["uniaxial"]
     assert first.ends and first.upper[15:] == [None] * 5
@@ -183,9 +183,9 @@ def test_the_three_moduli_together():
     assert log.log_y and not linear.log_y and log.title == "Table 3.2"
     low, high = axis_ends(linear)[1]
     assert low < MODULI.min() - 30.0 and high == pytest.approx(1.08 * (MODULI.max() - 30.0))
-    assert (log.x_label, log.y_label) == ("logarithmic strain", "tangent modulus, MPa")
+    assert (log.x_label, log.y_label) == ("logarithmic strain, %", "tangent modulus, MPa")
     for m, s in enumerate(log.series):
-        np.testing.assert_allclose([s.x, s.y], [STRAINS[m], MODULI[m]], rtol=1e-5)
+        np.testing.assert_allclose([s.x, s.y], [100 * STRAINS[m], MODULI[m]], rtol=1e-5)
         np.testing.assert_allclose([s.lower, s.upper], [0.9 * MODULI[m], 1.1 * MODULI[m]], 1e-5)
         assert s.ends
 

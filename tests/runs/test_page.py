@@ -151,8 +151,9 @@ def test_two_tests(together, written):
     assert fit.law.beta[7] == pytest.approx(190, abs=0.1)  # the middle of two specimens
     reached = np.log(22.9 / 20)
     assert titled(found, "Where they end").rows == [
-        ["warp", pytest.approx(0.12), pytest.approx(reached)],
-        ["fill", pytest.approx(reached), pytest.approx(reached)], ["shear", 1e-6, 1e-6],
+        ["warp", pytest.approx(12.0), pytest.approx(100 * reached)],
+        ["fill", pytest.approx(100 * reached), pytest.approx(100 * reached)],
+        ["shear", pytest.approx(1e-4), pytest.approx(1e-4)],
     ]  # fmt: skip
     best_first = sorted(fit.best.records, key=lambda r: r.objective)
     assert titled(found, "Starts, best first").rows == [

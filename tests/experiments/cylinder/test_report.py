@@ -194,17 +194,17 @@ def test_every_cell(tmp_path, undrawn):
     runs, errors = shown.tables
     stopped = f"stopped at 80 of 160 mm: {stopped}"
     assert [unbroken(row) for row in runs.rows] == [
-        ["150/90", "soft card", "4.26", "503 N, 120 mm", "33 mm", "86", None, "0.022", "+1.60",
+        ["150/90", "soft card", "4.26", "503 N, 120 mm", "33 mm", "86", None, "2.2", "+1.60",
          "finished", None, 2, 12.3],
         ["150/90", "stiff", None, None, None, None, None, None, None, "failed: killed", None, 2,
          12.3],
-        ["the wide one", "soft card", None, "251 N, 61 mm (knee)", None, "86", None, "0.022",
+        ["the wide one", "soft card", None, "251 N, 61 mm (knee)", None, "86", None, "2.2",
          "-0.13", stopped, "snap, stopped early", 2, 12.3],
     ]  # fmt: skip
     assert "\u00a0" in str(runs.rows[0][3]) and runs.rows[2][9] == stopped  # which is broken
     assert runs.header == [
         "test", "card", "stiffness, N/mm", "buckles", "wrinkles from", "load at 20 mm, N",
-        "load at a long way, N", "inflation strain", "pressure, kPa", "ended", "marked", "notes",
+        "load at a long way, N", "inflation strain, %", "pressure, kPa", "ended", "marked", "notes",
         "s",
     ]  # fmt: skip
     assert runs.note.count("20 mm") == 2 and runs.text == (1, 9, 10)

@@ -510,17 +510,19 @@ def test_every_cell(tmp_path):
         "fill": Strip("fill", 25.0, 30.0, line),
         "bias": Strip("bias", 20.0, 30.0),  # without data
     }
-    shown = examine(SimpleNamespace(test=SimpleNamespace(strips=strips)), Output(tmp_path, "s/"))
+    test = SimpleNamespace(strips=strips, width=25.0, rate=None, conditioning=None)
+    shown = examine(SimpleNamespace(test=test), Output(tmp_path, "s/"))
     assert [name for name, _ in shown.figures] == ["s/curves.png"]
     assert (tmp_path / "s" / "curves.png").is_file()
-    (table,) = shown.tables
+    standard, table = shown.tables
+    assert standard.rows == [["warp", "W1", 160.0, 320.0, 6.4, pytest.approx(20.0)]]
     assert [h.split(", ")[-1] for h in table.header] == [
-        "direction", "specimen", "points", "mm", "mm", "last strain", "N", "N"
+        "direction", "specimen", "points", "mm", "mm", "%", "N", "N"
     ]  # fmt: skip
     first, second = table.rows
     assert first[:2] == ["warp", "W1"] and second[:2] == ["fill", "polynomial"]
-    assert first[2:] == pytest.approx([5, 0.1, 3.9, np.log(23.9 / 20), 2.0, 160.0])
-    assert second[2:] == pytest.approx([50, 0.0, 5.0, np.log(1.2), 0.0, 150.0])
+    assert first[2:] == pytest.approx([5, 0.1, 3.9, 100 * np.log(23.9 / 20), 2.0, 160.0])
+    assert second[2:] == pytest.approx([50, 0.0, 5.0, 100 * np.log(1.2), 0.0, 150.0])
     assert table.text == (1,)
 
 
