@@ -104,6 +104,7 @@ def certainty(
     reached: Array,
     limit: Limit | None = None,
     second: Second | None = None,
+    taken_out: bool = False,
 ) -> Certainty:
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
@@ -129,7 +130,7 @@ def certainty(
     bands = bands_of(fine or posterior, law, strains)
     sure = Certainty(
         noise.level, strains, sigmas, (), mesh, noise.alike, posterior, fine, noise.rows, bands,
-        discrepancy=wrong, second=second,
+        taken_out and limit is not None, discrepancy=wrong, second=second,
     )  # fmt: skip
     words = [
         Note(
@@ -141,7 +142,7 @@ def certainty(
         if relative.max() > LARGEST_SIGMA
     ]
     notes = (*words, *_limited(problem, best), *notes_of_discrepancies(wrong))
-    return replace(sure, notes=notes)
+    return replace(sure, undetermined=notes)
 
 
 def uncertainty_from(

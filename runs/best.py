@@ -221,21 +221,21 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         notes.append(Note(MESH, NOT_TAKEN_OUT))
     elif limit is not None and out:
         law = problem.unknowns.law(law, slopes.unknowns + limit.step)
-    sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit)
+    sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit, out)
     if sure.mesh is not None:
         notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)
     if sure.order is not None:
         notes += sure.order.notes
     told = (*sure.undetermined, *notes)
-    sure = replace(sure, undetermined=told, taken_out=out and limit is not None)
-    return replace(best, law=law, certainty=sure)
+    return replace(best, law=law, certainty=replace(sure, undetermined=told))
 
 
 def _certainty(
-    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array, limit: Limit | None
-) -> Certainty:
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
+    limit: Limit | None, out: bool = False,
+) -> Certainty:  # fmt: skip
     """Return the certainty by first derivatives, by second if much is left and they differ."""
-    first = certainty(problem, best, law, reached, limit)
+    first = certainty(problem, best, law, reached, limit, taken_out=out)
     left = best.residual if limit is None else limit.residual
     if not large(problem, left):
         return first
@@ -244,7 +244,7 @@ def _certainty(
     if not definite(Linear.of(problem, best, noise), found):
         order = Order(False, NOT_DEFINITE, {}, found.directions, found.analyses)
         return replace(first, order=order)
-    second = certainty(problem, best, law, reached, limit, found)
+    second = certainty(problem, best, law, reached, limit, found, out)
     change = {}
     for name, sigma in second.sigma.items():
         by = sigma / first.sigma[name] - 1.0

@@ -361,8 +361,8 @@ def _added(
         size = round(np.mean(objective.sizes))
         said.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
         for strain, at, end in beyond(strains_of(history), law.strain_range):
-            at, end = in_percent(at, end)
-            words = f"{strain} strain {at} % is beyond {end} %: the modulus is held there"
+            one, other = in_percent(at, end)
+            words = f"{strain} strain {one} % is beyond {other} %: the modulus is held there"
             notes.append(Note(BEYOND_LAW, words, candidate.name))
         if comparison.must_be_stable:
             notes += [note.about(candidate.name) for note in unstable_words(history.unstable)]

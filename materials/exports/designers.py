@@ -57,8 +57,8 @@ class ConstantsOptions:
     )
 
 
-def _yarn(what: str, yarn: str, **limits: float) -> Any:
-    return option(None, f"{what}, {yarn} [not given].", **limits)
+def _yarn(what: str, yarn: str, least: float | None = None) -> Any:
+    return option(None, f"{what}, {yarn} [not given].", least=least)
 
 
 @dataclass(frozen=True)
@@ -157,6 +157,10 @@ WHICH_NU = (
 )
 
 
+#: What it is, of warp and fill, and its unit.
+Row = tuple[str, Sequence[float | None], str]
+
+
 def _sheet(
     linear: Linear, what: str, stiffness: Sequence[tuple[str, float | None, str]],
     options: SheetOptions, *confirm: str,
@@ -166,8 +170,8 @@ def _sheet(
     loads = options.prestress_warp, options.prestress_fill
     kept = options.kept_warp, options.kept_fill
     strain: Sequence[float | None] = (None, None)
-    for words, pair in (("prestress", loads), ("kept", kept)):
-        if sum(value is None for value in pair) == 1:
+    for words, both in (("prestress", loads), ("kept", kept)):
+        if sum(value is None for value in both) == 1:
             field = f"--{words}-warp, --{words}-fill"
             raise InputError(None, field, "expected both yarns, got one")
     carries, loses = says.carries, says.loses
@@ -186,9 +190,11 @@ def _sheet(
             "compensation: a card knows no strain kept after load cycles; `bubblefit biaxial` "
             "measures it (--kept-warp, --kept-fill)",
         )
-    rows, compensation = [*stiffness], ("compensation (strain kept)", kept, "%")
-    elastic = [("strain at the prestress", strain, "%")] if None not in strain else []
-    for words, pair, unit in (("prestress", loads, "kN/m"), *elastic, compensation):
+    rows = [*stiffness]
+    compensation: Row = ("compensation (strain kept)", kept, "%")
+    prestress: Row = ("prestress", loads, "kN/m")
+    elastic: list[Row] = [("strain at the prestress", strain, "%")] if None not in strain else []
+    for words, pair, unit in (prestress, *elastic, compensation):
         rows += [(f"{words}, {yarn}", value, unit) for yarn, value in zip(YARNS, pair, strict=True)]
     lines = [
         f"{name:34s}{missing if value is None else f'{value:.6g}':>14s}  {unit}"
