@@ -124,7 +124,7 @@ def test_shear_counts_either_way_and_compression_does_not():
 def test_shear_beyond_the_card_is_noted_either_way():
     for low, high in ((-0.31, 0.0), (0.0, 0.31)):
         (note,) = notes_of(history((0.0, 0.0, low), (0.1, 0.2, high)), CARD)
-        assert note.startswith("shear strain 0.310") and "0.300" in note
+        assert note.startswith("shear strain 31 %") and "30 %" in note
 
 
 BOUNDS = Expected({"E1": (200.0, 1000.0), "E2": (100.0, 400.0)})
@@ -175,7 +175,7 @@ def test_the_words_of_notes():
         (beyond_range(beyond, ends), BEYOND_LAW),
     ):
         assert [note.kind for note in found] == [kind]
-        assert "fill" in found[0] and "0.210" in found[0] and "0.2" in found[0]
+        assert "fill" in found[0] and "21 %" in found[0] and "20 %" in found[0]
     assert by_strain([1, 2, 3]) == {"warp": 1.0, "fill": 2.0, "shear": 3.0}
     assert other_thickness(CARD, 0.81) == []
     (note,) = other_thickness(CARD, 0.405)
