@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from bubblefit.experiments.registry import kinds
 from bubblefit.files import THREADS
-from bubblefit.runs import fit as fits
 from bubblefit.reports.content import read_page_data
+from bubblefit.runs import fit as fits
 from bubblefit.runs.fit import check, expected_of
 from bubblefit.runs.setup import prepare_fit
 from threadpoolctl import threadpool_info, threadpool_limits

@@ -78,7 +78,7 @@ def test_the_files_of_a_study_agree(study, golden):
     for name in re.findall(r"<tr><td>(.*?)</td>", listed):
         assert (out / name).exists(), name
     for name, end in ends.items():
-        assert f"<td>{name}</td><td>{end:.4g}</td>" in page
+        assert f"<td>{name}</td><td>{100 * end:.4g}</td>" in page
     said = page[: page.index("How to cite")] + text
     assert not re.search("thesis|Eq\\.|Fig\\.", said)
     assert (out / "bias.vtu").exists() and not list(out.glob("*.part"))

@@ -659,7 +659,7 @@ def test_the_error_of_the_moduli_names_its_strains(bubble):
         end = float(fit.best.reached[component])
         assert fit.result["moduli_error_range"][name] == [0.0, end]
         assert f"(up to {100 * end:.3g} %)" in line.split(name)[1].split(",")[0]
-        assert f"<td>0</td><td>{number(end)}</td></tr>" in bubble.page
+        assert f"<td>0</td><td>{number(100 * end)}</td></tr>" in bubble.page
 
 
 def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
