@@ -11,7 +11,7 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +28,7 @@ ORDER = NoteKind("order of frames")
 Array = NDArray[np.float64]
 #: Reference place and displacement, in the order of a frame's columns.
 QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
+PLACES = QUANTITIES[:3]
 #: Why rows of a file are not used: what a table of provenance calls it.
 FLAGGED, NEGATIVE_SIGMA = "flagged as doubtful", "sigma below zero"
 ALL_ZERO, LOST = "all zero", "without a value"
@@ -49,6 +50,7 @@ class Frame:
 
     points, displacement : (m, 3) mm, in the reference state; NaN where correlation was lost.
     dropped : counts of rows left out, by reason. sigma : (m,) the correlation's measure of error.
+    ids : (m,) numbers of the points. number : that of the frame in a file of several.
     """
 
     points: Array
@@ -57,6 +59,8 @@ class Frame:
     dropped: Mapping[str, int] = field(default_factory=dict)
     sigma: Array | None = None
     source: FrameSource = field(default_factory=FrameSource)
+    ids: Array | None = None
+    number: float | None = None
 
     def __post_init__(self) -> None:
         if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
@@ -74,7 +78,8 @@ class FrameOptions:
     some. flag_column, valid_column : rows where the first is not zero, or the second is, are left
     out. length_scale : mm per unit of columns without a unit. coordinates, camera_axes : state of
     the places, and whether y points down and z away; None where the format tells. planar : z and dz
-    may be missing, and are then zero.
+    may be missing, and are then zero. reference : a file of the places of the undeformed sheet,
+    where the others hold nothing but places.
     """
 
     quantities: tuple[str, ...] = QUANTITIES
@@ -87,6 +92,7 @@ class FrameOptions:
     coordinates: Literal["reference", "deformed"] | None = None
     camera_axes: bool | None = None
     planar: bool = False
+    reference: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.length_scale < math.inf:
@@ -104,6 +110,8 @@ def read_frames(
     """Read frames in the order of the files; most formats have one a file."""
     if not files:
         raise InputError(None, "files", "expected one file a frame, got none")
+    if options.reference is not None:
+        return _moved_from(files, options.reference, options, format)
     found: list[Frame] = []
     for path in map(Path, files):
         frames: Sequence[Frame] = read_file("frame", path, format, options)
@@ -112,6 +120,41 @@ def read_frames(
                 raise InputError(path, "", "lengths too large to be mm; is the length unit right?")
         found += frames
     return tuple(found)
+
+
+def _moved_from(
+    files: Sequence[Path | str], reference: Path, options: FrameOptions, format: str | None
+) -> tuple[Frame, ...]:
+    """Return frames of which each file holds the places, and one more those at rest.
+
+    Points are paired by their numbers; without, as many rows are the same points.
+    """
+    columns = {key: name for key, name in (options.columns or {}).items() if key in PLACES}
+    asked = replace(options, quantities=PLACES, columns=columns, reference=None, coordinates=None)
+    rest, *more = read_frames([reference], asked, format)
+    if more:
+        problem = f"expected the one frame of the undeformed sheet, found {1 + len(more)}"
+        raise InputError(reference, "", problem)
+    return tuple(_less(frame, rest) for frame in read_frames(files, asked, format))
+
+
+def _less(frame: Frame, rest: Frame) -> Frame:
+    """Return the frame of places with displacements from those at rest."""
+    if np.isfinite(frame.displacement).any():
+        problem = "holds displacements, and a reference is for files of places alone; leave it out"
+        raise InputError(frame.path, "", problem)
+    a, b = np.arange(len(frame.points)), np.arange(len(rest.points))
+    if frame.ids is not None and rest.ids is not None:
+        _, a, b = np.intersect1d(frame.ids, rest.ids, return_indices=True)
+    if len(a) != len(b) or not len(a):
+        problem = (
+            f"holds {len(a)} points, the reference {len(b)}, and no column of point numbers (id) in"
+            " both says which are the same; export one, or all points of every frame"
+        )
+        raise InputError(frame.path, "", problem)
+    sigma = None if frame.sigma is None else frame.sigma[a]
+    moved = frame.points[a] - rest.points[b]
+    return replace(frame, points=rest.points[b], displacement=moved, sigma=sigma, ids=None)
 
 
 #: mm in one of each unit of length, by its name in small letters.
@@ -139,12 +182,16 @@ _FILLING = frozenset(
 )
 _VALID = frozenset({"valid", "isvalid", "is valid", "validity", "gültig"})
 _INVALID = frozenset({"invalid", "rejected", "doubtful", "ungültig"})
+#: Headings of the number of a frame in a table of all frames, and of that of a point.
+_FRAMES = frozenset("frame stage step image picture snapshot bild stufe schritt aufnahme".split())
+_POINTS = frozenset("id index point punkt pointid subset marker node facet facette".split())
+_NUMBERED = frozenset("id number no nr num index nummer".split())
 _UNIT_AT_THE_END = re.compile(r"^(.*?)[\s_]+(µm|μm|um|inch|px|pixel)$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading; quantity : one of `QUANTITIES`, sigma, valid, invalid or ""."""
+    """A column's heading; quantity : of `QUANTITIES`, sigma, valid, invalid, frame, id, or ""."""
 
     name: str
     unit: str
@@ -174,6 +221,9 @@ def heading_of(name: str, unit: str = "") -> Heading:
     whole = " ".join(words)
     if whole == "sigma":
         return Heading(name, unit, "sigma")
+    for quantity, own in (("frame", _FRAMES), ("id", _POINTS)):
+        if words and {*words} & own and not {*words} - own - _NUMBERED:
+            return Heading(name, unit, quantity)
     if whole in _VALID or whole in _INVALID:
         return Heading(name, unit, "valid" if whole in _VALID else "invalid")
     length = unit.casefold() in LENGTHS
@@ -231,7 +281,8 @@ class FrameRows:
 
     values : (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
     valid, sigma : (rows,) flags, and measure of error, below zero where correlation was lost.
-    camera_axes : y points down and z away from the camera. dropped : counts of rows left out.
+    ids, number : as those of `Frame`. camera_axes : y points down and z away from the camera.
+    dropped : counts of rows left out.
     """
 
     values: Mapping[str, Array]
@@ -242,6 +293,8 @@ class FrameRows:
     camera_axes: bool = False
     dropped: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    ids: Array | None = None
+    number: float | None = None
 
 
 def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
@@ -254,7 +307,7 @@ def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) ->
     values = {name: _in_mm(rows, name, options, path) for name in rows.values}
     keep, dropped = _kept(rows, values)
     values = {name: value[keep] for name, value in values.items()}
-    sigma = None if rows.sigma is None else rows.sigma[keep]
+    sigma, ids = (None if own is None else own[keep] for own in (rows.sigma, rows.ids))
     _complete(values, options, notes)
     missing = [name for name in options.quantities if name not in values]
     if missing:
@@ -270,7 +323,7 @@ def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) ->
         notes.append("y and z are turned over: in the file y points down, z away from the camera")
     named = {name: unit for name, unit in rows.units.items() if unit}
     source = FrameSource(format, dict(rows.names), named, tuple(notes))
-    return Frame(table[:, :3], table[:, 3:], path, dropped, sigma, source)
+    return Frame(table[:, :3], table[:, 3:], path, dropped, sigma, source, ids, rows.number)
 
 
 def _in_mm(rows: FrameRows, name: str, options: FrameOptions, path: Path) -> Array:

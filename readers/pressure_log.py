@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import ends
-from .frames import Frame
+from .frames import Frame, heading_of
 from .machine_tables import (
     AS_FOUND,
     Channel,
@@ -440,6 +440,45 @@ def _float(cell: str) -> float:
     return float(cell.replace(",", "."))
 
 
+#: A pressure in a file's name, which is no number of a picture.
+_PRESSURE = re.compile(rf"{_UNSIGNED}[ _]?({'|'.join(PRESSURE_UNITS)})(?![^\W\d_])")
+#: So many missing numbers are named.
+FEW_NUMBERS = 5
+
+
+def picture_numbers(files: Sequence[Path], own: Sequence[float | None]) -> tuple[Array, list[str]]:
+    """Return numbers (frames,) of the pictures, the first 0, and doubts about them.
+
+    own : those that the files give their frames; else they are the rising ones in the names. Frames
+    without are counted.
+    """
+    rising = [np.array(own, dtype=float)] if None not in own else []
+    if not rising and len(files) == len(own):
+        bare = [_PRESSURE.sub("", str(file.with_suffix(""))) for file in files]
+        found = [[float(digits) for digits in re.findall(r"\d+", name)] for name in bare]
+        every = map(np.array, zip(*found, strict=False))
+        rising = [one for one in every if (np.diff(one) >= 0).all() and one[-1] > one[0]]
+    if not rising:
+        return np.arange(len(own), dtype=float), []
+    # Of several, those that rise at every frame, and by least: a counter, no time of the day.
+    numbers = min(rising, key=lambda one: ((np.diff(one) <= 0).sum(), one[-1] - one[0]))
+    steps, said = np.diff(numbers), []
+    usual = float(np.median(steps[steps > 0]))
+    missing = np.setdiff1d(np.arange(numbers[0], numbers[-1], usual), numbers)
+    seen = f"the frames' numbers, {numbers[0]:.10g} to {numbers[-1]:.10g},"
+    how = "times are numbers over 'rate'; time_in_name = false counts the frames instead"
+    if usual != 1:
+        said.append(f"{seen} go up by {usual:g}: {how}")
+    if (steps > usual).any():
+        few = ", ".join(f"{n:.10g}" for n in missing[:FEW_NUMBERS]) or "unevenly"
+        more = ", ..." if len(missing) > FEW_NUMBERS else ""
+        said.append(f"{seen} leave out {len(missing)} ({few}{more}): {how}")
+    if (steps <= 0).any():
+        again = ", ".join(f"{n:.10g}" for n in np.unique(numbers[1:][steps <= 0])[:FEW_NUMBERS])
+        said.append(f"{seen} come again ({again}): two frames of one time; {how}")
+    return numbers - numbers[0], said
+
+
 def check_pattern(pattern: str) -> str | None:
     """Return the fault of a pattern, None where there is none."""
     try:
@@ -455,10 +494,11 @@ def check_pattern(pattern: str) -> str | None:
 VOLTS, LONGEST = ("V", "mV"), 1000
 
 
-def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> float:
+def values_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> Array:
     """Return the value that `channel.column` names: of a column, or of a line above the numbers.
 
-    Such as `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`.
+    Such as `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`. Of a column that has frames beside it,
+    one value a frame.
     """
     name = channel.column or ""
     lines = read_lines(path, "", any_encoding=True)  # with comments: a value may stand in one
@@ -466,11 +506,11 @@ def value_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> f
     if found is None:
         says = f"neither a column {name!r} nor a line above the numbers that says {name!r}"
         raise InputError(path, "", f"{says} and a value")
-    value, unit, at = found
-    return float(in_unit(np.array([value]), unit, channel, units, path, at)[0])
+    values, unit, at = found
+    return np.asarray(in_unit(np.array(values), unit, channel, units, path, at))
 
 
-def _in_column(path: Path, lines: Lines, name: str) -> tuple[float, str, str] | None:
+def _in_column(path: Path, lines: Lines, name: str) -> tuple[list[float], str, str] | None:
     for separator in SEPARATORS:
         for index, (number, text) in enumerate(lines[:TOP]):
             if name not in text:
@@ -488,37 +528,45 @@ def _in_column(path: Path, lines: Lines, name: str) -> tuple[float, str, str] | 
                 problem = f"{len(where)} columns are called {name!r}"
                 raise InputError(path, f"line {number}", problem)
             if where:
-                return _constant(path, lines[index:], separator, names[where[0]], where[0])
+                frame = [i for i, cell in enumerate(names) if heading_of(cell).quantity == "frame"]
+                at = where[0], frame[0] if len(frame) == 1 else None
+                return _constants(path, lines[index:], separator, names[where[0]], *at)
     return None
 
 
-def _constant(
-    path: Path, lines: Lines, separator: str | None, name: str, column: int
-) -> tuple[float, str, str]:
-    """Return the one value of a column, its unit and place; `lines` begin with the names."""
-    unit, first, head = split_unit(name)[1], None, lines[0][0]
+def _constants(
+    path: Path, lines: Lines, separator: str | None, name: str, column: int, frame: int | None
+) -> tuple[list[float], str, str]:
+    """Return the value of a column in each frame by its number, its unit and place.
+
+    lines : begin with the names. frame : column of the number, None in a file of one frame.
+    """
+    unit, head = split_unit(name)[1], lines[0][0]
+    found: dict[float, tuple[float, int]] = {}
     for number, text in lines[1:]:
         row = cells_of(text, separator) or []
         cell, at = row[column] if column < len(row) else "", f"line {number}, column {name!r}"
+        key = "0" if frame is None or frame >= len(row) else row[frame]
+        first = found.get(_float(key)) if is_number(key) else None
         if not is_number(cell):
             # The row of units stands right below the names.
-            if first is None and number <= head + 2 and cell:
+            if not found and number <= head + 2 and cell:
                 unit = cell.strip("()[]<>{} ")
             elif cell.casefold() not in HOLES:
                 raise InputError(path, at, f"expected a number, found {cell[:40]!r}")
         elif first is None:
-            first = _float(cell), number
+            found[_float(key)] = _float(cell), number
         elif _float(cell) != first[0]:
             problem = f"expected the same number as in line {first[1]}, one a file"
             raise InputError(path, at, problem)
-    if first is None:
+    if not found:
         raise InputError(path, f"line {head}, column {name!r}", "holds no number")
-    return first[0], unit, f"line {head}, column {name!r}"
+    return [found[key][0] for key in sorted(found)], unit, f"line {head}, column {name!r}"
 
 
 def _above(
     path: Path, lines: Lines, name: str, units: Sequence[str]
-) -> tuple[float, str, str] | None:
+) -> tuple[list[float], str, str] | None:
     """Find a line such as "name [unit] = number", "name_unit=number" or "name: number unit"."""
     known = "|".join(sorted(units, key=len, reverse=True))
     says = re.compile(
@@ -534,4 +582,4 @@ def _above(
         raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
     found, line = every[0]
     own = found[1] or found[2] or found[4] or split_unit(name)[1]
-    return values.pop(), own.strip(), f"line {line}"
+    return [values.pop()], own.strip(), f"line {line}"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from .frames import (
     FLAGGED,
     LENGTHS,
     PIXELS,
+    PLACES,
+    QUANTITIES,
     Frame,
     FrameOptions,
     FrameRows,
@@ -207,7 +209,13 @@ def quantity_columns(
     path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
 ) -> dict[str, int]:
     """Return the one column of each quantity and flag; `named` gives the file's own names."""
-    columns = {key: _one(path, layout, key, where, named) for key, where in layout.columns.items()}
+    # Numbers of frames and points help where they are there, clear, and of use.
+    unclear = {key for key in ("frame", "id") if not _numbers(layout, key)}
+    unclear |= {"id"} if options.quantities != PLACES else set()
+    found = {key: where for key, where in layout.columns.items() if key not in unclear}
+    columns = {key: _one(path, layout, key, where, named) for key, where in found.items()}
+    if options.quantities == PLACES and not {*QUANTITIES} & {*columns}:
+        columns |= {q: columns.pop(f"{q} deformed") for q in PLACES if f"{q} deformed" in columns}
     planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
     for quantity in options.quantities:
         axis = quantity[-1]
@@ -218,6 +226,13 @@ def quantity_columns(
             problem = f"this column is missing; the file has: {there}"
             raise InputError(path, f"column {quantity!r}", problem)
     return columns
+
+
+def _numbers(layout: TextLayout, key: str) -> bool:
+    """Return whether one column is of this kind, and begins with a number, no name."""
+    where = layout.columns.get(key, ())
+    row = cells_of(layout.body[0][1], layout.separator) or []
+    return len(where) == 1 and where[0] < len(row) and is_number(row[where[0]])
 
 
 #: Flags in words, in small letters.
@@ -310,15 +325,18 @@ def _slow(
     return {key: one.numbers(name, holes=True) for key, (one, name) in kept.items()}, good
 
 
+#: Rows that a numbered frame has at least; fewer number the rows.
+LEAST_ROWS = 3
 #: Names of columns that say whether a row is good, but not in which way.
 UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
 
 
 def text_reader(format: str, **settings: Any) -> Callable[[Path, FrameOptions], Sequence[Frame]]:
-    """Return the reader of a format with one frame a text file; settings of `read_text_rows`."""
+    """Return the reader of a format that is text; settings of `read_text_rows`."""
 
     def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
-        return [frame_of(read_text_rows(path, options, **settings), options, path, format)]
+        every = read_text_rows(path, options, **settings)
+        return [frame_of(rows, options, path, format) for rows in every]
 
     return read
 
@@ -332,8 +350,8 @@ def read_text_rows(
     camera_axes: bool = False,
     names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
-) -> FrameRows:
-    """Read the rows of the one frame in a text file.
+) -> list[FrameRows]:
+    """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
     names : the format's names of some quantities; the user's come first. status : a column of
     states, and the values of good rows. upper : see `frames.columns_of`.
@@ -346,8 +364,8 @@ def read_text_rows(
     flags = flag_columns(path, layout, columns, options, status)
     numbers = {key: i for key, i in columns.items() if key not in ("valid", "invalid")}
     values, good = read_numbers(path, layout, numbers, flags)
-    sigma = values.pop("sigma", None)
-    headings = {key: layout.headings[i] for key, i in numbers.items() if key != "sigma"}
+    sigma, ids, frame = (values.pop(key, None) for key in ("sigma", "id", "frame"))
+    headings = {key: layout.headings[i] for key, i in numbers.items() if key in values}
     notes = tuple(
         f"column {heading.name!r} is not used; flag_column or valid_column says what it means"
         for heading in layout.headings
@@ -357,4 +375,16 @@ def read_text_rows(
     named = {key: heading.name for key, heading in headings.items()}
     units = {key: heading.unit for key, heading in headings.items() if heading.unit}
     lost = {FLAGGED: int((~good).sum())}
-    return FrameRows(values, named, units, None, sigma, camera_axes, lost, notes)
+    whole = FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
+    every = [] if frame is None else np.unique(frame)
+    if len(every) < 2 or LEAST_ROWS * len(every) > len(frame) or np.isnan(every).any():
+        return [whole]
+    return [
+        replace(
+            whole, values={key: value[frame == number] for key, value in values.items()},
+            sigma=None if sigma is None else sigma[frame == number], number=float(number),
+            ids=None if ids is None else ids[frame == number],
+            dropped=lost if number == every[0] else {},
+        )
+        for number in every
+    ]  # fmt: skip

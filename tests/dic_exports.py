@@ -69,6 +69,25 @@ def tecplot(folder: Path, frames: Frames) -> list[Path]:
     return _write(folder, "B{:05d}.dat", frames, lines, "latin-1")
 
 
+def tecplot_plain(folder: Path, frames: Frames) -> list[Path]:
+    """Without units: the vectors are displacements, in the unit of the places."""
+
+    def lines(k, x, u):
+        rows = [_row(row, " ") for row in np.hstack([x, u])]
+        return ['VARIABLES = "x", "y", "z", "Vx", "Vy", "Vz"', f"ZONE T={k}, F=POINT", *rows]
+
+    return _write(folder, "B{:05d}.dat", frames, lines, "latin-1")
+
+
+def long_table(folder: Path, frames: Frames) -> list[Path]:
+    """One table of all frames."""
+    path, rows = folder / "all.csv", ["Frame,x,y,z,dx,dy,dz"]
+    for k, (x, u) in enumerate(frames):
+        rows += [f"{k + 1},{_row(row)}" for row in np.hstack([x, u])]
+    path.write_text("\n".join(rows))
+    return [path]
+
+
 def vic3d(folder: Path, frames: Frames) -> list[Path]:
     def lines(k, x, u):
         names = [f"{a} [mm]" for a in "XYZUVW"]
@@ -211,6 +230,7 @@ def ncorr(folder: Path, frames: Frames) -> list[Path]:
 #: Writers by the name of the format that is to be found, and of the case.
 EXPORTS = {
     "plain": ("csv", plain), "german": ("csv", german), "davis": ("davis", davis),
+    "long table": ("csv", long_table), "tecplot plain": ("tecplot", tecplot_plain),
     "tecplot": ("tecplot", tecplot), "vic3d": ("vic3d", vic3d),
     "vic3d-mat": ("vic3d-mat", vic3d_mat), "aramis": ("aramis", aramis),
     "matchid 2024": ("matchid", matchid_2024), "matchid 2023": ("matchid", matchid_2023),

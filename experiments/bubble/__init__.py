@@ -7,9 +7,9 @@ from .section import BubbleSection
 from .test import STUDIED, read
 
 NAMES = (
-    "length-unit", "zero-points", "repeated-frame", "z-flipped", "frame-order",
-    "deformed-coordinates", "axis-flipped", "pressure-unit", "camera-frame", "off-centre", "tilted",
-    "turned", "swapped",
+    "frame-numbers", "length-unit", "zero-points", "outliers", "z-flipped", "frame-order",
+    "repeated-frame", "deformed-coordinates", "axis-flipped", "radius", "pressure-unit",
+    "flat-sheet", "camera-frame", "off-centre", "tilted", "turned", "swapped",
 )  # fmt: skip
 
 

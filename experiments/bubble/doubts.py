@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...meshes.disk import Outline
@@ -20,25 +21,47 @@ from ..kinds import Doubt, Expected
 from .registration import (
     POWERS,
     Axes,
+    ClampEdge,
     Rim,
     apex_shape,
+    clamp_of_motion,
     in_all_quarters,
     line_angle,
     rim_of_motion,
     symmetry_axes,
 )
+from .sheet import fit_disk_polynomial
 
 Array = NDArray[np.float64]
 #: Of the highest rise: a centre that sinks by more while the pressure rises is no noise.
 SINKS = 0.02
-#: Share of the displacements by which reference places follow them when they are deformed ones,
-#: and least correlation of the two.
-FOLLOWS, LIKE = 0.5, 0.9
+#: Between two pressures ln(rise) grows by so large a part of what it does in the others (of ln(p),
+#: at least so much), or the state is the same; so large a part of the highest rise is judged.
+SAME_STATE, USUAL, JUDGED = 0.1, 0.2, 0.02
+#: Share of the displacements by which reference places follow them when they are deformed ones (at
+#: most: no sheet is moved by twice its motion), and least correlation of the two.
+FOLLOWS, MOST_FOLLOWED, LIKE = 0.5, 2.0, 0.9
+#: Of the median motion between two frames: places this close are one; of the points, most of them.
+CLOSE, MOST = 0.05, 0.5
 #: Of the larger strain at the apex: the other one is not as negative as this under pressure.
 NEGATIVE = -0.25
 ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
 #: Of the radius: a centre, or a sheet's height, further off is no small thing.
 OFF, FAR_OFF, HIGH = 0.035, 0.15, 0.1
+#: Of the radius, and in standard errors: a smaller offset of a centre that is known this well, by
+#: the clamp's edge or by a sheet that rises as evenly as none with a first shape does.
+A_LITTLE, WELL = 0.015, 20.0
+#: Of the radius: the clamp's edge is elsewhere; surely so.
+EDGE, FAR_EDGE = 0.03, 0.06
+#: Of the radius: a first shape of the sheet that matters; degree of its polynomial.
+SHAPE, DEGREE = 0.004, 4
+#: Points off the smooth surface by so many robust deviations, and by so much of the highest rise,
+#: are gross outliers; degree of the surface, rounds, and the share of the radius that is judged.
+GROSS, OF_RISE, SMOOTH, ROUNDS, WELL_INSIDE = 10.0, 0.04, 8, 5, 0.95
+#: Points of a frame that are enough to look at; of more, every so many.
+ENOUGH = 4000
+#: A median absolute deviation of a normal distribution in standard deviations.
+MAD = 1.4826
 #: Degrees.
 TILT, STEEP, TURN = 1.2, 8.0, 5.0
 #: Standard errors that a place or an angle must be off by.
@@ -111,12 +134,17 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Measured fields by rising pressure, in the test's coordinates; thickness mm."""
+    """Measured fields by rising pressure, in the test's coordinates; thickness mm.
+
+    flat : nothing is said of the sheet's first shape. numbers : doubts about the frames' numbers.
+    """
 
     fields: tuple[DisplacementField, ...]
     outline: Outline
     thickness: float
     registered: bool
+    flat: bool = False
+    numbers: Sequence[str] = ()
 
     @property
     def radius(self) -> float:
@@ -150,13 +178,23 @@ class View:
         except (InputError, np.linalg.LinAlgError):
             return ()
 
+    @property
+    def surfaces(self) -> list[tuple[Array, Array]]:
+        """Return places and rises of the high frames."""
+        high = [f for f, r in zip(self.fields, self.rises, strict=True) if r > 0.5 * self.rises[-1]]
+        return [(f.points, f.displacement[:, 2]) for f in high]
+
+    @cached_property
+    def clamp(self) -> ClampEdge | None:
+        """Find the edge of the clamp; None where no points stand still around the disk."""
+        outline = self.outline
+        return clamp_of_motion(self.surfaces, (outline.major, outline.minor), outline.angle)
+
     @cached_property
     def rim(self) -> Rim | None:
         """Find the rim, of an ellipse its turn; None where points do not reach it all around."""
-        high = [f for f, r in zip(self.fields, self.rises, strict=True) if r > 0.5 * self.rises[-1]]
-        surfaces = [(f.points, f.displacement[:, 2]) for f in high]
         try:
-            return rim_of_motion(surfaces, (self.outline.major, self.outline.minor))
+            return rim_of_motion(self.surfaces, (self.outline.major, self.outline.minor))
         except InputError:
             return None
 
@@ -206,6 +244,71 @@ def repeated(view: View, expected: Expected) -> Iterator[Doubt]:
         more = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
         text = f"the displacements at {pairs[0]} are the same to the last digit{more}: one frame"
         yield Doubt("repeated-frame", True, f"{text} is given twice")
+        return
+    yield from _same_states(view)
+
+
+def _same_states(view: View) -> Iterator[Doubt]:
+    """Doubt two pressures between which the centre rises by next to nothing."""
+    if len(view.fields) < 2 or not (view.rises > 0).all():
+        return
+    p, h = np.log([field.pressure for field in view.fields]), np.log(view.rises)
+    usual = max(USUAL, float(np.median(np.diff(h) / np.diff(p))))
+    for k in range(len(p) - 1):
+        expected = usual * (p - p[k])
+        # The next frame that is far enough above for a rise to be seen.
+        far = np.flatnonzero(expected * view.rises[k] > JUDGED * view.rises.max())
+        if len(far) and h[far[0]] - h[k] < SAME_STATE * expected[far[0]]:
+            low, high = (1e3 * view.fields[i].pressure for i in (k, far[0]))
+            text = (
+                f"the centre stands at {view.rises[k]:.4g} mm at {low:.4g} kPa and at "
+                f"{view.rises[far[0]]:.4g} mm at {high:.4g} kPa, and should rise by about "
+                f"{view.rises[k] * np.expm1(expected[far[0]]):.2g} mm: one state was recorded twice"
+                ", or a pressure is wrong"
+            )
+            yield Doubt("repeated-frame", True, text)
+            return
+
+
+def numbered(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt the times of frames whose numbers have gaps or repeats."""
+    for text in view.numbers:
+        yield Doubt("frame-numbers", False, text)
+
+
+def outliers(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt points far off the smooth surface through all."""
+    found = [(field, *_gross(view, field)) for field in view.fields]
+    field, bad, judged, most = max(found, key=lambda one: one[1])
+    if bad:
+        frames = sum(one[1] > 0 for one in found)
+        text = (
+            f"{bad} of {judged} points at {1e3 * field.pressure:.4g} kPa ({bad / judged:.1%}), and "
+            f"some in {frames} of {len(found)} frames, lie up to {most:.3g} mm off the smooth "
+            "surface through the others, and the fit takes squares: leave them out with a flag "
+            "(flag_column), or correlate again"
+        )
+        yield Doubt("outliers", False, text)
+
+
+def _gross(view: View, field: DisplacementField) -> tuple[int, int, float]:
+    """Return the number of gross outliers, of points that were judged, and the farthest, mm."""
+    inside = np.flatnonzero(view.inner(field, WELL_INSIDE))
+    inside = inside[:: max(1, -(-len(inside) // ENOUGH))]
+    points, moved = field.points[inside], field.displacement[inside]
+    kept, off = np.ones(len(points), dtype=bool), np.zeros_like(moved)
+    for _ in range(ROUNDS):
+        try:
+            surface = fit_disk_polynomial(points[kept], moved[kept], view.outline.major, SMOOTH)
+        except InputError:
+            return 0, len(points), 0.0
+        off = np.abs(moved - surface.at(points))
+        least = np.maximum(GROSS * MAD * np.median(off[kept], axis=0), OF_RISE * view.rises.max())
+        now = (off <= least).all(axis=1)
+        if (now == kept).all():
+            break
+        kept = now
+    return int((~kept).sum()), len(points), float(off[~kept].max(initial=0.0))
 
 
 def rejected_at_zero(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -231,14 +334,34 @@ def deformed_coordinates(view: View, expected: Expected) -> Iterator[Doubt]:
         alike = _follows(last.z[:, None], last.displacement[:, 2:])
         seen = f"the height z follows dz by {alike:.0%}" if alike > FOLLOWS else ""
     for other in view.fields[:-1]:
-        if not seen and len(other.points) == len(last.points):
-            moved = (last.displacement - other.displacement)[:, :2]
-            alike = _follows(last.points - other.points, moved)
-            if alike > FOLLOWS:
+        a, b = _same_points(last, other)
+        if not seen and len(a):
+            moved = (last.displacement[a] - other.displacement[b])[:, :2]
+            alike = _follows(last.points[a] - other.points[b], moved)
+            if FOLLOWS < alike < MOST_FOLLOWED:
                 seen = f"x and y change from frame to frame by {alike:.0%} of dx and dy"
     if seen:
         text = f"{seen}: the coordinates are those of the deformed sheet; export the reference"
         yield Doubt("deformed-coordinates", True, f"{text} coordinates")
+
+
+def _same_points(
+    last: DisplacementField, other: DisplacementField
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows of points that are in both frames: by their places, before or after.
+
+    Rows are paired as they stand where most of the places are found in neither way.
+    """
+    moved = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
+    for taken_off in (0.0, 1.0):
+        a, b = (f.points - taken_off * f.displacement[:, :2] for f in (last, other))
+        some = np.arange(len(b))[:: max(1, -(-len(b) // ENOUGH))]
+        apart, row = cKDTree(a).query(b[some])
+        near = apart <= CLOSE * moved
+        if near.mean() > MOST:
+            return row[near], some[near]
+    rows = np.arange(len(last.points) if len(last.points) == len(other.points) else 0)
+    return rows, rows
 
 
 def _follows(place: Array, moved: Array) -> float:
@@ -272,11 +395,58 @@ def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("camera-frame", False, text)
 
 
+def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a radius that is not that of the edge beyond which points stand still."""
+    edge = view.clamp
+    if edge is None or abs(edge.scale - 1.0) < EDGE:
+        return
+    outline = view.outline
+    names = ("radius",) if outline.round else ("major", "minor")
+    sizes = (outline.major,) if outline.round else (outline.major, outline.minor)
+    seen, said = (
+        " and ".join(f"{name} {by * size:.3g} mm" for name, size in zip(names, sizes, strict=True))
+        for by in (edge.scale, 1.0)
+    )
+    text = (
+        f"{edge.still} points of the clamp stand still, beyond an edge of {seen}; the project says "
+        f"{said}: give that of the free disk inside the clamp"
+    )
+    yield Doubt("radius", abs(edge.scale - 1.0) > FAR_EDGE, text)
+
+
+def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt a sheet taken for flat whose measured heights are not."""
+    field = max(view.fields, key=lambda f: 0 if f.z is None else len(f.points))
+    on = view.inner(field, 1.0)
+    if field.z is None or not view.flat:
+        return
+    heights, points = field.z[on], field.points[on]
+    try:
+        plane, shape = (
+            fit_disk_polynomial(points, heights[:, None], view.outline.major, degree).at(points)
+            for degree in (1, DEGREE)
+        )
+    except InputError:
+        return
+    most = float(np.abs(shape - plane).max())
+    if most > SHAPE * view.radius:
+        text = (
+            f"the sheet is up to {most:.2g} mm off a plane in the reference picture, and would be "
+            "taken for flat and taut, which can change E1 by a factor: say [bubble.sheet] surface "
+            '= "measured"'
+        )
+        yield Doubt("flat-sheet", False, text)
+
+
 def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt an origin that is not the rim's centre."""
-    rim = view.rim
+    rim = view.clamp or view.rim
     off = 0.0 if rim is None else float(np.hypot(rim.x, rim.y))
-    if rim is not None and not off < max(OFF * view.radius, SURE * rim.error):
+    if rim is None:
+        return
+    much = max(OFF * view.radius, SURE * rim.error)
+    little = max(A_LITTLE * view.radius, WELL * rim.error)
+    if not off < min(much, little):
         text = (
             f"the sheet rises about x = {rim.x:.3g}, y = {rim.y:.3g} mm (+- {rim.error:.2g}), not "
             f"about the origin: {ADVICE}"
@@ -381,8 +551,9 @@ def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
-    length_unit, rejected_at_zero, repeated, upside_down, order, deformed_coordinates, mirrored,
-    pressure_unit, camera_height, off_centre, tilted, turned, swapped,
+    numbered, length_unit, rejected_at_zero, outliers, upside_down, order, repeated,
+    deformed_coordinates, mirrored, clamped_elsewhere, pressure_unit, first_shape, camera_height,
+    off_centre, tilted, turned, swapped,
 )  # fmt: skip
 
 

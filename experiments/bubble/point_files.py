@@ -17,7 +17,7 @@ from ...readers import pressure_log
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
 from ...readers.machine_tables import Channel, read_times
-from ...readers.pressure_log import check_pattern, number_in_name, value_in_file
+from ...readers.pressure_log import check_pattern, number_in_name, values_in_file
 from ...readers.sections import LENGTH_UNITS
 from ...readers.tables import PRESSURE_UNITS, TIME_UNITS
 from ..kinds import Array, Place, channel_of, named_format
@@ -35,8 +35,10 @@ def pressures_by_log(
     format: str | None,
     place: Place,
     folder: Path,
-) -> tuple[pressure_log.ClockOffset, list[str]]:
-    """Return the pressures of all frames by a log, and the frames' names; raises InputError.
+) -> tuple[pressure_log.ClockOffset, list[str], list[str]]:
+    """Return the pressures of all frames by a log, their names, and doubts about their numbers.
+
+    Raises InputError.
 
     folder : of the data, where the log may be too.
     """
@@ -47,21 +49,23 @@ def pressures_by_log(
     log = pressure_log.read_pressure_log(
         file, pressure_log.LogOptions(pressure, time, kind, section.comment, section.decimal)
     )
-    heights, names = [], []
+    heights, names, own = [], [], []
     for one in files:
         # One file at a time: all frames of a test need not be in memory at once.
-        risen = pressure_log.apex_heights(read_frames([one], options, format)).tolist()
+        frames = read_frames([one], options, format)
+        risen = pressure_log.apex_heights(frames).tolist()
+        own += [frame.number for frame in frames]
         heights += risen
         several = [f"{one.name}, frame {i + 1}" for i in range(len(risen))]
         names += several if len(risen) > 1 else [one.name] * len(risen)
     height = np.array(heights)
     try:
-        times = _frame_times(section, files, len(height), place, folder)
+        times, said = _frame_times(section, files, own, place, folder)
         seen = times, height, log.time, log.pressure
         given = section.offset
         if given is None:
-            return pressure_log.find_offset(*seen), names
-        return pressure_log.given_offset(given, *seen), names
+            return pressure_log.find_offset(*seen), names, said
+        return pressure_log.given_offset(given, *seen), names, said
     except InputError as error:
         if error.path is not None:
             raise
@@ -69,10 +73,17 @@ def pressures_by_log(
 
 
 def _frame_times(
-    section: LogSection, files: Sequence[Path], count: int, place: Place, folder: Path
-) -> Array:
-    """Return times (frames,) in s by the camera's clock."""
-    by_name = bool(section.time_in_name)
+    section: LogSection,
+    files: Sequence[Path],
+    own: Sequence[float | None],
+    place: Place,
+    folder: Path,
+) -> tuple[Array, list[str]]:
+    """Return times (frames,) in s by the camera's clock, and doubts about the numbers they are of.
+
+    own : numbers of the frames in their files.
+    """
+    by_name, count = bool(section.time_in_name), len(own)
     if by_name == (section.times is not None) and (by_name or section.rate is None):
         problem = "expected one of 'rate', 'times' and 'time_in_name' for the times of the frames"
         raise InputError(None, "", problem)
@@ -86,10 +97,13 @@ def _frame_times(
         if len(times) != count:
             problem = f"expected one time for each of the {count} frames, got {len(times)}"
             raise InputError(path, "", problem)
-        return times
+        return times, []
     if not by_name:
         assert section.rate is not None
-        return np.arange(count) / section.rate
+        if section.time_in_name is not None:
+            return np.arange(count) / section.rate, []
+        picture, said = pressure_log.picture_numbers(files, own)
+        return picture / section.rate, said
     if len(files) != count:
         problem = "a file holds several frames; give 'rate' or 'times'"
         raise InputError(None, "time_in_name", problem)
@@ -98,7 +112,7 @@ def _frame_times(
         problem = "with 'rate', expected a pattern whose group is the number of the picture"
         raise InputError(None, "time_in_name", problem)
     numbers = [number_in_name(f, TIME_UNITS, pattern, None, "time_in_name") for f in files]
-    return np.array(numbers) / (section.rate or 1.0)
+    return np.array(numbers) / (section.rate or 1.0), []
 
 
 def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
@@ -116,7 +130,8 @@ class RecordedFrames:
     files : of the frames taken; all files where one holds several. frames : numbers among all
     frames of the files, None where each file holds one. pressure, asked : (n,) MPa. source : of the
     pressures, in words. count : of all frames. left_out : number of frames not used, by why. doubt
-    : (n,) MPa, by the uncertain offset of the clocks. logs : a log, a table of times.
+    : (n,) MPa, by the uncertain offset of the clocks. logs : a log, a table of times. numbers :
+    doubts about the frames' numbers, of which their times are.
     """
 
     files: tuple[Path, ...]
@@ -130,6 +145,7 @@ class RecordedFrames:
     doubt: Array | None = None
     clock: pressure_log.ClockOffset | None = None
     logs: tuple[Path, ...] = ()
+    numbers: tuple[str, ...] = ()
 
 
 def recorded_frames(
@@ -146,13 +162,19 @@ def recorded_frames(
     asked : MPa, the test's `pressures`; None takes all frames, or `frames` of them.
     """
     _check(section, asked, place)
-    clock, names = None, [file.name for file in files]
+    clock, names, said = None, [file.name for file in files], list[str]()
     if section.log is not None:
-        clock, names = pressures_by_log(section.log, files, options, format, place, folder)
+        clock, names, said = pressures_by_log(section.log, files, options, format, place, folder)
         pressures, source = clock.pressure, f"the log {section.log.file}"
     elif section.column is not None:
         channel = Channel(section.column, section.unit, section.scale, section.offset)
-        pressures = np.array([value_in_file(file, channel, PRESSURE_UNITS) for file in files])
+        each = [values_in_file(file, channel, PRESSURE_UNITS) for file in files]
+        names = [
+            f"{file.name}, frame {i + 1}" if len(one) > 1 else file.name
+            for file, one in zip(files, each, strict=True)
+            for i in range(len(one))
+        ]
+        pressures = np.concatenate(each)
         source = f"{section.column!r} in each file"
     else:
         pattern = section.from_name if isinstance(section.from_name, str) else None
@@ -183,6 +205,7 @@ def recorded_frames(
         doubt=None if clock is None else clock.doubt[taken],
         clock=clock,
         logs=tuple(logs),
+        numbers=tuple(said),
     )
 
 
@@ -255,11 +278,22 @@ def _points(points: PointsSection, place: Place) -> PointFiles:
     options = FrameOptions(
         FIELD, columns or None, points.flag_column, points.comment, scale, points.valid_column,
         points.decimal, points.coordinates, points.camera_axes,
+        reference=_reference(points, place),
     )  # fmt: skip
     kind = named_format(place, "data.points.format", "frame", points.format)
     registration = registration_options(points.registration, place, scale)
     correlation = points.correlation.model_dump(exclude_none=True)
     return PointFiles(files, options, kind, registration, correlation=correlation)
+
+
+def _reference(points: PointsSection, place: Place) -> Path | None:
+    """Return the file of the undeformed state, None without one; raises InputError."""
+    if points.reference is None:
+        return None
+    path = _folder(points, place) / points.reference
+    if place.need_data and not is_file(path):
+        raise place.error("data.points.reference", f"there is no file {path}")
+    return path
 
 
 def _folder(points: PointsSection, place: Place) -> Path:
@@ -318,6 +352,7 @@ def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
                 return ()
             where = f"{error.path} " if error.path is not None else ""
             raise place.error(error.field, f"{where}{error.problem}; {advice}") from None
+    files = [file for file in files if file != _reference(points, place)]
     for file in files:
         if needed and not is_file(file):
             raise place.error("data.points", f"there is no file {file}; {advice}")

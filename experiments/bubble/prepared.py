@@ -172,6 +172,8 @@ class PreparedBubble:
         """Return the files of the measured fields; none where they were computed."""
         recorded = self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
         logs = () if recorded is None else recorded.logs
+        if isinstance(self.test.data, PointFiles) and self.test.data.options.reference:
+            logs = (*logs, self.test.data.options.reference)
         read = [(field.path, field) for field in self.fields if field.path is not None]
         frames = [kinds.DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
         others = [kinds.DataFile(log, FrameSource("log"), None) for log in logs]
@@ -200,7 +202,10 @@ class PreparedBubble:
     def view(self) -> View:
         """Return the fields for a look before a fit."""
         test = self.test
-        return View(self.fields, test.outline, test.thickness, self.registration is not None)
+        registered, flat = self.registration is not None, not test.sheet.known
+        recorded = test.data.recorded if isinstance(test.data, PointFiles) else None
+        numbers = () if recorded is None else recorded.numbers
+        return View(self.fields, test.outline, test.thickness, registered, flat, numbers)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         """Return the doubts about the measured fields; none where they were computed."""

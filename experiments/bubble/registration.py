@@ -208,6 +208,11 @@ POINTS, FRAMES = 2000, 4
 #: Share of the radius beyond which points tell where the rim is, and up to which points are taken
 #: about the first guess of the centre.
 NEAR, INSIDE = 0.8, 1.02
+#: Of the radius that is said: points further off tell nothing of the clamp's edge. Of the largest
+#: rise: points that move by less stand still.
+AROUND, STILL = 1.6, 0.01
+#: Of the radius that is said: sizes of the edge that are tried first.
+SIZES = np.arange(0.6, 1.55, 0.1)
 #: Harmonics around the centre; the even ones above zero tell the axes.
 HARMONICS = (0, 1, 2, 3, 4)
 TELLING = (2, 4)
@@ -283,6 +288,68 @@ def rim_of_motion(
     return Rim(float(best.x[0]), float(best.x[1]), turn, error, turn_error)
 
 
+@dataclass(frozen=True)
+class ClampEdge:
+    """The edge of the clamp by the points that stand still: a centre x, y, mm, and its size.
+
+    scale : of the semi-axes that were said. error : standard error of the centre, mm. still :
+    points beyond the edge.
+    """
+
+    x: float
+    y: float
+    scale: float
+    error: float
+    still: int
+
+
+def clamp_of_motion(
+    surfaces: Sequence[tuple[Array, Array]], semi_axes: tuple[float, float], angle: float = 0.0
+) -> ClampEdge | None:
+    """Find the edge beyond which points stand still; None where too few around the disk do.
+
+    The rise of every frame is a polynomial times a factor that is zero from the edge on, whose
+    centre and size are looked for. surfaces, semi_axes, angle : as those of `rim_of_motion`.
+    """
+    few = []
+    for points, rise in surfaces[-FRAMES:]:
+        near = np.hypot(*_local(points, np.array([0.0, 0.0, angle]), semi_axes)) < AROUND
+        every = slice(None, None, max(1, -(-int(near.sum()) // POINTS)))
+        points, rise = points[near][every], rise[near][every]
+        if len(rise) < 3 * (len(EVEN) + len(ODD) + 1) or not np.abs(rise).max() > 0:
+            return None
+        few.append((points, rise / np.abs(rise).max()))
+
+    def local(points: Array, place: Array) -> Array:
+        return _local(points, np.array([*place[:2], angle]), semi_axes) / place[2]
+
+    def left(place: Array) -> Array:
+        parts = []
+        for points, rise in few:
+            orthogonal, _ = np.linalg.qr(_terms(*local(points, place), still=True))
+            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
+        return np.concatenate(parts)
+
+    # Too large a circle hides in the points that stand still: the best of several is the start.
+    start = min((np.array([0.0, 0.0, s]) for s in SIZES), key=lambda a: np.linalg.norm(left(a)))
+    ends = np.array([0.5 * semi_axes[1], 0.5 * semi_axes[1], 0.2])
+    scale = [semi_axes[0], semi_axes[0], 1.0]
+    best = least_squares(left, start, x_scale=scale, bounds=(start - ends, start + ends))
+    points, rise = few[-1]
+    places = local(points, best.x)
+    beyond = np.hypot(*places) > BEYOND
+    if beyond.sum() < LEAST or not in_all_quarters(places[:, beyond].T):
+        return None
+    # Of the largest rise: what does not stand still is no clamp.
+    level = np.median(rise[beyond])
+    if np.median(np.abs(rise[beyond] - level)) > STILL:
+        return None
+    variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
+    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
+    error = float(np.sqrt(np.trace(covariance[:2, :2])))
+    return ClampEdge(*map(float, best.x), error, int(beyond.sum()))
+
+
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
     """Guess the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
     weight = np.clip(rise, 0.0, None)
@@ -319,8 +386,9 @@ def _on_disk(
     return points[inside][every], rise / np.abs(rise).max()
 
 
-def _terms(u: Array, v: Array) -> Array:
+def _terms(u: Array, v: Array, still: bool = False) -> Array:
     factor = 1.0 - u**2 - v**2
+    factor = factor.clip(min=0.0) if still else factor
     shapes = [factor * u**i * v**j for i, j in (*EVEN, *ODD)]
     return np.stack([*shapes, np.ones_like(u)], axis=1)
 

@@ -124,7 +124,7 @@ class LogSection(Section):
     rate: Positive | None = None
     times: Name | None = None
     times_column: Name | None = None
-    time_in_name: bool | Name = False
+    time_in_name: bool | Name | None = None
     offset: Number | None = None
 
 
@@ -326,6 +326,7 @@ class PointsSection(Section):
     pattern: str | None = None
     indices: list[int] | None = None
     folder: str = ""
+    reference: Name | None = None
     format: str | None = None
     columns: ColumnsSection = ColumnsSection()
     flag_column: str | None = None

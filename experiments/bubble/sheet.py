@@ -67,6 +67,8 @@ def _terms(places: Array, degree: int) -> Array:
 
 #: How far out measured heights must go, in radii: beyond them the polynomial is a guess.
 LEAST_REACH = 0.85
+#: Places that go out to less are in metres, as a rule.
+METRES = 0.01
 #: Height over the radius beyond which a surface is not that of a clamped sheet.
 MOST_HEIGHT = 0.5
 #: Points whose misfits go together: so many fewer say something.
@@ -129,6 +131,8 @@ def _on_disk(field: DisplacementField, outline: Outline, key: str) -> NDArray[np
             f"points go out to {100 * reach:.0f} % of the radius; at least {100 * LEAST_REACH:.0f} "
             "% are needed to know the rim"
         )
+        if reach < METRES:
+            problem += '; places in metres need length_unit = "m"'
         raise InputError(None, f"sheet.{key}", problem)
     return on
 

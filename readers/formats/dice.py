@@ -46,8 +46,8 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     good = "STATUS_FLAG", SUCCESSFUL
     # Without a stereo model, of columns that the user names, the model's are not asked for.
     names = {key: name for key, name in NAMES.items() if name in top}
-    rows = read_text_rows(path, options, comment="***", names=names, status=good, camera_axes=True)
-    return [frame_of(rows, options, path, "dice")]
+    every = read_text_rows(path, options, comment="***", names=names, status=good, camera_axes=True)
+    return [frame_of(rows, options, path, "dice") for rows in every]
 
 
 register_format(Format("dice", "frame", "solution files of DICe", read, recognises))

@@ -95,8 +95,8 @@ def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     if not head.startswith(SIGNATURE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
-        rows = read_text_rows(path, deformed, camera_axes=True)
-        return [frame_of(rows, deformed, path, "pyaldic")]
+        every = read_text_rows(path, deformed, camera_axes=True)
+        return [frame_of(rows, deformed, path, "pyaldic") for rows in every]
     there = (read_variables if is_mat(head) else read_arrays)(path, ("points3D", *"UVW"))
     points = there.get("points3D")
     if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:

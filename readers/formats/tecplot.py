@@ -41,7 +41,7 @@ def recognises(path: Path, head: bytes) -> bool:
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read the frames of a file, one a zone."""
     names, zones = _zones(path)
-    headings = [heading_of(name) for name in names]
+    headings = _with_vectors([heading_of(name) for name in names])
     columns = _columns(path, headings, options)
     found = {key: headings[i] for key, i in columns.items() if key not in FLAGS}
     named = {key: heading.name for key, heading in found.items()}
@@ -135,6 +135,20 @@ def _first_bad(lines: list[tuple[int, str]]) -> tuple[str, str]:
     return "", "expected numbers"
 
 
+def _with_vectors(headings: list[Heading]) -> list[Heading]:
+    """Return the headings with Vx, Vy, Vz without a unit as displacements, in that of the place."""
+    if any(heading.quantity in ("dx", "dy", "dz") for heading in headings):
+        return headings
+    units = {h.quantity: h.unit for h in headings if h.quantity in (*"xyz",)}
+    names = {f"v{axis}": axis for axis in "xyz"}
+    return [
+        Heading(h.name, units.get(axis, ""), f"d{axis}")
+        if not h.unit and (axis := names.get(h.name.strip().casefold(), ""))
+        else h
+        for h in headings
+    ]
+
+
 def _columns(path: Path, headings: Sequence[Heading], options: FrameOptions) -> dict[str, int]:
     named = dict(options.columns or {})
     flags = {"invalid": options.flag_column, "valid": options.valid_column}
@@ -142,6 +156,8 @@ def _columns(path: Path, headings: Sequence[Heading], options: FrameOptions) -> 
     found = {}
     there = ", ".join(heading.name for heading in headings)[:300]
     for key, where in columns_of(headings, named).items():
+        if key in ("frame", "id"):
+            continue
         if len(where) != 1:
             what = f"{named[key]!r} is missing" if not where else "may be one of several"
             problem = f"the variable of {key} {what}; name one with columns. The file has: {there}"

@@ -27,7 +27,7 @@ from bubblefit.readers.fields import (
 )
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
-from bubblefit.readers.pressure_log import read_pressure_log, value_in_file
+from bubblefit.readers.pressure_log import read_pressure_log, values_in_file
 from bubblefit.readers.registry import format_names
 from bubblefit.readers.tables import PRESSURE_UNITS
 from bubblefit.runs.setup import bounds_of, law_of
@@ -203,7 +203,7 @@ def _cards(folder: Path) -> list[bytes]:
 
 
 def _value(path: Path) -> float:
-    return value_in_file(path, Channel("pressure"), PRESSURE_UNITS)
+    return float(values_in_file(path, Channel("pressure"), PRESSURE_UNITS)[0])
 
 
 def _surfaces(folder: Path) -> str:

@@ -363,3 +363,31 @@ def as_version_73(path, copy):
     with copy.open("r+b") as stream:
         stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
     return copy
+
+
+def places(path, ids, points):
+    rows = [";".join(map(str, (i, *row))) for i, row in zip(ids, points.tolist(), strict=True)]
+    path.write_text("\n".join(["Point ID;X deformed [mm];Y deformed [mm];Z deformed [mm]", *rows]))
+    return path
+
+
+def test_a_reference_of_its_own_beside_places(tmp_path):
+    """Points are paired by their numbers, or as many by their rows."""
+    draw = np.random.default_rng(1)
+    rest, moved = draw.uniform(-90, 90, (20, 3)), draw.normal(0, 2, (2, 20, 3))
+    options = FrameOptions(QUANTITIES, reference=places(tmp_path / "ref.csv", range(20), rest))
+    order = [draw.permutation(20)[:count] for count in (20, 13)]
+    files = [
+        places(tmp_path / f"s{k}.csv", own, (rest + u)[own])
+        for k, (own, u) in enumerate(zip(order, moved, strict=True))
+    ]
+    for frame, own, u in zip(read_frames(files, options), order, moved, strict=True):
+        at = np.sort(own)
+        np.testing.assert_allclose(frame.points, rest[at])
+        np.testing.assert_allclose(frame.displacement, u[at], atol=1e-9)
+    bare = files[1].read_text().replace("Point ID", "value")
+    files[1].write_text(bare)
+    complaint_with(["s1.csv", "13 points, the reference 20"], read_frames, files, options)
+    both = tmp_path / "both.csv"
+    both.write_text("x,y,z,dx,dy,dz\n1,2,3,4,5,6\n7,8,9,1,2,3\n")
+    complaint_with(["both.csv", "holds displacements"], read_frames, [both], options)

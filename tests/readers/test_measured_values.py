@@ -27,7 +27,7 @@ from bubblefit.readers.pressure_log import (
     offset_misfits,
     read_pressure_log,
     straightest,
-    value_in_file,
+    values_in_file,
 )
 from bubblefit.readers.tables import PRESSURE_UNITS, TIME_UNITS
 
@@ -335,7 +335,7 @@ def test_a_column_or_a_line_above_the_numbers(tmp_path):
         "p [kPa],q,r\n35.5,a,1\n35.5,b,2\n", "x p_kPa\n1 35.5\n", "# p_kPa = 35.5\nx;y\n1;2\n",
         "p [kPa]: 35,5\nx;y\n1;2\n", "p 35.5 kPa, and p 35.5 kPa again\n", "p (kPa) 355e-1\n",
     ):  # fmt: skip
-        value = value_in_file(written(tmp_path, text), Channel("p"), PRESSURE_UNITS)
+        value = values_in_file(written(tmp_path, text), Channel("p"), PRESSURE_UNITS)
         assert value == pytest.approx(0.0355), text
 
 
@@ -361,7 +361,7 @@ NEITHER = ["neither a column 'p' nor a line"]
 )  # fmt: skip
 def test_values_that_cannot_be_told(tmp_path, text, words):
     path = written(tmp_path, text)
-    complaint_with([str(path), *words], value_in_file, path, Channel("p"), PRESSURE_UNITS)
+    complaint_with([str(path), *words], values_in_file, path, Channel("p"), PRESSURE_UNITS)
 
 
 def test_a_log_in_volts(tmp_path):

@@ -338,11 +338,14 @@ def test_points_that_lie_on_the_disk():
 def times(folder, count=2, files=("p1.csv", "p7.csv"), **said):
     (folder / "t.csv").write_text("frame,time (ms)\n1,500\n2,1500\n")
     section = LogSection(file="l.csv", **said)
-    return _frame_times(section, [folder / f for f in files], count, PLACE, folder).tolist()
+    own, files = [None] * count, [folder / f for f in files]
+    return _frame_times(section, files, own, PLACE, folder)[0].tolist()
 
 
 def test_times_of_frames(tmp_path):
     assert times(tmp_path, 3, rate=2.0) == [0.0, 0.5, 1.0]
+    assert times(tmp_path, rate=2.0) == [0.0, 3.0]  # p1, p7
+    assert times(tmp_path, rate=2.0, time_in_name=False) == [0.0, 0.5]
     assert times(tmp_path, times="t.csv") == [0.5, 1.5]
     assert times(tmp_path, time_in_name=r"p(\d)") == [1.0, 7.0]
     assert times(tmp_path, time_in_name=r"p(\d)", rate=2.0) == [0.5, 3.5]

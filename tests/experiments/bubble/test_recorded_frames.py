@@ -13,7 +13,7 @@ from bubblefit.experiments.bubble.prepared import prepare
 from bubblefit.experiments.bubble.report import clock_pictures, recorded_table
 from bubblefit.experiments.kinds import Output, files_of
 from bubblefit.project.project import project_text, read_project, settings_of
-from bubblefit.readers.pressure_log import ClockOffset
+from bubblefit.readers.pressure_log import ClockOffset, picture_numbers
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
@@ -157,6 +157,63 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     given = bubble(project(folder, LOG.format(more="") + f"offset = {AHEAD}\n"))
     assert given.data.recorded.clock.misfit is None
     assert recorded_lines(given.data.recorded)[1].endswith(" 41.00 s, given")
+
+
+@pytest.mark.parametrize("offset", ["", f"offset = {AHEAD}\n"])
+def test_numbers_of_frames_that_are_missing_are_time(folder, tmp_path, offset):
+    """Without pictures 5 to 8 of 17 at 2 s each, the last of 60 kPa is at 28 s all the same."""
+    shutil.copytree(folder / "data", tmp_path / "data")
+    for k in range(5, 9):
+        next((tmp_path / "data" / "frames").glob(f"p{k}_*")).unlink()
+    test = bubble(project(tmp_path, LOG.format(more="") + offset))
+    taken = test.data.recorded
+    for name, pressure in zip(taken.names, 1e3 * taken.pressure, strict=True):
+        assert pressure == pytest.approx(float(name.split("_")[1][:-7]), abs=2.0)
+    (said,) = taken.numbers
+    assert "1 to 17" in said and "leave out 4 (5, 6, 7, 8)" in said
+    doubts = prepare(test, None, None).view.numbers
+    assert doubts == taken.numbers
+
+
+@pytest.mark.parametrize(
+    ("names", "numbers", "words"),
+    [
+        ("B0001 B0002 B0003", [0, 1, 2], []), ("a b c", [0, 1, 2], []),
+        ("i1 i2 i4 i5", [0, 1, 3, 4], ["leave out 1 (3)"]),
+        ("i1 i2 i2b i3", [0, 1, 1, 2], ["come again (2)"]),
+        ("s1_12kPa s2_35.5kPa s3_60kPa", [0, 1, 2], []),
+        ("c2_00010 c2_00020 c2_00030 c2_00050", [0, 10, 20, 40], ["up by 10", "1 (40)"]),
+        ("1_140201 2_140203 3_140301", [0, 1, 2], []), ("i3 i1 i2", [0, 1, 2], []),
+    ],
+)  # fmt: skip
+def test_numbers_of_pictures(names, numbers, words):
+    files = [Path("run_7") / f"{name}.csv" for name in names.split()]
+    found, said = picture_numbers(files, [None] * len(files))
+    assert found.tolist() == numbers and len(said) == len(words)
+    assert all(word in text for word, text in zip(words, said, strict=True))
+    own, said = picture_numbers(files[:1], [2.0, 3.0, 7.0, 8.0])
+    assert own.tolist() == [0, 1, 5, 6] and "leave out 3 (4, 5, 6)" in said[0]
+
+
+def test_one_table_of_all_frames(folder, tmp_path):
+    """Frames 1 to 17 without 5 to 8; pressures by a column of it, or by a log and their numbers."""
+    (tmp_path / "data").mkdir()
+    shutil.copy(folder / "data" / "valve.csv", tmp_path / "data")
+    home, rows = folder / "data" / "frames", ["Bild;x;y;dx;dy;dz;p [bar]"]
+    for k, level in enumerate(LEVELS, 1):
+        table = np.loadtxt(home / f"p{k}_{level:g}kPa.csv", delimiter=",", skiprows=1)
+        rows += [";".join(f"{v:g}" for v in (k, *row)) for row in table if not 5 <= k <= 8]
+    (tmp_path / "data" / "all.csv").write_text("\n".join(rows))
+    files = 'files = ["all.csv"]\nfolder = "data"'
+    column = "[bubble.data.points.pressure]\ncolumn = 'p'\n"
+    for section in (column, LOG.format(more="")):
+        test = bubble(project(tmp_path, section, "[10, 21, 60]", files))
+        assert test.pressures == pytest.approx([0.010, 0.021, 0.060], rel=0.01)
+        assert test.data.recorded.count == 13
+        fields = prepare(test, None, None).fields
+        assert [len(field.points) for field in fields] == [81] * 3
+        rises = [field.displacement[40, 2] for field in fields]
+        assert rises == pytest.approx([40 * (p / 60) ** (1 / 3) for p in (10, 21, 60)], abs=0.1)
 
 
 def test_one_file_with_all_frames(folder, tmp_path):
