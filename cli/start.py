@@ -94,10 +94,8 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
     if tests["bubble"]:
-        words = (
-            'the sheet of a bubble is seldom flat: [bubble.sheet] surface = "measured" takes the'
-        )
-        click.echo(f"note: {words} heights z of the files; modes where there are none")
+        words = '[bubble.sheet] surface = "measured" takes the heights z of the files'
+        click.echo(f"note: a bubble's sheet is seldom flat: {words}, modes where there are none")
     fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
     then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
     click.echo(f"next: bubblefit {then}")

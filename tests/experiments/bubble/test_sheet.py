@@ -72,6 +72,9 @@ def test_the_surface_the_rim_and_modes_follow_the_measurement(outline):
     # Points of another outline do not reach the edge.
     with pytest.raises(InputError, match="points go out to"):
         measured_sheet(sheet, Outline(200.0, 160.0, 30.0), fields)
+    metres = [replace(f, points=f.points / 1e3) for f in fields]
+    with pytest.raises(InputError, match='length_unit = "m"'):
+        measured_sheet(sheet, outline, metres)
 
 
 UNEVEN = script("benchmarks/bench_sheet.py")
