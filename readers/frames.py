@@ -221,9 +221,9 @@ def heading_of(name: str, unit: str = "") -> Heading:
     whole = " ".join(words)
     if whole == "sigma":
         return Heading(name, unit, "sigma")
-    for quantity, own in (("frame", _FRAMES), ("id", _POINTS)):
-        if words and {*words} & own and not {*words} - own - _NUMBERED:
-            return Heading(name, unit, quantity)
+    for kind, of_kind in (("frame", _FRAMES), ("id", _POINTS)):
+        if {*words} & of_kind and not {*words} - of_kind - _NUMBERED:
+            return Heading(name, unit, kind)
     if whole in _VALID or whole in _INVALID:
         return Heading(name, unit, "valid" if whole in _VALID else "invalid")
     length = unit.casefold() in LENGTHS

@@ -376,7 +376,9 @@ def read_text_rows(
     units = {key: heading.unit for key, heading in headings.items() if heading.unit}
     lost = {FLAGGED: int((~good).sum())}
     whole = FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
-    every = [] if frame is None else np.unique(frame)
+    if frame is None:
+        return [whole]
+    every = np.unique(frame)
     if len(every) < 2 or LEAST_ROWS * len(every) > len(frame) or np.isnan(every).any():
         return [whole]
     return [

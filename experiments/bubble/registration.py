@@ -272,7 +272,7 @@ def rim_of_motion(
         at = place if free else np.array([*place, fixed])
         parts = []
         for points, rise in few:
-            orthogonal, _ = np.linalg.qr(_terms(*_local(points, at, semi_axes)))
+            orthogonal, _ = np.linalg.qr(_terms(_local(points, at, semi_axes)))
             parts.append(rise - orthogonal @ (orthogonal.T @ rise))
         return np.concatenate(parts)
 
@@ -326,7 +326,7 @@ def clamp_of_motion(
     def left(place: Array) -> Array:
         parts = []
         for points, rise in few:
-            orthogonal, _ = np.linalg.qr(_terms(*local(points, place), still=True))
+            orthogonal, _ = np.linalg.qr(_terms(local(points, place), still=True))
             parts.append(rise - orthogonal @ (orthogonal.T @ rise))
         return np.concatenate(parts)
 
@@ -347,7 +347,8 @@ def clamp_of_motion(
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
-    return ClampEdge(*map(float, best.x), error, int(beyond.sum()))
+    x, y, size = map(float, best.x)
+    return ClampEdge(x, y, size, error, int(beyond.sum()))
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
@@ -386,7 +387,8 @@ def _on_disk(
     return points[inside][every], rise / np.abs(rise).max()
 
 
-def _terms(u: Array, v: Array, still: bool = False) -> Array:
+def _terms(local: Array, still: bool = False) -> Array:
+    u, v = local
     factor = 1.0 - u**2 - v**2
     factor = factor.clip(min=0.0) if still else factor
     shapes = [factor * u**i * v**j for i, j in (*EVEN, *ODD)]
