@@ -334,6 +334,8 @@ def clamp_of_motion(
     start = min((np.array([0.0, 0.0, s]) for s in SIZES), key=lambda a: np.linalg.norm(left(a)))
     ends = np.array([0.5 * semi_axes[1], 0.5 * semi_axes[1], 0.2])
     scale = [semi_axes[0], semi_axes[0], 1.0]
+    from scipy.optimize import least_squares  # heavy: where it is used
+
     best = least_squares(left, start, x_scale=scale, bounds=(start - ends, start + ends))
     points, rise = few[-1]
     places = local(points, best.x)
