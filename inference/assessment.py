@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import Note, NoteKind
+from ..materials.card import band_at
 from ..materials.forms.base import COMPONENTS, Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .linear import (
@@ -82,10 +83,22 @@ class Certainty:
         Where the error of the mesh is taken out, only the share counts that may be left of it."""
         if self.mesh is None:
             return dict(self.sigma)
-        share = LEFT if self.taken_out else 1.0
-        return {
-            name: np.hypot(sigma, share * self.mesh[name]) for name, sigma in self.sigma.items()
-        }
+        return {name: np.hypot(self.sigma[name], left) for name, left in self.of_mesh.items()}
+
+    @property
+    def of_mesh(self) -> dict[str, Array]:
+        """Return (n,) by modulus, the mesh error that the reported law has, or may have, in it."""
+        assert self.mesh is not None
+        if not self.taken_out:
+            return {name: np.abs(off) for name, off in self.mesh.items()}
+        return {name: LEFT * np.abs(off) / (1.0 + off) for name, off in self.mesh.items()}
+
+    def ends(self, name: str, strain: Array | float, modulus: Array) -> tuple[Array, Array] | None:
+        """Return the ends of the band at strains (n,), with the modulus (n,) inside; None if
+        unknown."""
+        if name not in self.band:
+            return None
+        return band_at(self.strain[name], list(self.band[name]), strain, modulus)
 
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
@@ -120,8 +133,17 @@ def certainty(
     if limit is not None:
         which += " and the mesh"
     left = best.residual if limit is None else limit.residual
-    wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual))
-    wrong |= differences_of_all(problem, left, best.jacobian)
+
+    def effect(step: Array) -> float:
+        """Return the largest relative change of a modulus halfway along its strains."""
+        some = {name: at[len(at) // 2 : len(at) // 2 + 1] for name, at in strains.items()}
+        before, after = (
+            moduli_of(problem.unknowns, y, some) for y in (best.unknowns, best.unknowns + step)
+        )
+        return max(float(np.abs(after[name] / before[name] - 1.0).max()) for name in some)
+
+    wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual), best, effect)
+    wrong |= differences_of_all(problem, left, best, effect)
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)

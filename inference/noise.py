@@ -14,7 +14,7 @@ tested against their scatter (Hotelling's T squared)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,10 +22,11 @@ import numpy as np
 from numpy.polynomial.legendre import legval
 from scipy.special import chdtr, chdtrc, fdtri
 
-from ..errors import Note, NoteKind
+from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.forms.base import Array
+from ..materials.law import ThicknessChange
 from .comparison import NoiseIs, Objective
-from .problem import FitProblem
+from .problem import Evaluation, FitProblem
 
 #: Kinds of notes that are made here.
 ABOVE_NOISE = NoteKind("above the noise", weight=13)
@@ -160,13 +161,61 @@ LEAST_VALUES, FEW = 2, 3
 STEEPER = 3.5
 
 
+#: Of what was measured (RMS): a discrepancy of displacements, or of loads, that does not matter
+#: unless its cause moves a modulus by more than `MOVES`.
+OF_SHEET, OF_LOAD, MOVES = 0.002, 0.01, 0.02
+#: Of a discrepancy: a cause that explains less is not named; causes that are named, at most.
+NAMED, CAUSES = 0.5, 2
+DISTINCT = 1e-2  # of a cause: if less is left beside the slopes, the moduli follow it
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of a discrepancy, with its amount and remedy in `words`.
+    share : of the squares of the discrepancy that it explains. moves : largest relative change of a
+    modulus where it is mended, halfway along the strains."""
+
+    words: str
+    share: float
+    moves: float = 0.0
+
+
+#: Largest relative change of a modulus by a step of the unknowns.
+Effect = Callable[[Array], float]
+
+
+def ranked_causes(
+    left: Array, slopes: Array, causes: Mapping[str, Array], effect: Effect | None = None
+) -> tuple[Cause, ...]:
+    """Return causes of a discrepancy (n,), the likeliest first.
+    slopes : (n, unknowns); what they follow explains nothing. causes : (n, k), change of the
+    residual by one unit of each cause, by its words with `{}` for the amounts."""
+    basis, size, _ = np.linalg.svd(slopes, full_matrices=False)
+    basis = basis[:, size > NOTHING * size.max(initial=0.0)]
+    beside = left - basis @ (basis.T @ left)
+    whole, found = float(beside @ beside), []
+    for words, columns in causes.items():
+        own = columns - basis @ (basis.T @ columns)
+        real = np.linalg.norm(own, axis=0) > DISTINCT * np.linalg.norm(columns, axis=0)
+        amount = np.zeros(len(real))
+        if not real.any() or not whole > 0:
+            continue
+        amount[real] = -np.linalg.lstsq(own[:, real], beside, rcond=DISTINCT)[0]
+        explained = 1.0 - float(np.sum((beside + own @ amount) ** 2)) / whole
+        step = np.asarray(-np.linalg.lstsq(slopes, columns @ amount, rcond=NOTHING)[0], float)
+        moves = 0.0 if effect is None else effect(step)
+        found.append(Cause(words.format(*amount), explained, moves))
+    return tuple(sorted(found, key=lambda one: -one.share))
+
+
 @dataclass(frozen=True)
 class Discrepancy:
     """The part of a comparison's residual that is smooth over its whole sheet.
     ratio : power in a smooth shape over that in one of the next. largest : of those that noise
     alone exceeds in one of a hundred fits. rms : of the part beyond the noise's share, in `unit`s.
     least : uncertainty of a mean by the noise; less does not matter. specimens : of strips; then
-    `ratio` is of Hotelling's test and `rms` of what all have in common."""
+    `ratio` is of Hotelling's test and `rms` of what all have in common. share : `rms` over the RMS
+    of what was measured. causes : the likeliest first."""
 
     ratio: float
     largest: float
@@ -174,18 +223,36 @@ class Discrepancy:
     unit: str
     least: float = 0.0
     specimens: int = 0
+    share: float = 1.0
+    causes: tuple[Cause, ...] = ()
 
     @property
-    def significant(self) -> bool:
+    def named(self) -> tuple[Cause, ...]:
+        """Return the causes that its shape points to."""
+        return tuple(one for one in self.causes[:CAUSES] if one.share > NAMED)
+
+    @property
+    def systematic(self) -> bool:
         """Return whether it cannot be noise, and exceeds what the noise leaves open anyway."""
         return self.ratio > self.largest and self.rms > self.least
 
+    @property
+    def significant(self) -> bool:
+        """Return whether it is systematic and so large that it matters."""
+        large = self.share > (OF_LOAD if self.specimens else OF_SHEET)
+        return self.systematic and (large or any(one.moves > MOVES for one in self.named))
+
 
 def discrepancies(
-    problem: FitProblem, residual: Array, doubt: Array | None = None
+    problem: FitProblem,
+    residual: Array,
+    doubt: Array | None = None,
+    best: Evaluation | None = None,
+    effect: Effect | None = None,
 ) -> dict[str, Discrepancy]:
     """Return the discrepancy of every comparison with places on a sheet, from the residual (m,).
-    doubt : (m,) part of the residual that the mesh may cause."""
+    doubt : (m,) part of the residual that the mesh may cause. best : where causes are looked for.
+    """
     found = {}
     doubt = np.zeros_like(residual) if doubt is None else doubt
     for k, comparison in enumerate(problem.comparisons):
@@ -201,8 +268,56 @@ def discrepancies(
         one = discrepancy(blocks, of_mesh, places, problem.unknowns.count, objective.unit)
         if one is not None:
             least = objective.least_noise / float(np.sqrt(len(residual[rows])))
-            found[comparison.name] = replace(one, least=least)
+            one = replace(one, least=least, share=_share(one, objective))
+            if one.systematic and best is not None:
+                one = replace(one, causes=_causes_on_sheet(problem, residual, best, k, effect))
+            found[comparison.name] = one
     return found
+
+
+def _share(one: Discrepancy, objective: Objective) -> float:
+    """Return its size beside what was measured."""
+    measured = getattr(objective, "measured_rms", 0.0)
+    return one.rms / measured if measured > 0 else 1.0
+
+
+def _causes_on_sheet(
+    problem: FitProblem, residual: Array, best: Evaluation, k: int, effect: Effect | None
+) -> tuple[Cause, ...]:
+    """Return causes of the smooth part of a comparison's residual, by its shapes' amplitudes."""
+    rows, objective = problem.rows(k), problem.comparisons[k].objective
+    if best.jacobian is None or not hasattr(objective, "causes"):
+        return ()
+    causes = {**objective.causes(best.histories[k]), **_by_thickness(problem, best, k)}
+    columns = np.column_stack([residual[rows], best.jacobian[rows], *causes.values()])
+    blocks = np.split(columns * problem.scale[rows, None], np.cumsum(objective.sizes)[:-1])
+    some = [
+        smooth_shapes(at)[:, : _shapes(SMOOTH)].T @ block
+        for block, at in zip(blocks, objective.places, strict=True)  # type: ignore[attr-defined]
+        if len(block) >= LEAST_VALUES * _shapes(NEXT)
+    ]
+    ends = np.cumsum([1, best.jacobian.shape[1], *(own.shape[1] for own in causes.values())])
+    left, slopes, *own = np.split(np.concatenate(some), ends[:-1], axis=1)
+    return ranked_causes(left[:, 0], slopes, dict(zip(causes, own, strict=True)), effect)
+
+
+def _by_thickness(problem: FitProblem, best: Evaluation, k: int) -> dict[str, Array]:
+    """Return (m, 1) of the other option of the thickness; none for another program."""
+    comparison, unknowns = problem.comparisons[k], problem.unknowns
+    law = unknowns.law(problem.law, best.unknowns)
+    other: ThicknessChange = "incompressible" if law.thickness_change == "constant" else "constant"
+    values = unknowns.nuisance_values(comparison.name, best.unknowns)
+    if problem.solver.external:
+        return {}
+    try:
+        there = comparison.run(
+            replace(law, thickness_change=other), unknowns.free, values, warm=False
+        )
+    except (InputError, SolverFailure):
+        return {}
+    residual = comparison.objective.residual
+    by = residual(there, values) - residual(best.histories[k], values)
+    return {f'thickness_change = "{other}", {{:.0%}} of its effect': by[:, None]}
 
 
 def discrepancy(
@@ -272,21 +387,33 @@ def notes_of_discrepancies(found: Mapping[str, Discrepancy]) -> list[Note]:
 
 
 def _words(one: Discrepancy) -> str:
-    left = f"{one.rms:.2g} {one.unit} of what the fit leaves is "
+    of = "loads" if one.specimens else "displacements"
+    left = f"{one.rms:.2g} {one.unit} of what the fit leaves, {_percent(one.share)} of the {of}, is"
     chance = f"chance gives {one.largest:.3g} in one of a hundred"
-    wrong = "the form of the law or the model is wrong"
-    off = "and the moduli are off by more than their bands say"
-    if one.specimens:
-        return (
-            f"{left}alike in all {one.specimens} specimens (Hotelling's F is {one.ratio:.3g}; "
-            f"{chance}): {wrong} (moduli that depend on more than their own strain, gauge lengths, "
-            f"a preload), {off}"
-        )
-    return (
-        f"{left}smooth over the whole sheet ({one.ratio:.3g} times the power that noise has in "
-        f"such shapes; {chance}): {wrong} (thickness option, axes, pressures, a sheet taken for "
-        f"flat), {off}"
+    where = (
+        f"alike in all {one.specimens} specimens (Hotelling's F is {one.ratio:.3g}; {chance})"
+        if one.specimens
+        else f"smooth over the whole sheet ({one.ratio:.3g} times the power that noise has in such "
+        f"shapes; {chance})"
     )
+    named = " or ".join(
+        f"{cause.words} ({100 * cause.share:.0f} % of it explained; moduli would change by up to "
+        f"{_percent(round(cause.moves, 3))})"
+        for cause in one.named
+    )
+    if named:
+        return f"{left} {where}; it has the shape of {named}"
+    share = max((cause.share for cause in one.causes), default=0.0)
+    known = f" (known causes explain at most {100 * share:.0f} %)" if one.causes else ""
+    sheet = "" if one.specimens else ", or [bubble.sheet] for a sheet that was not flat"
+    return (
+        f"{left} {where}: the form of the law or the model is wrong{known}, and the moduli are off "
+        f"by more than their bands say; try another form (bubblefit compare){sheet}"
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.{2 if share < 0.1 else 3}g} %"
 
 
 #: Shapes that are tested, at most, and degrees of polynomials among which they are found.
@@ -297,10 +424,11 @@ NOTHING, LEFT = 1e-6, 1e-3
 
 
 def differences_of_all(
-    problem: FitProblem, residual: Array, jacobian: Array | None
+    problem: FitProblem, residual: Array, best: Evaluation, effect: Effect | None = None
 ) -> dict[str, Discrepancy]:
     """Return discrepancies of the comparisons with values of several specimens along a curve."""
     found: dict[str, Discrepancy] = {}
+    jacobian = best.jacobian
     if jacobian is None:
         return found
     for k, comparison in enumerate(problem.comparisons):
@@ -313,19 +441,27 @@ def differences_of_all(
         off, slopes = residual[rows] * scale, jacobian[rows] * scale[:, None]
         some = [np.flatnonzero(whose == number) for number in np.unique(whose)]
         left, places, steep = ([v[own] for own in some] for v in (off, at[:, 0], slopes))
-        one = alike_in_all(left, places, steep, objective.unit)
+        known = objective.causes(best.histories[k]) if hasattr(objective, "causes") else {}
+        order = np.concatenate(some)
+        causes = {words: (own * scale[:, None])[order] for words, own in known.items()}
+        one = alike_in_all(left, places, steep, objective.unit, causes, effect)
         if one is not None:
-            found[comparison.name] = one
+            found[comparison.name] = replace(one, share=_share(one, objective))
     return found
 
 
 def alike_in_all(
-    residuals: Sequence[Array], places: Sequence[Array], slopes: Sequence[Array], unit: str
+    residuals: Sequence[Array],
+    places: Sequence[Array],
+    slopes: Sequence[Array],
+    unit: str,
+    causes: Mapping[str, Array] | None = None,
+    effect: Effect | None = None,
 ) -> Discrepancy | None:
     """Return what specimens have in common beside the model and what no unknown can follow.
     residuals : (n,) of each specimen, model less measured, in `unit`s. places : (n,) along its
-    curve. slopes : (n, unknowns). None with fewer than three specimens that cover most of the
-    curve."""
+    curve. slopes : (n, unknowns). causes : of all, see `ranked_causes`. None with fewer than
+    three specimens that cover most of the curve."""
     low, high = (end(end(own) for own in places) for end in (min, max))
     if not high > low:
         return None
@@ -360,7 +496,8 @@ def alike_in_all(
     square = specimens * float(mean @ np.linalg.solve(spread, mean))
     ratio = square * (specimens - count) / (count * (specimens - 1))
     largest = float(fdtri(count, specimens - count, 1 - FALSE_ALARMS))
-    return Discrepancy(ratio, largest, rms, unit, specimens=specimens)
+    why = ranked_causes(common, whole, causes or {}, effect)
+    return Discrepancy(ratio, largest, rms, unit, specimens=specimens, causes=why)
 
 
 def _beside(slopes: Array, along: Array, count: int) -> Array:

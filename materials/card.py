@@ -2,13 +2,15 @@
 
 Format 2 names its form and what the form needs (`breaks`, `knots`). Format 3 also has
 `[certainty]`: independent directions whose products add up to the covariance of the free
-coefficients. A file without `format` is of format 1: cubics, and tri-linear laws by their breaks.
+coefficients, and `[certainty.band]`, the ends of the fit's band of each modulus. A file without
+`format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
+import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -47,11 +49,13 @@ TRIES = 200
 class CardCertainty:
     """The uncertainty that a fit leaves in its law; words : what is in it, and of what.
 
-    directions : (k, free) MPa, one standard deviation each; the least certain first.
+    directions : (k, free) MPa, one standard deviation each; the least certain first. bands : (3, n)
+    by modulus, strain and ends of the fit's own band in MPa; empty where the card has none.
     """
 
     directions: Array
     words: str = ""
+    bands: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def covariance(self) -> Array:
@@ -64,7 +68,13 @@ class CardCertainty:
         return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
 
     def band(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> tuple[Array, Array]:
-        """Return (n,) MPa each, lower and upper end of 95 % of a modulus; none is below zero."""
+        """Return (n,) MPa each, lower and upper end of 95 % of a modulus; none is below zero.
+
+        They are the fit's own where the card has them, else by `sigma`.
+        """
+        if name in self.bands:
+            strains, *ends = self.bands[name]
+            return band_at(strains, ends, strain, law.modulus(name, strain))
         modulus, off = law.modulus(name, strain), BAND * self.sigma(law, name, strain)
         return np.maximum(modulus - off, 0.0), modulus + off
 
@@ -91,7 +101,20 @@ class CardCertainty:
         return drawn
 
 
-def certainty_of(law: HypoelasticLaw, coefficients: Array, words: str = "") -> CardCertainty:
+def band_at(
+    strains: Array, ends: Sequence[Array], strain: ArrayLike, modulus: ArrayLike
+) -> tuple[Array, Array]:
+    """Return the ends at strains (n,) of a band known at some; a modulus (n,) is always inside."""
+    lower, upper = (np.interp(np.asarray(strain, dtype=float), strains, end) for end in ends)
+    return np.minimum(lower, modulus), np.maximum(upper, modulus)
+
+
+def certainty_of(
+    law: HypoelasticLaw,
+    coefficients: Array,
+    words: str = "",
+    bands: Mapping[str, Array] | None = None,
+) -> CardCertainty:
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
     relative = np.vstack(
@@ -104,7 +127,7 @@ def certainty_of(law: HypoelasticLaw, coefficients: Array, words: str = "") -> C
     )
     _, sizes, turned = np.linalg.svd(relative @ spread.T, full_matrices=False)
     kept = turned[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
-    return CardCertainty(np.asarray(kept @ spread), words)
+    return CardCertainty(np.asarray(kept @ spread), words, bands or {})
 
 
 def strains_of(law: HypoelasticLaw) -> dict[str, Array]:
@@ -186,7 +209,19 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         content["certainty"] = {"of": sure.words, "directions": directions}
     words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
     header = "".join(f"# {line}\n" for line in words)
-    write_text(path, header + tomli_w.dumps(content))
+    write_text(path, header + tomli_w.dumps(content) + _bands_text(sure, scale))
+
+
+def _bands_text(sure: CardCertainty | None, scale: float) -> str:
+    """Return `[certainty.band]`, a line a modulus, which is shorter than a line a number."""
+    if sure is None or not sure.bands:
+        return ""
+    lines = ["", "[certainty.band]"]
+    for name, (strain, *ends) in sure.bands.items():
+        columns = [strain, *(end / scale for end in ends)]
+        rows = [[float(f"{v:.7g}") for v in column] for column in columns]
+        lines.append(f"{name} = {json.dumps(rows)}")
+    return "\n".join(lines) + "\n"
 
 
 def _numbers(value: Any) -> list[float]:
@@ -228,11 +263,23 @@ class ValidStrain(Section):
     shear: End = UNLIMITED
 
 
+Band = Annotated[list[Numbers], Field(min_length=3, max_length=3)]
+
+
+class BandFile(Section):
+    """Strains, lower and upper ends of the 95 % band of each modulus, in `unit`."""
+
+    E1: Band
+    E2: Band
+    G12: Band
+
+
 class CertaintyFile(Section):
-    """Steps of the free coefficients, one standard deviation each, in `unit`."""
+    """Steps of the free coefficients, one standard deviation each, and the band, in `unit`."""
 
     of: str = ""
     directions: list[Numbers]
+    band: BandFile | None = None
 
 
 class CardFile(Section):
@@ -301,7 +348,26 @@ def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
     directions = np.array(file.certainty.directions).reshape(-1, free) * UNITS[file.unit]
     if not np.isfinite(directions).all():
         raise InputError(None, "certainty.directions", f"too large for {file.unit}")
-    return CardCertainty(directions, file.certainty.of)
+    return CardCertainty(directions, file.certainty.of, _bands(file))
+
+
+def _bands(file: CardFile) -> dict[str, Array]:
+    """Return strain and ends in MPa by modulus; InputError where they make no band."""
+    assert file.certainty is not None
+    if file.certainty.band is None:
+        return {}
+    bands = {}
+    for name, rows in file.certainty.band:
+        try:
+            strain, lower, upper = np.array(rows)
+            good = len(strain) > 0 and (np.diff(strain) >= 0).all() and (lower <= upper).all()
+        except ValueError:
+            good = False
+        if not good:
+            problem = "expected rising strains, lower and upper ends, as many of each"
+            raise InputError(None, f"certainty.band.{name}", problem)
+        bands[name] = np.array([strain, lower * UNITS[file.unit], upper * UNITS[file.unit]])
+    return bands
 
 
 def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

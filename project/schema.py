@@ -117,7 +117,7 @@ class FitSection(Section):
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
     unknowns: UnknownsSection = UnknownsSection()
-    mesh_error: Literal["told", "taken out"] = "told"
+    mesh_error: Literal["told", "taken out"] = "taken out"
     cache: bool | Name = True
 
 

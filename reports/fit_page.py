@@ -455,7 +455,7 @@ def _moduli(fit: Fit, folder: Path) -> Charts:
     if sure is not None and sure.band:
         band = np.array(
             [
-                [np.interp(x, sure.strain[name], end) for end in sure.band[name]]
+                sure.ends(name, x, fit.law.modulus(name, x)) or ()
                 for name, x in zip(COMPONENTS, strains, strict=True)
             ]
         ).transpose(1, 0, 2)

@@ -40,7 +40,8 @@ from .simulation import GivenCard, card_of, card_words, fitted_card
 from .starts import StartRecord
 
 #: Kinds of notes that are made here.
-MESH = NoteKind("mesh error", weight=5)
+MESH = NoteKind("mesh error", weight=16)
+UNKNOWN = NoteKind("mesh error not known", weight=5)
 TAKEN_OUT = NoteKind("mesh error taken out")
 NOT_THE_CARD = NoteKind("not where the card is")
 
@@ -150,8 +151,8 @@ def _repeated(
 FINER = 2.0
 #: Values of `fit.mesh_error`.
 TOLD, CORRECTED = "told", "taken out"
-#: Relative error of a modulus that needs no note, whatever the noise.
-LEAST = 0.01
+#: Relative error of a modulus that needs no note, whatever the noise; one that is rounding.
+LEAST, NOTHING = 0.01, 1e-4
 
 
 def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
@@ -174,26 +175,28 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
     return limit_of(problem, best.differentiated, residual, FINER)
 
 
-def notes_of_mesh(sure: Certainty, mesh: dict[str, Array]) -> list[Note]:
-    """Return a note a modulus that the mesh moves by more than the noise, where most."""
+def notes_of_mesh(sure: Certainty) -> list[Note]:
+    """Return a note a modulus in which the mesh has a larger share than the noise, where most."""
+    assert sure.mesh is not None
     notes = []
-    for name in COMPONENTS:
-        beyond = np.abs(mesh[name]) - np.maximum(sure.sigma[name], LEAST)
+    for name, share in sure.of_mesh.items():
+        beyond = share - np.maximum(sure.sigma[name], LEAST)
         worst = int(beyond.argmax())
         if beyond[worst] > 0:
-            strain, by = sure.strain[name][worst], 100 * mesh[name][worst]
-            words = (
-                f"on a fine mesh {name} would be {by:+.2g} % at {100 * strain:.3g} % of strain, "
-                f"more than the noise makes uncertain ({100 * sure.sigma[name][worst]:.2g} %): "
-                "more elements help"
-            )
+            by = _signed(sure.mesh[name][worst])
+            at = f"at {100 * sure.strain[name][worst]:.3g} % of strain"
+            words = f"on a fine mesh {name} would be {by} {at},"
+            if sure.taken_out:
+                words = f"the mesh moved {name} {at}: {by} is taken out, and what may be left is"
+            noise = f"{100 * sure.sigma[name][worst]:.2g} %"
+            words += f" more than the noise makes uncertain ({noise}): more elements help"
             notes.append(Note(MESH, words))
     return notes
 
 
 def note_of_limit(mesh: dict[str, Array]) -> Note:
     """Return the note that the card is not that of the mesh of the fit."""
-    by = ", ".join(f"{name} {100 * off[np.abs(off).argmax()]:+.2g} %" for name, off in mesh.items())
+    by = ", ".join(f"{name} {_signed(off[np.abs(off).argmax()])}" for name, off in mesh.items())
     words = (
         f"the error of the mesh is taken out of the moduli ({by} at most): the card is the law of "
         "ever finer meshes, to first order; objective, residuals and what is drawn of the tests "
@@ -202,28 +205,38 @@ def note_of_limit(mesh: dict[str, Array]) -> Note:
     return Note(TAKEN_OUT, words)
 
 
+def _signed(share: float) -> str:
+    return f"{100 * share:+.{0 if abs(share) >= 0.1 else 2}{'f' if abs(share) >= 0.1 else 'g'}} %"
+
+
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """Return the best fit with its certainty, if its derivatives are known.
 
-    Noise is the residual of finer models. With `mesh_error` taken out the law is that of ever finer
-    meshes; the analysis stays that of the fit.
+    Noise is the residual of finer models. With `mesh_error` taken out, and where the mesh moves
+    anything, the law is that of ever finer meshes; the analysis stays that of the fit.
     """
     slopes = best.differentiated
     if slopes is None:
         return best
-    out = setup.project.fit.mesh_error == CORRECTED
+    settings = setup.project.fit
+    out = settings.mesh_error == CORRECTED
     limit, notes = _limit(setup, problem, best)
     law = best.law
-    if limit is None and out:
-        notes.append(Note(MESH, NOT_TAKEN_OUT))
-    elif limit is not None and out:
+    if limit is None and out and "mesh_error" in settings.model_fields_set:
+        notes.append(Note(UNKNOWN, NOT_TAKEN_OUT))
+    if limit is not None and (np.abs(limit.step) <= NOTHING * np.abs(slopes.unknowns)).all():
+        out = False
+    out = out and limit is not None
+    if limit is not None and out:
         law = problem.unknowns.law(law, slopes.unknowns + limit.step)
     sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit, out)
     if sure.mesh is not None:
-        notes += [note_of_limit(sure.mesh)] if out else notes_of_mesh(sure, sure.mesh)
+        notes += notes_of_mesh(sure)
+        if out and max(np.abs(off).max() for off in sure.mesh.values()) > LEAST:
+            notes.append(note_of_limit(sure.mesh))
     if sure.order is not None:
         notes += sure.order.notes
     told = (*sure.undetermined, *notes)
@@ -260,7 +273,7 @@ def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit |
         return limit_of_meshes(setup, problem, best), []
     except (InputError, SolverFailure) as error:
         words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
-        return None, [Note(MESH, words)]
+        return None, [Note(UNKNOWN, words)]
 
 
 #: Number of draws for the certainty of a card.
@@ -282,7 +295,8 @@ def card_certainty(
     drawn = known.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
-    return certainty_of(law, drawn @ unknowns.to_coefficients.T, words)
+    bands = {name: np.array([sure.strain[name], *ends]) for name, ends in sure.band.items()}
+    return certainty_of(law, drawn @ unknowns.to_coefficients.T, words, bands)
 
 
 #: A card, its file or its name; None for that of the project's fit.

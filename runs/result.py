@@ -191,8 +191,8 @@ class Fit:
             if sure is not None:
                 at = sure.strain[name]
                 sigma, noise = (np.interp(strain, at, s[name]) for s in (sure.total, sure.sigma))
-                if name in sure.band:
-                    lower, upper = (np.interp(strain, at, end) for end in sure.band[name])
+                if (ends := sure.ends(name, strain, self.law.modulus(name, strain))) is not None:
+                    lower, upper = ends
                 if sure.mesh is not None:
                     mesh = np.interp(strain, at, sure.mesh[name])
             columns = {
@@ -313,10 +313,8 @@ def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
     def at(values: np.ndarray) -> float:
         return float(np.interp(strain, sure.strain[name], values))
 
-    band = None
-    if name in sure.band:
-        lower, upper = sure.band[name]
-        band = at(lower), at(upper)
+    ends = sure.ends(name, strain, np.array(value))
+    band = None if ends is None else (float(ends[0]), float(ends[1]))
     return Answer(name, strain, value, per_width, at(sure.total[name]), band, end)
 
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -184,12 +185,56 @@ class FieldObjective:
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from d displacement (frames, nodes, 3, parameters)."""
-        count = slope.shape[-1]
-        parts = self._varying([target.of(slope, k) for k, target in enumerate(self.targets)])
-        every = zip(parts, self.scales, strict=True)
+        return self._columns([target.of(slope, k) for k, target in enumerate(self.targets)])
+
+    def _columns(self, parts: list[Array]) -> Array:
+        """Return (m, k) of changes (n, 3, k) of the model's displacement of each target."""
+        every = zip(self._varying(parts), self.scales, strict=True)
         return np.concatenate(
-            [(p / s[:, None]).swapaxes(0, 1).reshape(-1, count) for p, s in every]
+            [(p / s[:, None]).swapaxes(0, 1).reshape(-1, p.shape[-1]) for p, s in every]
         )
+
+    @property
+    def measured_rms(self) -> float:
+        """Return the RMS of the measured displacements, mm."""
+        return float(np.sqrt(np.mean(np.concatenate([t.displacement for t in self.targets]) ** 2)))
+
+    def causes(self, history: History) -> dict[str, Array]:
+        """Return (m, k) a cause, by its words, slopes of the residual by its amounts.
+
+        Of the model's own field u(x) at pressure p: a place is off by d where u is read at x + d; a
+        larger disk has R u(x / R, R p); turned axes turn places and u, a tilted plane u alone.
+        """
+        pressures = [0.0, *(target.pressure for target in self.targets)]
+        if not self.places or len(pressures) < 3 or not (np.diff(pressures) > 0).all():
+            return {}
+        moved = history.displacement
+        frames = [k if t.frame is None else t.frame for k, t in enumerate(self.targets)]
+        # By the logarithm of the pressure: a flat sheet rises with a power of it.
+        logs, by_pressure = np.log(pressures[1:]), np.zeros_like(moved)
+        order: Literal[1, 2] = 2 if len(logs) > 2 else 1
+        by_pressure[frames] = np.gradient(moved[frames], logs, axis=0, edge_order=order)
+        parts: dict[str, list[Array]] = {}
+        for k, target in enumerate(self.targets):
+            assert target.at_rest is not None
+            x, y = target.at_rest.T
+            u, by_p = target.of(moved, k), target.of(by_pressure, k) / target.pressure
+            by_x, by_y = _slopes(target.at_rest, u)
+            (dx, dy, dz), none = u.T, np.zeros(len(u))
+            degree, p = np.pi / 180, target.pressure
+            turned = np.stack([-dy, dx, none], axis=1) + y[:, None] * by_x - x[:, None] * by_y
+            larger = u - x[:, None] * by_x - y[:, None] * by_y + p * by_p
+            tilts = np.stack([none, -dz, dy], axis=1), np.stack([dz, none, -dx], axis=1)
+            for words, columns in {
+                "a true radius {:+.1%} away (compare it with the clamp)": [larger],
+                "a centre at {:+.2g}, {:+.2g} mm (registration.centre)": [-by_x, -by_y],
+                "a tilt of {:+.2g}, {:+.2g} degrees (registration.plane)":
+                    [degree * one for one in tilts],
+                "axes turned by {:+.2g} degrees (registration.warp)": [degree * turned],
+                "pressures off by {:+.2g} kPa (nuisance.pressure_offset)": [-1e-3 * by_p],
+            }.items():  # fmt: skip
+                parts.setdefault(words, []).append(np.stack(columns, axis=-1))
+        return {words: self._columns(own) for words, own in parts.items()}
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
         """Return (m, names), the slope of the residual by offset_x, offset_y, offset_z (mm)."""
@@ -206,6 +251,27 @@ class FieldObjective:
         """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""
         parts = self.differences(displacement, nuisance)
         return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())
+
+
+#: Degree of the polynomials in x and y whose slopes are those of a field, and a small step.
+DEGREE, SMALL = 8, 1e-4
+
+
+def _slopes(places: Array, values: Array) -> tuple[Array, Array]:
+    """Return the slopes (n, 3) of values (n, 3) at places (n, 2) by x and by y."""
+    size = float(np.abs(places).max())
+
+    def shapes(at: Array) -> Array:
+        x, y = (legvander(one, DEGREE) for one in (at / size).T)
+        return np.asarray((x[:, :, None] * y[:, None]).reshape(len(at), -1))
+
+    amplitude = np.linalg.lstsq(shapes(places), values, rcond=1e-6)[0]
+    step = SMALL * size * np.eye(2)
+    by_x, by_y = (
+        (shapes(places + one) - shapes(places - one)) @ amplitude / (2 * SMALL * size)
+        for one in step
+    )
+    return by_x, by_y
 
 
 #: Of the points on the disk, and of its radius covered: less is taken for a wrong unit.

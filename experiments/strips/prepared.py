@@ -76,7 +76,9 @@ class LoadObjective:
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         from scipy.interpolate import CubicSpline
 
-        self.sample = CubicSpline(knots, np.eye(len(knots)))(self.elongation)[:, 1:]
+        curve = CubicSpline(knots, np.eye(len(knots)))
+        self.sample = curve(self.elongation)[:, 1:]
+        self.steep = curve(self.elongation, 1)[:, 1:]
         self.sizes = (len(self.load),)
         self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
@@ -121,6 +123,21 @@ class LoadObjective:
         if history.load_slope is None:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
         return np.asarray(self.sample @ history.load_slope / self._unit)
+
+    @property
+    def measured_rms(self) -> float:
+        """Return the RMS of the measured loads, N."""
+        return float(np.sqrt(np.mean(self.load**2)))
+
+    def causes(self, history: History) -> dict[str, Array]:
+        """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
+        slope = self.steep @ history.load / self._unit
+        return {
+            "loads off by {:+.2g} N (zero the load cell, name the preload)":
+                np.full((len(self.load), 1), 1.0 / self._unit),
+            "elongations off by {:+.2g} mm (count them from the preload)": -slope[:, None],
+            "a gauge length off by {:+.1%} (measure it)": (slope * self.elongation)[:, None],
+        }  # fmt: skip
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
         """Return (n, 0): a load curve has no nuisance unknowns."""

@@ -18,7 +18,7 @@ from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
 from bubblefit.inference.assessment import BOUND, UNCERTAIN
 from bubblefit.inference.noise import ABOVE_NOISE, DISCREPANCY, Misfit
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.best import MESH
+from bubblefit.runs.best import MESH, UNKNOWN
 from bubblefit.runs.result import ALONE, STARTS, Answer, answers
 
 from ..commands import in_process as quick
@@ -235,11 +235,11 @@ def test_the_misfit_stands_beside_the_noise():
 
 
 def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
-    wrong = [DISCREPANCY, UNSTABLE, ABOVE_NOISE, DOUBTFUL, FLAT_SHEET, SURFACES]
-    unsure = [BOUND, UNCERTAIN, MESH]
+    wrong = [MESH, DISCREPANCY, UNSTABLE, ABOVE_NOISE, DOUBTFUL, FLAT_SHEET, SURFACES]
+    unsure = [BOUND, UNCERTAIN, UNKNOWN]
     weights = [kind.weight for kind in (*wrong, *unsure, STARTS)]
     assert weights == sorted(weights, reverse=True)
-    notes = [Note(STARTS, "one"), Note(MESH, "two"), Note(DISCREPANCY, "three")]
+    notes = [Note(STARTS, "one"), Note(UNKNOWN, "two"), Note(DISCREPANCY, "three")]
     for order in permutations(notes):
         assert foremost(order) == "three"
     assert foremost([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == "it"
@@ -248,7 +248,7 @@ def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
 
 
 def test_one_warning_and_how_many_more(tmp_path):
-    notes = [Note(STARTS, "some failed"), Note(BOUND, "E1 touches", "two"), Note(MESH, "m")]
+    notes = [Note(STARTS, "some failed"), Note(BOUND, "E1 touches", "two"), Note(UNKNOWN, "m")]
     warning, more = warning_lines(notes, tmp_path)
     assert warning == "warning: two: E1 touches"
     assert more.startswith("2 further notes: ") and str(tmp_path / "notes.csv") in more

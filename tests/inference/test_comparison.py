@@ -1,6 +1,7 @@
 """Comparisons, shared unknowns, specimens and folds."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,13 @@ from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.noise import DISCREPANCY, Noise, alike_in_all, notes_of_discrepancies
+from bubblefit.inference.noise import (
+    DISCREPANCY,
+    Noise,
+    alike_in_all,
+    differences_of_all,
+    notes_of_discrepancies,
+)
 from bubblefit.inference.problem import FitProblem, folds_of
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.meshes.bubble_model import BubbleModel
@@ -335,6 +342,47 @@ def test_a_wrong_form_is_told():
     (note,) = notes_of_discrepancies({"strips: warp": ten[0]})
     assert (note.kind, note.of) == (DISCREPANCY, "strips: warp")
     assert f"{ten[0].rms:.2g} N " in note and "all 10 specimens" in note
+
+
+def judged_strips(off, load, elongation):
+    """Six strips of F = 100 x + 20 x^3 (N, mm), read `off` by a load and an elongation."""
+    knots, random = np.linspace(0.25, 3.5, 14), np.random.default_rng(2)
+    model = SimpleNamespace(load=off * (100 * knots + 20 * knots**3))
+    x, count = np.tile(PLACES, 6), np.repeat(np.arange(6), len(PLACES))
+    places = x + elongation
+    scatter = 0.02 * (np.stack([x**0, x**2], axis=1) * random.standard_normal((6, 2))[count]).sum(1)
+    measured = off * (100 * places + 20 * places**3) + load + scatter
+    objective = LoadObjective(knots, x, measured, specimens=count)
+    slopes = np.column_stack([x, x**3]) / objective.scale[:, None]
+    problem = SimpleNamespace(
+        comparisons=[SimpleNamespace(name="warp", objective=objective)],
+        rows=lambda _: slice(None), scale=objective.scale,
+    )  # fmt: skip
+    best = SimpleNamespace(jacobian=slopes, histories=[model])
+    return differences_of_all(problem, objective.residual(model), best, lambda step: 0.0)["warp"]
+
+
+@pytest.mark.parametrize(
+    ("load", "elongation", "words"),
+    [(0.0, 0.2, "elongations off by -0.2 mm"), (15.0, 0.0, "loads off by +15 N")],
+)
+def test_what_all_specimens_have_in_common_points_to_its_cause(load, elongation, words):
+    one = judged_strips(1.0, load, elongation)
+    assert one.significant and one.specimens == 6
+    first, *others = one.causes
+    assert words in first.words and first.share > 0.9
+    assert all(other.share < first.share for other in others)
+    (note,) = notes_of_discrepancies({"warp": one})
+    assert words in note
+
+
+def test_what_is_small_beside_the_load_is_no_warning():
+    """Beyond chance, but 0.3 N: told of strips that carry 3 N, not of those that carry 3000."""
+    small, large = judged_strips(10.0, 0.3, 0.0), judged_strips(0.01, 0.3, 0.0)
+    assert small.systematic and small.ratio > 5 * small.largest
+    assert small.share < 1e-3 and not small.significant
+    assert not notes_of_discrepancies({"warp": small})
+    assert large.share > 0.02 and large.significant
 
 
 def test_what_the_law_can_follow_is_no_wrong_form():

@@ -21,7 +21,7 @@ from bubblefit.materials.card import (
     write_card,
 )
 from bubblefit.materials.exports.base import BAND_COLUMNS
-from bubblefit.materials.forms.base import UNLIMITED, form_named
+from bubblefit.materials.forms.base import COMPONENTS, UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, LoadRatio
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
@@ -255,7 +255,9 @@ def test_drawn_laws_have_the_covariance_and_positive_moduli():
 def test_a_card_keeps_its_certainty(tmp_path, unit):
     law, path = quadratic(), tmp_path / "card.toml"
     words = words_of(["bubble 1", "strips"], 4321, mesh=True)
-    card = MaterialCard(law, 0.8, "made", "", certainty_of(law, drawn(law, 50)[0], words))
+    bands = {n: np.array([[0, 0.1], [3, 4], [500, 900]]) for n in COMPONENTS}
+    sure = certainty_of(law, drawn(law, 50)[0], words, bands)
+    card = MaterialCard(law, 0.8, "made", "", sure)
     write_card(card, path, unit)
     content = tomllib.loads(path.read_text())
     assert content["format"] == 3
@@ -264,6 +266,10 @@ def test_a_card_keeps_its_certainty(tmp_path, unit):
     again = read_card(path).certainty
     np.testing.assert_allclose(again.directions, card.certainty.directions, rtol=1e-14)
     assert again.words == words
+    # The fit's own ends, between its strains; the law's own modulus is never outside.
+    assert np.ravel(again.band(law, "E1", [0.05])) == pytest.approx([3.5, 700])
+    stiff = law.with_beta(1e3 * law.beta)
+    assert float(again.band(stiff, "E1", [0.05])[1][0]) == float(stiff.E1(0.05))
     write_card(MaterialCard(law, 0.8, "made"), path)
     assert tomllib.loads(path.read_text())["format"] == 2 and read_card(path).certainty is None
 
@@ -275,11 +281,14 @@ def test_a_card_keeps_its_certainty(tmp_path, unit):
         ("1.0, 2.0", "1.0", r"certainty.directions\[0\]: expected 3 numbers, .* got 2"),
         ("1.0, 2.0", "1.0, nan", "certainty.directions"),
         ("directions", "direction", "certainty.direction"),
+        ("E1 = [[0.0, 0.1]", "E1 = [[0.1, 0.0]", "certainty.band.E1: expected rising strains"),
+        ("[3.0, 4.0], [500", "[3.0], [500", "certainty.band.E1: expected .* as many of each"),
     ],
 )
 def test_a_certainty_that_is_none_is_refused(tmp_path, old, new, field):
     law, path = HypoelasticLaw.linear(300.0, 200.0, 10.0), tmp_path / "card.toml"
-    sure = CardCertainty(np.array([[0.5, 1.0, 2.0]]))
+    bands = {n: np.array([[0, 0.1], [3, 4], [500, 900]]) for n in COMPONENTS}
+    sure = CardCertainty(np.array([[0.5, 1.0, 2.0]]), "", bands)
     write_card(MaterialCard(law, 0.8, "made", "", sure), path, "MPa")
     text = path.read_text().replace("1.0,\n        2.0", "1.0, 2.0")
     assert old in text, text

@@ -95,7 +95,19 @@ def notes_of_mesh(*_: Any) -> Iterable[Note]:
     strain = {name: np.array([0.0, 0.05]) for name in COMPONENTS}
     sigma = {name: np.full(2, 0.01) for name in COMPONENTS}
     mesh = {name: np.array([0.0, 0.04 * (name == "E1")]) for name in COMPONENTS}
-    return mesh_error.notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
+    return mesh_error.notes_of_mesh(Certainty({}, strain, sigma, (), mesh))
+
+
+def notes_of_no_mesh(_: Path, monkeypatch: pytest.MonkeyPatch) -> Iterable[Note]:
+    """A finer mesh that cannot be run."""
+    failure = SolverFailure("it breaks", "membrane")
+    monkeypatch.setattr(mesh_error, "limit_of_meshes", lambda *_: raise_(failure))
+    none: Any = None
+    return mesh_error._limit(none, none, none)[1]
+
+
+def raise_(error: Exception) -> None:
+    raise error
 
 
 def notes_of_form(*_: Any) -> Iterable[Note]:

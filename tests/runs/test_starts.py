@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from io import StringIO
 from types import SimpleNamespace
 
 import bubblefit as bf
@@ -14,12 +15,16 @@ from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
+from bubblefit.materials.card import read_card
+from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.project.schema import FitSection
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs import fit as stages
 from bubblefit.runs import starts as room
-from bubblefit.runs.best import MESH, TAKEN_OUT, notes_of_mesh, with_certainty
+from bubblefit.runs.best import MESH, TAKEN_OUT, UNKNOWN, notes_of_mesh, with_certainty
 from bubblefit.runs.fit import distinct, moduli_apart, one_fit
+from bubblefit.runs.result import answers
 from bubblefit.runs.setup import coarse_problem
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord, run_start
 
@@ -389,6 +394,7 @@ def known(elements):
     project = bf.read_project(KNOWN).with_fit(starts=1)
     (test,) = project.tests.values()
     case = replace(test, elements=COARSE, data=replace(test.data, elements=elements))
+    project = project.with_fit(mesh_error="told")
     return bf.fit(replace(project, tests={test.name: case}))
 
 
@@ -450,9 +456,15 @@ def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
     sigma = {"E1": [0.02, 0.03, 0.03], "E2": [0.001] * 3, "G12": [0.5] * 3}
     mesh = {"E1": [0.01, -0.044, 0.031], "E2": [0.009] * 3, "G12": [-0.4] * 3}
     sigma, mesh = ({n: np.array(v) for n, v in of.items()} for of in (sigma, mesh))
-    (note,) = notes_of_mesh(Certainty({}, strain, sigma, ()), mesh)
+    told = Certainty({}, strain, sigma, (), mesh)
+    (note,) = notes_of_mesh(told)
     assert note.kind is MESH
-    assert "E1" in note and "-4.4 %" in note and "0.050" in note and "(3 %)" in note
+    assert "E1" in note and "-4.4 %" in note and "5 % of" in note and "(3 %)" in note
+    # Of what is taken out a tenth may be left, of the modulus that is reported.
+    assert not notes_of_mesh(replace(told, taken_out=True))
+    large = {**mesh, "E1": np.array([0.0, 0.5, 1.0])}
+    (note,) = notes_of_mesh(replace(told, taken_out=True, mesh=large))
+    assert (note.kind, note.kind.weight) == (MESH, 16) and "+100 %" in note and "(3 %)" in note
 
 
 class Unable:
@@ -478,7 +490,7 @@ def test_where_it_cannot_be_known(off, monkeypatch):
         monkeypatch.setattr(mesh_error, "residual_of", lambda *_, e=error: (_ for _ in ()).throw(e))
         sure = again().certainty
         assert sure.mesh is None and sure.total == sure.sigma
-        assert sure.undetermined[-1].kind is MESH
+        assert sure.undetermined[-1].kind is UNKNOWN
         assert str(sure.undetermined[-1]).startswith("the error of the mesh is not known: ")
 
 
@@ -496,12 +508,51 @@ def test_what_the_mesh_leaves_is_no_noise(off):
         residual_of(problem, problem.comparisons * 2, best, off.law)
 
 
-def test_the_error_is_taken_out_where_the_project_says_so(off):
-    fitted = off
-    settings = fitted.project.fit.model_copy(update={"mesh_error": "taken out"})
-    setup = replace(fitted.setup, project=replace(fitted.project, fit=settings))
+def corrected(fitted):
+    """The same fit by default: what the mesh moves is taken out."""
+    setup = replace(
+        fitted.setup, project=fitted.project.with_fit(mesh_error=FitSection().mesh_error)
+    )
     plain = replace(fitted.best, certainty=None)
-    best = with_certainty(setup, fitted.problem, plain)
+    return replace(fitted, setup=setup, best=with_certainty(setup, fitted.problem, plain))
+
+
+def test_the_default_is_nearer_to_the_truth_than_its_mesh(off):
+    (test,) = off.setup.tests
+    for name, (told, out) in {"E1": (0.07, 0.02), "E2": (0.07, 0.02), "G12": (0.2, 0.07)}.items():
+        strain = off.best.certainty.strain[name]
+        true = test.known.modulus(name, strain)
+        for fitted, least, most in ((off, told, 1.0), (corrected(off), 0.0, out)):
+            wrong = np.abs(fitted.law.modulus(name, strain) / true - 1.0).max()
+            assert least < wrong < most, name
+
+
+@pytest.mark.parametrize("change", [lambda fitted: fitted, corrected], ids=["told", "taken out"])
+def test_one_band_in_every_place(off, change, tmp_path):
+    """Card and export, moduli.csv and terminal: the same ends, and the value between them."""
+    fitted = change(off)
+    table, told = fitted.moduli(), answers(fitted)
+    fitted.card.write(tmp_path / "card.toml")
+    card = read_card(tmp_path / "card.toml")
+    beside = pd.read_csv(StringIO(band_table(card)), comment="#")
+    for name in COMPONENTS:
+        mine, export = (t[t["modulus"] == name] for t in (table, beside))
+        for rows in (mine, export):
+            assert (rows["lower_MPa"] <= rows["MPa"]).all()
+            assert (rows["MPa"] <= rows["upper_MPa"]).all()
+        for end in ("lower_MPa", "upper_MPa"):
+            again = np.interp(export["log_strain"], mine["strain"], mine[end])
+            assert export[end].to_numpy() == pytest.approx(again, rel=2e-3)
+        for one in (one for one in told if one.modulus == name):
+            assert one.band[0] <= one.value <= one.band[1]
+            ends = [float(end[0]) for end in card.certainty.band(card.law, name, [one.strain])]
+            assert ends == pytest.approx(one.band, rel=1e-5)
+
+
+def test_the_error_is_taken_out(off):
+    fitted = off
+    again = corrected(fitted)
+    best, plain = again.best, replace(fitted.best, certainty=None)
     told, sure = fitted.best.certainty, best.certainty
     assert sure.taken_out and not told.taken_out
     assert best.point is plain.point and best.objective == fitted.objective
@@ -511,7 +562,8 @@ def test_the_error_is_taken_out_where_the_project_says_so(off):
         moved = best.law.modulus(name, strain) / fitted.law.modulus(name, strain) - 1.0
         assert moved == pytest.approx(told.mesh[name], abs=1e-12)
         # What may be left is a tenth of it; the band is about the card.
-        assert sure.total[name] == pytest.approx(np.hypot(sure.sigma[name], 0.1 * sure.mesh[name]))
+        left = 0.1 * sure.mesh[name] / (1.0 + sure.mesh[name])
+        assert sure.total[name] == pytest.approx(np.hypot(sure.sigma[name], left))
         for which, law in ((sure, best.law), (told, fitted.law)):
             lower, upper = which.band[name]
             own = law.modulus(name, strain)
@@ -521,7 +573,6 @@ def test_the_error_is_taken_out_where_the_project_says_so(off):
     (note,) = [n for n in sure.undetermined if n.kind is TAKEN_OUT]
     assert "is taken out of the moduli (E1 " in note
     assert not [n for n in sure.undetermined if n.kind is MESH]
-    again = replace(fitted, setup=setup, best=best)
     assert again.card.source.endswith(", error of the mesh taken out")
     assert again.law is best.law and again.laws[0] is best.law
     rows = again.moduli().query("modulus == 'E1'")

@@ -1,5 +1,6 @@
 """Cards on a bubble: numbers, lines, table and files of a made-up history."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,6 +25,7 @@ from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.kinds import CardRun, Fabric, Output, Place, Weighting
 from bubblefit.inference.comparison import Blocks
+from bubblefit.inference.noise import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
@@ -425,6 +427,7 @@ files = ["0.csv", "1.csv", "2.csv"]
 columns = { z = "z" }
 [bubble.data.points.registration]
 [fit]
+mesh_error = "told"
 starts = 1
 seed = 3
 jobs = 1
@@ -480,6 +483,7 @@ SYMMETRY
 files = ["a.csv", "b.csv"]
 FILTER
 [fit]
+mesh_error = "told"
 starts = 1
 jobs = 1
 """
@@ -600,3 +604,73 @@ def test_computed_fields_at_the_nodes_of_a_model():
     assert (first.pressure, second.pressure) == (0.1, 0.2) and first.displacement is noisy
     np.testing.assert_allclose(second.displacement, field(mesh.points), atol=0.01)
     np.testing.assert_array_equal(second.displacement[mesh.node_sets["rim"]], 0.0)
+
+
+def given(name):
+    """The field as measured: 1 mm beside the centre, turned by 3, or tilted by 1 degree."""
+    turn = Rotation.from_euler("zy", {"turn": [3, 0], "tilt": [0, 1]}.get(name, [0, 0]), True)
+    beside = np.array([1.0, -0.5]) if name == "centre" else np.zeros(2)
+
+    def moved(one):
+        at = np.column_stack([one.points[:, :2], np.zeros(len(one.points))])
+        at = turn.apply(at)[:, :2] if name == "turn" else at[:, :2]
+        return replace(one, points=at + beside, displacement=turn.apply(one.displacement))
+
+    return moved
+
+
+@pytest.fixture(scope="module")
+def cubic(tmp_path_factory):
+    """Cubic moduli on a full disk of 192 quads, and its fields inside 90 mm with 1 um of noise."""
+    folder, random = tmp_path_factory.mktemp("causes"), np.random.default_rng(0)
+    project = read_project(small(folder, ("elements = 48", "elements = 192"), FULL, FRAMES))
+    (prepared,) = prepare_fit(project, project.chosen(None, fitted=True)).tests
+    seen = []
+    for one in prepared.matched:
+        some = np.hypot(*one.points[:, :2].T) < 90
+        noise = 1e-3 * random.standard_normal((some.sum(), 3))
+        seen.append(
+            replace(one, points=one.points[some], displacement=one.displacement[some] + noise)
+        )
+    return project, tuple(seen)
+
+
+FULL = 'symmetry = "quarter"', 'symmetry = "full"'
+FRAMES = "[22, 59, 97, 132, 186, 251, 300]", "[60, 120, 180, 240, 300]"
+LATE = "[22, 59, 97, 132, 186, 251, 300]", "[65, 125, 185, 245, 305]"
+STRETCHED = 'thickness_change = "constant"', 'thickness_change = "incompressible"'
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words", "amounts"),
+    [
+        ("radius", ("radius = 100.0", "radius = 101.0"), "radius", [-1.0]),
+        ("centre", FULL, "centre", [1.0, -0.5]),
+        ("turn", FULL, "axes", [3.0]),
+        ("tilt", FULL, "tilt", [0.0, 1.0]),
+        ("pressure", LATE, "pressures", [5.0]),
+        ("thickness", STRETCHED, "thickness_change", [100.0]),
+    ],
+)
+def test_the_residual_points_to_its_cause(cubic, tmp_path, name, change, words, amounts):
+    _, seen = cubic
+    frames = () if change is LATE else (FRAMES,)
+    changes = (FULL, *frames) if change is FULL else (FULL, *frames, change)
+    project = read_project(small(tmp_path, ("elements = 48", "elements = 192"), *changes))
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    (own,) = setup.tests
+    fields = [
+        replace(given(name)(one), pressure=p)
+        for one, p in zip(seen, own.test.pressures, strict=True)
+    ]
+    measured = replace(own, fields=tuple(fields), known=None, by_this_model=False)
+    problem = replace(setup, tests=(measured,)).problem()
+    beta = own.known.beta[list(problem.unknowns.free)]
+    point = problem.evaluate(problem.unknowns.at(beta), True)
+    found = discrepancies(problem, point.residual, None, point, lambda step: 0.0)["bubble"]
+    assert found.significant
+    first = found.causes[0]
+    assert words in first.words and first.share > 0.8, found.causes
+    assert all(one.share < 0.5 * first.share for one in found.causes[1:]), found.causes
+    said = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e-\d+)?", first.words)]
+    assert said == pytest.approx(amounts, abs=0.1, rel=0.2)
