@@ -31,7 +31,7 @@ QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
 PLACES = QUANTITIES[:3]
 #: Why rows of a file are not used: what a table of provenance calls it.
 FLAGGED, NEGATIVE_SIGMA = "flagged as doubtful", "sigma below zero"
-ALL_ZERO, LOST = "all zero", "without a value"
+ALL_ZERO, LOST, BELOW = "all zero", "without a value", "a row of words below the points"
 
 
 @dataclass(frozen=True)

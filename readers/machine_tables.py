@@ -79,6 +79,8 @@ def column_of(
     there = ", ".join(name for name in names if name)[:300]
     several = " or ".join(repr(names[i]) for i in which[:6])
     what = f"may be {several}; name one with columns" if which else "is missing"
+    if len(which) > len({names[i] for i in which}) == 1:
+        what = f"{names[which[0]]!r} appears twice, with other numbers; rename one in the file"
     if quantity in named:
         what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
     problem = f"the column of {quantity} {what}; the file has: {there}"

@@ -49,6 +49,11 @@ class TextTable:
             plain = plain.str.replace(self.decimal, ".", regex=False)
         value = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
         bad = ~np.isfinite(value)
+        if bad.any() and any(is_grouped(cell.strip(), self.decimal) for cell in text[bad]):
+            # One cell with both marks says which is which, for the others of its column too.
+            plain = pd.Series([_ungrouped(cell.strip(), self.decimal) for cell in text])
+            value = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
+            bad = ~np.isfinite(value)
         if holes and bad.any():
             # Only of the rows in question: text costs more than numbers.
             bad[bad] = ~text[bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
@@ -223,6 +228,27 @@ _COMMA = re.compile(r"[+-]?\d*+,\d++([eE][+-]?\d++)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
+#: "1 013,5", "1'013.5": no mark of decimals stands before three digits here.
+_BLANKS = re.compile(r"(?<=\d)[ '’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
+
+
+def is_grouped(cell: str, decimal: str) -> bool:
+    """Return whether a cell holds a number whose thousands are marked, beyond any doubt."""
+    other = "," if decimal == "." else "."
+    both = rf"[+-]?[1-9]\d{{0,2}}(\{other}\d{{3}})+\{decimal}\d+"
+    return bool(re.fullmatch(both, cell)) or (
+        bool(_BLANKS.search(cell)) and is_number(_BLANKS.sub("", cell))
+    )
+
+
+def _ungrouped(cell: str, decimal: str) -> str:
+    """Return a number without marks of thousands and with a decimal point; else no number."""
+    cell, other = _BLANKS.sub("", cell), "," if decimal == "." else "."
+    if not re.fullmatch(rf"[+-]?([1-9]\d{{0,2}}(\{other}\d{{3}})+(\{decimal}\d*)?)", cell):
+        return cell.replace(other, "?").replace(decimal, ".")
+    return cell.replace(other, "").replace(decimal, ".")
+
+
 def is_number(cell: str) -> bool:
     """Return whether a cell holds one number, with either mark."""
     return bool(_NUMBER.fullmatch(cell))
@@ -337,12 +363,15 @@ DIRECTION_ALIASES: Mapping[str, str] = {
     **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias diagonal".split(), "bias"),
 }
 #: mm in one of each unit of length, N in one of each unit of load.
-LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3}
-LOAD_UNITS = {"N": 1.0, "kN": 1e3}
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "µm": 1e-3, "μm": 1e-3, "um": 1e-3}
+LOAD_UNITS = {
+    "N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "kgf": 9.80665, "kp": 9.80665,
+    "gf": 9.80665e-3, "lbf": 4.4482216152605,
+}  # fmt: skip
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {
     "kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02, "N/5cm": 0.02,
-    "daN/5cm": 0.2,
+    "daN/5cm": 0.2, "lbf/in": 4.4482216152605 / 25.4,
 }  # fmt: skip
 #: One in each unit of strain.
 STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0, "1": 1.0}
@@ -357,7 +386,7 @@ TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 LONGEST, MOST_NAMES = 300, 2000
 _KNOWN = (
     r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/5cm|daN/5cm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar"
-    "|psi"
+    "|psi|lbf/in|lbf|kgf|daN"
 )
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .frames import (
+    BELOW,
     FLAGGED,
     LENGTHS,
     PIXELS,
@@ -55,7 +56,10 @@ TOP, SAMPLE = 300, 500
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Layout of the numbers in a file; separator None for blanks, header the line of the names."""
+    """Layout of the numbers in a file; separator None for blanks, header the line of the names.
+
+    below : count of rows of means and the like, which are not in the body.
+    """
 
     separator: str | None
     headings: Sequence[Heading]
@@ -63,6 +67,7 @@ class TextLayout:
     header: int
     body: Lines
     decimal: str
+    below: int = 0
 
 
 def cells_of(text: str, separator: str | None) -> list[str] | None:
@@ -110,6 +115,9 @@ def find_layout(
         units, body = plain + units, body[1:]
     headings = [heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
     columns = columns_of(headings, named, upper)
+    total = len(body)
+    while len(body) > 1 and _is_summary(body[-1][1], body[0][1], separator):
+        body = body[:-1]
     if not body:
         problem = "expected a header line and rows of numbers, found only a header line"
         raise InputError(path, f"line {header}", problem)
@@ -118,7 +126,14 @@ def find_layout(
     sample = [(number, cells_of(text, separator) or []) for number, text in body[:SAMPLE]]
     cells = [(number, names[i], row[i]) for number, row in sample for i in wanted if i < len(row)]
     mark = decimal or decimal_mark(path, cells)
-    return TextLayout(separator, headings, columns, header, body, mark)
+    return TextLayout(separator, headings, columns, header, body, mark, total - len(body))
+
+
+def _is_summary(text: str, first: str, separator: str | None) -> bool:
+    """Return whether a row begins with a word, such as "Mean", and the `first` with a number."""
+    word, number = ((cells_of(one, separator) or [""])[0] for one in (text, first))
+    known = word.casefold() in {*HOLES, *WORDS}
+    return word[:1].isalpha() and not known and is_number(number)
 
 
 def _best_header(
@@ -193,6 +208,11 @@ def _one(
         return where[0]
     names = [heading.name for heading in layout.headings]
     may = [names[i] for i in where]
+    if len({*may}) == 1:
+        cells = (cells_of(text, layout.separator) or [] for _, text in layout.body)
+        # A column that comes twice with the same cells is one.
+        if all(len({tuple(row[i : i + 1]) for i in where}) == 1 for row in cells):
+            return where[0]
     if key in named or len({*may}) == 1:
         return _named(path, names, named.get(key) or may[0])
     several = " or ".join(repr(name) for name in may[:6])
@@ -374,7 +394,7 @@ def read_text_rows(
     )
     named = {key: heading.name for key, heading in headings.items()}
     units = {key: heading.unit for key, heading in headings.items() if heading.unit}
-    lost = {FLAGGED: int((~good).sum())}
+    lost = {FLAGGED: int((~good).sum()), BELOW: layout.below}
     whole = FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
     if frame is None:
         return [whole]

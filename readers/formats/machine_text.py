@@ -23,6 +23,7 @@ from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
 from ..tables import (
     DIRECTION_ALIASES,
+    HOLES,
     LENGTH_UNITS,
     LOAD_UNITS,
     MOST_NAMES,
@@ -34,6 +35,7 @@ from ..tables import (
     decimal_mark,
     is_number,
     is_stamp,
+    nearest_to_strip,
     plain_unit,
     read_lines,
     split_unit,
@@ -42,13 +44,19 @@ from ..tables import (
 #: Line number from 1 and cells.
 Rows = list[tuple[int, list[str]]]
 SEPARATORS = ("\t", ";", ",")
+#: Labels of rows that are no readings, in any column.
+STATISTICS = frozenset(
+    "mean average std sd median mittelwert standardabweichung variationskoeffizient".split()
+)
 UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
 _LETTERS = re.compile(r"[^\W\d_]")
 _LETTER = re.compile(r"[^\W\d_eE]")
 
 
 def cells_of(text: str, separator: str) -> list[str]:
-    """Return the cells of one line."""
+    """Return the cells of one line; a blank stands for any number of blanks."""
+    if separator == " ":
+        return text.split()
     # Line by line: a quotation mark left open must not swallow the rest of the file.
     if '"' not in text:
         return [cell.strip() for cell in text.split(separator)]
@@ -95,11 +103,12 @@ def _is_header(rows: Rows, index: int, named: Mapping[str, str], quantities: Seq
 
 @dataclass(frozen=True)
 class Block:
-    """A row of names with the numbers below it. line : of the names."""
+    """A row of names with the numbers below it. line : of the names. summary : lines left out."""
 
     line: int
     units: dict[str, str]
     rows: Rows
+    summary: tuple[int, ...] = ()
 
 
 def find_blocks(
@@ -128,12 +137,39 @@ def find_blocks(
         # What stands between two tables begins with a word: the title of the second.
         while end < len(rows) and inside and not is_reading(next(filter(None, inside[-1][1]), "")):
             inside.pop()
-        blocks.setdefault(tuple(names), []).append(Block(line, units, inside))
+        last = _count_of_readings(inside) if end == len(rows) else len(inside)
+        summary = tuple(number for number, _ in inside[last:])
+        blocks.setdefault(tuple(names), []).append(Block(line, units, inside[:last], summary))
     return blocks
 
 
 def _is_number(row: list[str], column: int) -> bool:
     return column < len(row) and is_reading(row[column])
+
+
+def _count_of_readings(rows: Rows) -> int:
+    """Return the count of rows above a summary: means, or a short table after an empty line."""
+    count = len(rows)
+    while count > 1 and _is_summary(rows[count - 1][1], rows[0][1]):
+        count -= 1
+    for i in range(1, count):
+        apart = rows[i][0] > rows[i - 1][0] + 1 and 4 * (len(rows) - i) <= i
+        if apart and _is_summary(rows[i][1], rows[0][1]):
+            return i
+    return count
+
+
+def _is_summary(row: list[str], first: list[str]) -> bool:
+    """Return whether a row has a word where the `first` row of numbers has one of them."""
+    named, before = ({cell.casefold().strip(".: ") for cell in one} for one in (row, first))
+    if named & STATISTICS and not before & STATISTICS:
+        return True
+    at = next(i for i, cell in enumerate(row) if cell)
+    cell = row[at]
+    word = _LETTERS.search(cell) and not is_reading(cell) and cell.casefold() not in HOLES
+    # One letter and nothing else is a slip of a reading.
+    word = word and (len(cell) > 1 or any(row[at + 1 :]))
+    return bool(word) and at < len(first) and (is_reading(first[at]) or not first[at])
 
 
 def is_reading(cell: str) -> bool:
@@ -169,8 +205,10 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     """
     named, quantities = options.columns, options.quantities
     lines = read_lines(path, options.comment, any_encoding=True)
-    found = []
-    for separator in SEPARATORS:
+    found: list[tuple[int, Rows, int, str]] = []
+    for separator in (*SEPARATORS, " "):
+        if found and separator == " ":
+            break
         rows = [(number, cells_of(text, separator)) for number, text in lines]
         index = find_header(rows, named, quantities)
         if index is not None:
@@ -196,11 +234,32 @@ def table_of(
     if not rest:
         raise InputError(path, f"line {header}", "no rows of numbers below these names")
     for number, row in rest:
-        check_row(path, number, row, width, separator, f"line {header}")
+        blanks = separator == " "
+        own = None if blanks else separator
+        check_row(path, number, row, width, own, f"line {header}", short=blanks)
     check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
     rest = [(number, (row + [""] * width)[:width]) for number, row in rest]
     above = dict(rows).get(max((n for n, _ in rows if n < header), default=0), [])
     names, rest, notes = _stacked(path, several[0], names, rest, above, options)
+    first = {name: names.index(name) for name in names}
+    # A column that comes twice with the same cells is one.
+    once = [
+        i for i, n in enumerate(names) if i == first[n] or any(r[i] != r[first[n]] for _, r in rest)
+    ]
+    names, rest = (
+        [names[i] for i in once],
+        [(number, [row[i] for i in once]) for number, row in rest],
+    )
+    rest, lost = _without_holes(rest, names, options)
+    notes += tuple(
+        f"{path.name}: left out, as {why}: line {', '.join(map(str, gone[:6]))}"
+        + (f" and {len(gone) - 6} more" if len(gone) > 6 else "")
+        for why, gone in (
+            ("a row below the readings", [n for one in several for n in one.summary]),
+            ("a reading without a value", lost),
+        )
+        if gone
+    )
     cells = pd.DataFrame([row for _, row in rest], columns=names)
     needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
     numbers = [(n, names[i], row[i]) for n, row in rest for i in needed if i < len(row)]
@@ -212,6 +271,21 @@ def table_of(
         f" that of line {' and '.join(others)}"
     )
     return MachineTable(table, units, header, (*notes, note) if others else notes)
+
+
+def _without_holes(rows: Rows, names: list[str], options: TableOptions) -> tuple[Rows, list[int]]:
+    """Return the rows without those in which a reading is marked as lost, and the lines of these.
+
+    All rows are kept where more than half are such, and empty cells, which may be mistakes.
+    """
+    needed: list[int] = []
+    for quantity in options.quantities:
+        which = columns_of(names, quantity, options.columns)
+        near = quantity == "elongation" and quantity not in options.columns
+        needed += nearest_to_strip(names, which) if near else which
+    lost = [n for n, row in rows if any(row[i] and row[i].casefold() in HOLES for i in needed)]
+    gone = {*lost} if 2 * len(lost) <= len(rows) else set()
+    return [one for one in rows if one[0] not in gone], sorted(gone)
 
 
 def _plain(name: str) -> str:

@@ -40,10 +40,13 @@ def test_units_of_columns_are_those_of_si():
         "bar": 1e5, "MPa": 1e6,
     }  # fmt: skip
     assert {k: 1e6 * v for k, v in tables.PRESSURE_UNITS.items()} == pytest.approx(pascal)
-    assert tables.LENGTH_UNITS == {"mm": 1.0, "cm": 10.0, "m": 1000.0}
-    assert tables.LOAD_UNITS == {"N": 1.0, "kN": 1000.0}
+    lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "um": 1e-3, "\u00b5m": 1e-3}
+    assert pytest.approx(lengths | {"\u03bcm": 1e-3}) == tables.LENGTH_UNITS
+    pond, pound = 9.80665e-3, 0.45359237 * 9.80665
+    loads = {"N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "gf": pond, "lbf": pound}
+    assert pytest.approx(loads | {"kgf": 1e3 * pond, "kp": 1e3 * pond}) == tables.LOAD_UNITS
     per_metre = {"kN/m": 1e3, "N/mm": 1e3, "N/m": 1.0, "N/cm": 1e2, "N/50mm": 20.0}
-    per_metre |= {"N/5cm": 20.0, "daN/5cm": 200.0}
+    per_metre |= {"N/5cm": 20.0, "daN/5cm": 200.0, "lbf/in": pound / 0.0254}
     found = {k: 1e3 * v for k, v in tables.WIDTH_LOAD_UNITS.items()}
     assert found == pytest.approx(per_metre)
     assert tables.TIME_UNITS == {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}

@@ -1,0 +1,147 @@
+"""Files as vendors' programs write them: what is read is what was written, or is refused."""
+
+import numpy as np
+import pytest
+from bubblefit.experiments.biaxial.data import read_biaxial_table
+from bubblefit.readers.curves import read_load_curves
+from bubblefit.readers.frames import BELOW, LENGTHS, FrameOptions, read_frames
+from bubblefit.readers.pressure_log import read_pressure_log
+
+from ..complaints import complaint_with
+
+#: A strip of 800 MPa, 0.8 mm by 50 mm, over 50 mm: load in N, elongation in mm.
+ELONGATION = np.linspace(0.0, 5.0, 61)
+LOAD = 800.0 * 0.8 * ELONGATION
+ZWICK = ["testXpert", "Kunde;M\u00fcller & S\u00f6hne", "Datum;12.03.2021", "Vorkraft;2;N"]
+
+
+def german(value: float, places: int = 3) -> str:
+    return f"{value:,.{places}f}".translate(str.maketrans(",.", ".,"))
+
+
+def comma(value: float) -> str:
+    return f"{value:.5f}".replace(".", ",")
+
+
+def rows(*columns, form="{:.6f}", separator=","):
+    """Return lines of columns (n,), of numbers or of text."""
+    text = [[c if isinstance(c, str) else form.format(c) for c in one] for one in columns]
+    return [separator.join(row) for row in zip(*text, strict=True)]
+
+
+def blanks(mark: str) -> list[str]:
+    loads = [f"{load:,.2f}".replace(",", mark) for load in LOAD]
+    return ["Extension (mm);Load (N)", *rows(ELONGATION, loads, separator=";")]
+
+
+TIMED = ["Time (s),Extension (mm),Load (N)", *rows(np.arange(61), ELONGATION, LOAD)]
+LOST = [f"{load:.6f}" if i % 20 else "---" for i, load in enumerate(LOAD, 1)]
+QUOTED = [f'"{u:.6f}","{load:,.3f}"' for u, load in zip(ELONGATION, LOAD, strict=True)]
+STRIPS = {
+    "Zwick": (
+        [*ZWICK, "Standardweg;Feindehnung;Standardkraft", "mm;mm;N",
+         *rows(*(list(map(comma, y)) for y in (2 * ELONGATION, ELONGATION, LOAD)), separator=";")],
+        "cp1252", 61, 1,
+    ),
+    "Instron": (["Extension,Load", '"(mm)","(N)"', *QUOTED], "utf-8", 61, 0),
+    "German thousands": (
+        ["Weg [mm];Kraft [N]",
+         *rows(list(map(comma, ELONGATION)), list(map(german, LOAD)), separator=";")],
+        "latin-1", 61, 0,
+    ),
+    **{f"blank {ord(mark)}": (blanks(mark), "utf-8", 61, 0) for mark in " '\u00a0\u202f"},
+    "means below": ([*TIMED, "Mean,2.5,1600", "Std. dev.,1.5,940"], "utf-8", 61, 1),
+    "a label behind": (
+        [f"{TIMED[0]},Specimen", *(f"{row},A" for row in TIMED[1:]), "9,2.5,1600,Mean"],
+        "utf-8", 61, 1,
+    ),
+    "signs below": ([*TIMED, "x\u0304,2.5,1600", "s,1.5,940", "95% conf.,0,9"], "utf-8", 61, 1),
+    "results below": (
+        [*TIMED, "", "Results", ",F (N),E (MPa)", "1,3200,800", "Mean,3200,800"], "utf-8", 61, 1,
+    ),
+    "means of two columns": (
+        ["Extension (mm),Load (N)", *rows(ELONGATION, LOAD), "", "Mittelwert,1600"],
+        "latin-1", 61, 1,
+    ),
+    "lost readings": (
+        ["Weg [mm];Kraft [N]", *rows(ELONGATION, LOST, separator=";")], "utf-8", 58, 1,
+    ),
+    "a column twice": (
+        ["Load (N),Extension (mm),Load (N)", *rows(LOAD, ELONGATION, LOAD)], "utf-8", 61, 0,
+    ),
+    "kgf, UTF-16": (
+        ["Load(kgf)\tExtension(\u00b5m)", *rows(LOAD / 9.80665, 1e3 * ELONGATION, separator="\t")],
+        "utf-16", 61, 0,
+    ),
+    "pounds per inch": (
+        ["Extension (in),Load (lbf/in)", *rows(ELONGATION / 25.4, LOAD / 50 / 0.1751268352)],
+        "utf-8", 61, 0,
+    ),
+    "blanks": (
+        ["extension_mm  force_kN", *rows(ELONGATION, LOAD / 1e3, form="{:.6E}", separator="   ")],
+        "utf-8", 61, 0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STRIPS)
+def test_strips_are_read_as_written(tmp_path, name):
+    lines, encoding, count, notes = STRIPS[name]
+    path = tmp_path / "a.txt"
+    path.write_bytes("\r\n".join(lines).encode(encoding))
+    (curve,) = read_load_curves(path, direction="warp", width=50.0)
+    assert (len(curve.load), len(curve.notes)) == (count, notes)
+    np.testing.assert_allclose(curve.load, 640.0 * curve.elongation, rtol=2e-4, atol=6e-3)
+    assert curve.elongation.max() == pytest.approx(5.0, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        # Integers with one mark may be decimals; a word in the midst is no summary.
+        (["Weg [mm];Kraft [N]", "1,250;1.013", "2,500;2.026"], ["line 2", "'1,250'"]),
+        (["Weg [mm];Kraft [N]", "0;0", "1;12.34,5"], ["line 3", "'12.34,5'"]),
+        ([*TIMED[:9], "", "pause,,", *TIMED[9:]], ["line 11", "found nothing"]),
+        (["Weg [mm];Kraft [N]", "0;---", "1;---", "2;5"], ["line 2", "'---'; so in 1 more row"]),
+        (["Weg [mm];Kraft [N];Weg [mm]", "0;0;1", "1;5;2"], ["'Weg [mm]' appears twice"]),
+        (["extension_mm load_N", "0 0", "1 2 3"], ["line 3", "expected 2 cells"]),
+    ],
+)
+def test_what_may_be_read_in_two_ways_is_refused(tmp_path, lines, words):
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(lines))
+    complaint_with([str(path), *words], read_load_curves, path, direction="warp")
+
+
+def test_logs_and_biaxial_tables_leave_lost_readings_out(tmp_path):
+    path = tmp_path / "a.csv"
+    stamps = [f"2021-03-12T14:02:{second:06.3f}" for second in range(9)]
+    values = [f"{p:.3f}" if p != 4 else "NaN" for p in range(9)]
+    path.write_text("\n".join(["timestamp,Druck [mbar]", *rows(stamps, values), "Mean,4"]))
+    log = read_pressure_log(path)
+    np.testing.assert_allclose(log.time - log.time[0], [0, 1, 2, 3, 5, 6, 7, 8])
+    np.testing.assert_allclose(log.pressure, 1e-4 * (log.time - log.time[0]), rtol=1e-12)
+    names = "Kraft Kette;Kraft Schuss;Dehnung Kette;Dehnung Schuss"
+    path.write_bytes(
+        f"{names}\nlbf/in;lbf/in;%;%\n0;0;0;0\n---;1;1;1\n10;5;1,5;2\n".encode("latin-1")
+    )
+    table = read_biaxial_table(path)
+    np.testing.assert_allclose(table.load, [[0, 0], [1.751268352, 0.875634176]], rtol=1e-8)
+    np.testing.assert_allclose(table.strain, [[0, 0], [0.015, 0.02]], rtol=1e-12)
+    assert len(table.source.notes) == 1
+
+
+def test_a_frame_keeps_to_its_points(tmp_path):
+    """Rows of means are no points, and a column that comes twice with the same cells is one."""
+    draw = np.random.default_rng(0).uniform(-9, 9, (20, 6)).round(4)
+    for unit, below in (("mm", ["mean,1,1,1,1,1,1,1", "std. dev.,2,2,2,2,2,2,2"]), ("in", [])):
+        names = ",".join(["no", *(f"{q} [{unit}]" for q in ("x", "y", "z", "dx", "dy", "dz", "x"))])
+        path = tmp_path / f"{unit}.csv"
+        body = rows(map(str, range(20)), *draw.T, draw[:, 0], form="{:.4f}")
+        path.write_text("\n".join(["# a lab's own", names, *body, *below]))
+        (frame,) = read_frames([path], FrameOptions())
+        found = np.column_stack([frame.points, frame.displacement])
+        np.testing.assert_allclose(found, LENGTHS[unit] * draw, rtol=1e-12)
+        assert frame.dropped == ({BELOW: 2} if below else {})
+    path.write_text(path.read_text().replace(f"{draw[3, 0]:.4f}\n", "0.5\n"))
+    complaint_with(["x [in]", "appears twice"], read_frames, [path])
