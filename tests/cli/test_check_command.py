@@ -20,6 +20,7 @@ from ..camera import camera_project
 from ..commands import in_process, one_line, result_in
 from ..complaints import complaint
 from ..experiments.biaxial.test_biaxial_fit import TRAPS as BIAXIAL_TRAPS
+from ..experiments.bubble.test_bubble_doubts import OF_OWN_TESTS as BUBBLE_TESTS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
 from ..places import EXAMPLES, ROOT
@@ -194,7 +195,7 @@ def test_the_document_lists_every_doubt_and_its_limits():
     row = re.compile(r"^\| `([\w-]+)` \| (.*?) \| (.*) \|$", re.M)
     told = [{name: rest for name, *rest in row.findall(part)} for part in parts]
     traps = (
-        {name: sure for _, name, sure, _ in BUBBLE_TRAPS.values()},
+        {name: sure for _, name, sure, _ in BUBBLE_TRAPS.values()} | BUBBLE_TESTS,
         {name: sure for _, _, (name, sure, _) in STRIP_TRAPS.values()},
         {name: sure for _, own in BIAXIAL_TRAPS.values() for name, (sure, _) in own.items()},
     )
