@@ -175,7 +175,7 @@ def write_test(folder, what, pressures, elements):
 UNEVEN = """\
 fabric = {{ name = "computed", thickness = {thickness}, thickness_change = "incompressible" }}
 units = {{ modulus = "MPa" }}
-fit = {{ starts = 1, seed = 3, jobs = 1, max_analyses = 60 }}
+fit = {{ starts = 1, seed = 3, jobs = 1, max_analyses = 60, mesh_error = "told" }}
 
 [law]
 form = "linear"

@@ -36,6 +36,7 @@ from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
 from bubblefit.solvers.marc.t19 import T19File
 from bubblefit.solvers.registry import FORMATS
+from openpyxl import Workbook
 
 from .. import dic_exports, projects
 from ..biaxial_files import BENT, HEAD, rows_of, write_rows
@@ -188,6 +189,14 @@ def _targets(folder: Path) -> dict[str, Target]:
         frames = [(np.abs(POINTS), FRAMES[0][1])] if case == "ncorr" else FRAMES
         file = write(place, frames)[0]
         found[f"frame {case}"] = Target(file.suffix, [file.read_bytes()], _frames)
+    book, rows = (
+        Workbook(),
+        [["elongation (mm)", "load (N)"], *([k / 9, 5.0 * k] for k in range(20))],
+    )
+    for row in rows:
+        book.active.append(row)
+    book.save(folder / "s.xlsx")
+    found["workbook"] = Target(".xlsx", [(folder / "s.xlsx").read_bytes()], _machine)
     return found
 
 

@@ -61,7 +61,7 @@ def test_every_format_is_among_them(tmp_path):
         if name.startswith("frame"):
             found.add(format_of("frame", path).name)
     assert found == {one.name for one in formats("frame")}
-    assert [one.name for one in formats("machine table")] == ["text"]
+    assert [one.name for one in formats("machine table")] == ["text", "xlsx"]
 
 
 def raising(error: BaseException):

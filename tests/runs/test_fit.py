@@ -98,8 +98,10 @@ def test_figures_show_what_the_tables_hold(fitted, bubble):
     off = np.concatenate(data(by_panel["modelled − known solution, mm"]), axis=1)
     assert off[1] == pytest.approx(heights["difference"].to_numpy(), abs=1e-12)
     (best,) = lines(by_panel["tangent modulus, MPa"], "best")
-    assert best[1] == pytest.approx(fitted.law.E1(best[0]), rel=1e-4)
-    assert (best[0].min(), best[0].max()) == pytest.approx((0.0, fitted.best.valid[0]), rel=1e-5)
+    assert best[1] == pytest.approx(fitted.law.E1(best[0] / 100), rel=1e-4)
+    assert (best[0].min(), best[0].max()) == pytest.approx(
+        (0.0, 100 * fitted.best.valid[0]), rel=1e-5
+    )
     (optima,) = data(next(c for c in bubble.drawn if c.name == "optima").charts[0])
     assert optima[1] == pytest.approx(sorted(fitted.starts()["objective"], reverse=True), rel=1e-5)
 
@@ -172,7 +174,7 @@ def maps_and_surface_say_what_the_table_says(fit, folder):
     assert len(maps.panels) == 9 and sum(maps.counts) == len(table) // 3
     for panel in maps.panels:
         quantity, what = panel.name.split(", ")
-        column = "difference" if "−" in what else what
+        column = "difference" if "−" in what else {"known": "measured"}.get(what, what)
         own = table[table["quantity"] == quantity][column].to_numpy()
         np.testing.assert_allclose(panel.values.values, own, atol=0.51 * panel.values.step + 1e-9)
     history = fit.tests["bubble 1"].histories[0]

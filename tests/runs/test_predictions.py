@@ -129,7 +129,7 @@ def test_every_kind_of_note():
     record = RunRecord(1.0, strain=strain, unstable=("132 kPa",), remarks=("a remark",))
     notes = notes_of_record(record, card)
     assert notes[0] == "a remark" and len(notes) == 4
-    assert notes[1].startswith("fill strain 0.210") and notes[2].startswith("shear strain 0.310")
+    assert notes[1].startswith("fill strain 21 %") and notes[2].startswith("shear strain 31 %")
     assert notes[3] == "unstable equilibrium at 132 kPa: the model would not stay there"
     assert notes_of_record(RunRecord(1.0, "failed"), card) == []
 

@@ -122,6 +122,8 @@ def in_camera(turn: Rotation, shift=(0.0, 0.0, 0.0)):
 
 
 TURN = partial(Rotation.from_euler, degrees=True)
+#: Doubts that tests of their own provoke, and whether they are errors.
+OF_OWN_TESTS = {"frame-numbers": False, "outliers": False, "radius": True, "flat-sheet": False}
 TRAPS = {
     "places in m": (columns(0.001), "length-unit", True, "radii from the centre"),
     "displacements in m": (columns(1.0, (0.001,) * 3), "length-unit", True, "mm beside m"),
