@@ -43,9 +43,7 @@ class Place(click.Path):
             if self.folder and not there.is_dir():
                 words = f"{there} is a file; name a folder"
             elif self.folder and not os.access(there, os.W_OK):
-                words = (
-                    f"{there} cannot be written (read-only, or no permission); name another folder"
-                )
+                words = f"{there} is Read-only, or not yours to write; name another folder"
         except OSError as error:  # a name that is too long, a folder that may not be read
             words = f"no path: {error.strerror}"
         if words:

@@ -162,7 +162,8 @@ def test_two_tests(together, written):
     ]
     assert [name for name, _ in found.files] == [
         "result.json", "material.toml", "moduli.csv", "coefficients.csv", "residuals.csv",
-        "notes.csv", "one-loads.csv", "one-loads.png", "two-loads.csv", "two-loads.png",
+        "notes.csv", "one-loads.csv", "one-loads.png", "one-en-iso-1421.csv", "two-loads.csv",
+        "two-loads.png", "two-en-iso-1421.csv",
     ]  # fmt: skip
     assert found.versions == versions()
     (warned,) = [p for p in found.parts if isinstance(p, Words) and p.warning]
