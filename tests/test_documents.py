@@ -154,7 +154,11 @@ def messages():
 
 def test_no_message_says_a_share_that_is_not_measured_there():
     """A share in a message ("off by 56 %") would be right for one example at best."""
-    typed = [f"{place}: {text.strip()}" for place, text in messages() if TYPED.search(text)]
+    typed = [
+        f"{place}: {text.strip()}"
+        for place, text in messages()
+        if TYPED.search(re.sub(r"\{:[^}]*\}", "", text)) and ".css" not in place
+    ]
     assert typed == []
 
 

@@ -187,8 +187,8 @@ def notes(*histories):
 def test_strains_beyond_the_law_and_unstable_equilibria_with_their_part():
     for histories, words in (
         ((history(0.1181, 0.0), history(0.05, -0.25, ("2 mm",))),
-         ["warp: warp strain 0.118", "fill: shear strain 0.250", "fill: unstable"]),
-        ((history(0.1181, 0.0, ("2 mm",)),), ["one: warp strain 0.118", "one: unstable"]),
+         ["warp: warp strain 11.8", "fill: shear strain 25 %", "fill: unstable"]),
+        ((history(0.1181, 0.0, ("2 mm",)),), ["one: warp strain 11.8", "one: unstable"]),
         ((history(0.1, -0.1),), []),
     ):  # fmt: skip
         assert all(word in line for word, line in zip(words, notes(*histories), strict=True))
@@ -234,7 +234,7 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
     assert (warp.test, fill.test) == ("one: warp", "one: fill")
     # Beyond the strain of the other test, 2.5 / 20, the law is not known.
     (beyond,) = warp.notes
-    assert beyond.kind == BEYOND_CARD and f"0.135 is beyond {np.log(1.125):.3f}" in beyond
+    assert beyond.kind == BEYOND_CARD and f"13.5 % is beyond {100 * np.log(1.125):.1f} %" in beyond
     loads = np.concatenate([20 * e * STRAIN for e in (300, 360)])
     rms = float(np.sqrt(np.mean((20 * 370 * np.tile(STRAIN, 2) - loads) ** 2)))
     assert warp.rms == {"one: warp": pytest.approx(rms, rel=1e-3)}
