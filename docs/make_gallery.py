@@ -24,10 +24,8 @@ CASES = {
         ("[bubble.data.points.registration]", "[bubble.data.points.registration]\nwarp = 0.0"),
     ),
     "constant": (('form = "cubic"', 'form = "constant"'),),
-    "low": (('files = ["*.csv"]', 'files = ["step_00*.csv", "step_01*.csv"]'),),
-    "thickness": (("thickness = 0.81", "thickness = 1.62"),),
 }
-SHOWN = ("moduli.png", "residual-maps.png")
+SHOWN = ("moduli.png",)
 WIDTH = 900
 
 

@@ -216,8 +216,10 @@ def _watched() -> Iterator[Callable[[int], None]]:
     watcher = None
 
     def watch(group: int) -> None:
-        with suppress(OSError):  # there is no watcher
-            os.write(held, f"{group}\n".encode())
+        # A library may have made SIGPIPE deadly: nothing is written that nobody reads.
+        with suppress(OSError):
+            if watcher is not None:
+                os.write(held, f"{group}\n".encode())
 
     try:
         with suppress(OSError):  # no such shell
