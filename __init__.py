@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from .materials.card import MaterialCard, read_card
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
-    from .runs.fit import fit
+    from .runs.fit import check, fit
     from .runs.plan import plan
     from .runs.predictions import predict
     from .runs.profile import profile
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "fit", "plan", "predict", "profile",
-           "read_card", "read_project", "simulate"]  # fmt: skip
+__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "check", "fit", "plan", "predict",
+           "profile", "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -45,6 +45,7 @@ _PLACES = {
     "MaterialCard": "materials.card",
     "Project": "project.project",
     "bootstrap": "runs.bootstrap",
+    "check": "runs.fit",
     "fit": "runs.fit",
     "plan": "runs.plan",
     "predict": "runs.predictions",

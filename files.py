@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import html
 import json
 import math
 import os
@@ -227,6 +228,16 @@ def write_text(path: Path | str, text: str) -> None:
 def json_text(content: Any) -> str:
     """Return plain values as a JSON file; a number that is not known (not finite) is null."""
     return json.dumps(_known(content), indent=1, allow_nan=False) + "\n"
+
+
+def html_table(caption: str, header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table for a notebook; every text is escaped."""
+    head, *lines = (
+        f"<tr>{''.join(f'<{tag}>{html.escape(str(cell))}</{tag}>' for cell in row)}</tr>"
+        for tag, row in (("th", header), *(("td", row) for row in rows))
+    )
+    said = f"<caption>{html.escape(caption)}</caption>"
+    return f"<table>{said}<thead>{head}</thead><tbody>{''.join(lines)}</tbody></table>"
 
 
 def _known(value: Any) -> Any:

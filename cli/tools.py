@@ -15,10 +15,9 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError, SolverFailure, rows
-from ..files import write_text
+from ..errors import InputError, SolverFailure, rows
 from ..materials.card import read_card
-from ..materials.exports.base import Export, Option, options_of
+from ..materials.exports.base import Export, Option, options_of, write_export
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
@@ -303,10 +302,7 @@ def export_command(
     for path in paths:
         if path.exists() and path.samefile(card):
             raise InputError(None, "--out", f"{path} is the card itself; name another file")
-        if path.exists() and not force:
-            raise OutputError(f"{path}: is already there; use --force or another --out")
-    for path, text in zip(paths, export.files.values(), strict=True):
-        write_text(path, text)
+    write_export(export, paths, force)
     files = [str(path) for path in paths]
     said: dict[str, Any] = {"carries": export.says.carries, "loses": export.says.loses}
     said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}

@@ -188,8 +188,7 @@ class Comparison:
         free : entries of the law's beta that vary between runs. nuisance : values by name, in their
         units. warm : start each increment from the last differentiated solution and its slope.
         Raises SolverFailure."""
-        values = self._model_values(nuisance)
-        model = self._model(values)
+        values, model = self._model_values(nuisance), self.model_at(nuisance)
         if isinstance(self.solver, DifferentiatingSolver):
             guess = self._guess(self._point(law, free, values)) if warm else None
             return self.solver.run(model, law, guess=guess)
@@ -204,7 +203,7 @@ class Comparison:
         values = self._model_values(nuisance)
         point = self._point(law, free, values)
         history, slope = self.solver.run_with_sensitivity(
-            self._model(values),
+            self.model_at(nuisance),
             law,
             [*(f"beta_{i}" for i in free), *values, *self._of_law],
             guess=self._guess(point) if warm else None,
@@ -220,9 +219,9 @@ class Comparison:
             if n.model_parameter is not None
         }
 
-    def _model(self, values: Mapping[str, float]) -> Any:
-        """Return the model with its parameters at `values`; SolverFailure where there is none."""
-        if not values:
+    def model_at(self, nuisance: Mapping[str, float]) -> Any:
+        """Return the model at nuisance values by name; SolverFailure where there is none."""
+        if not (values := self._model_values(nuisance)):
             return self.model
         try:
             return self.model.with_parameters(values)

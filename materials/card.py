@@ -6,11 +6,13 @@ coefficients, and `[certainty.band]`, the ends of the fit's band of each modulus
 `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
+import functools
 import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -33,7 +35,7 @@ from .forms.base import (
     form_settings,
     ratios_of,
 )
-from .law import HypoelasticLaw, ThicknessChange
+from .law import HypoelasticLaw, ThicknessChange, moduli_html
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
@@ -177,6 +179,29 @@ class MaterialCard:
 
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         write_card(self, Path(path), unit)
+
+    def export(
+        self, name: str, folder: Path | str = ".", *, overwrite: bool = False, **options: Any
+    ) -> list[Path]:
+        """Write the material for another program, as `bubblefit export`; return the files.
+
+        name : of the format. options : of the format. InputError : no such format or option, or a
+        law that the format cannot hold. OutputError : a file is there already.
+        """
+        # Formats take cards, and one of them is a solver's own: they are found at run time.
+        formats = import_module("bubblefit.solvers.registry").FORMATS
+        if name not in formats:
+            raise InputError(None, "name", f"expected one of {', '.join(formats)}, got {name!r}")
+        written: list[Path] = formats[name].write_files(
+            self, Path(folder) / f"material-{name}", overwrite, **options
+        )
+        return written
+
+    def _repr_html_(self) -> str:
+        words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
+        sure = self.certainty
+        band = None if sure is None else functools.partial(sure.band, self.law)
+        return moduli_html(self.law, words, band)
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:

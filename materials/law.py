@@ -10,7 +10,7 @@ nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. One increm
 of each modulus over its own strain increment (`point_moduli`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..files import compiled
+from ..files import compiled, html_table
 from .forms.base import (
     COMPONENTS,
     EVEN,
@@ -148,6 +148,9 @@ class HypoelasticLaw:
         """Return (n, size), d modulus / d beta at strains (n,), held ones included."""
         return modulus_rows(self.form, name, strain, self.strain_range.tolist(), ratio)
 
+    def _repr_html_(self) -> str:
+        return moduli_html(self, f"{self.form.name} law, nu12 {self.nu12:g}")
+
     @property
     def of_load_ratio(self) -> bool:
         """Return whether E1 or E2 may depend on the ratio of the loads along warp and fill."""
@@ -186,6 +189,27 @@ class HypoelasticLaw:
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
         return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
+
+
+def moduli_html(
+    law: HypoelasticLaw, caption: str,
+    band: Callable[[str, Array], tuple[Array, Array]] | None = None,
+) -> str:  # fmt: skip
+    """Return a table of the moduli at rest, and halfway to and at the end of their range.
+
+    band : of a modulus by its name, at strains (n,).
+    """
+    rows: list[list[object]] = []
+    for name, component in COMPONENTS.items():
+        end = float(law.strain_range[component])
+        strain = end * np.array([0.0, 0.5, 1.0]) if end < UNLIMITED else np.zeros(1)
+        ends = [""] * len(strain)
+        if band is not None:
+            pairs = zip(*band(name, strain), strict=True)
+            ends = [f"{low:.4g} to {high:.4g}" for low, high in pairs]
+        values = zip(strain, law.modulus(name, strain), ends, strict=True)
+        rows += [[name, f"{100 * x:.3g} %", f"{value:.4g}", own] for x, value, own in values]
+    return html_table(caption, ["", "strain", "MPa", "" if band is None else "95 % band"], rows)
 
 
 def _read_only(numbers: ArrayLike) -> Array:

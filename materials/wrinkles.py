@@ -19,7 +19,7 @@ import numpy as np
 
 from ..files import compiled
 from .forms.base import Array
-from .point_law import increment_modulus, log_strain, referred_stress, stress_update
+from .point_law import SLOPES, increment_modulus, log_strain, referred_stress, stress_update
 
 ITERATIONS = 25
 #: Strain, or stress over the stiffness, that is taken as none.
@@ -298,3 +298,20 @@ def relaxed_membrane_stress(
     )
     referred_stress(m, q, c, ratio, growth, carried, pk2, stiffness, p, law_tangent, pull, work)
     return state
+
+
+@compiled()
+def relaxed_increments(
+    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array
+) -> tuple[Array, Array]:
+    """Return strain and stress (n, 3) of the fabric at total strains h, or NaN; see above."""
+    he, s = np.empty(h.shape), np.empty(h.shape)
+    carried, slopes = np.empty(3), np.empty(SLOPES)
+    tangent, strain_slope = np.empty((3, 3)), np.empty((3, 3))
+    for i in range(len(h)):
+        if relaxed_update(
+            pieces, coupling, 0.0, h[i], h_old[i], s_old[i], he[i], s[i], carried, tangent,
+            slopes, strain_slope,
+        ) < 0:  # fmt: skip
+            he[i], s[i] = np.nan, np.nan
+    return he, s

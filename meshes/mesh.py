@@ -1,16 +1,21 @@
 """Quadrilateral surface meshes as plain data: strain, enclosed volume, interpolation, facets."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..files import compiled
+
+if TYPE_CHECKING:
+    import meshio
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +33,25 @@ class Mesh:
     node_sets: Mapping[str, NDArray[np.intp]]
     element_sets: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     warp: NDArray[np.float64] | None = None
+
+
+def meshio_of(
+    mesh: Mesh, displacement: ArrayLike, point_data: Mapping[str, ArrayLike],
+    cell_data: Mapping[str, ArrayLike],
+) -> meshio.Mesh:  # fmt: skip
+    """Return the mesh displaced by (n, 3) mm, which is also its point data `displacement`.
+
+    point_data, cell_data : (n, ...), (m, ...). ValueError : a field without one row a node.
+    """
+    import meshio
+
+    u = np.asarray(displacement, dtype=float)
+    points = {"displacement": u} | {name: np.asarray(own) for name, own in point_data.items()}
+    for name, own in points.items():
+        if len(own) != len(mesh.points):
+            raise ValueError(f"{name}: {len(own)} rows for {len(mesh.points)} nodes")
+    cells = {name: [np.asarray(own)] for name, own in cell_data.items()}
+    return meshio.Mesh(mesh.points + u, [("quad", mesh.quads)], points, cells)
 
 
 Array = NDArray[np.float64]

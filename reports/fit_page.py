@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..errors import NOTES, NOTES_ARE
+from ..errors import NOTES, NOTES_ARE, InputError
 from ..experiments.kinds import by_strain
 from ..experiments.registry import report_of
 from ..files import __version__, replacing, write_notes
@@ -25,12 +25,12 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
 from ..runs.result import USABLE, Fit, answers, coefficients_of, next_step, reaches
-from .charts import Charts
+from .charts import Chart, Charts, dots
 from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
 from .moduli import moduli_charts, pinned_charts
 from .studies import optima_chart
-from .vega import save
+from .vega import Drawing, save
 
 Array = NDArray[np.float64]
 
@@ -410,7 +410,7 @@ def _page(fit: Fit, folder: Path) -> Report:
                 ),
                 Facts(assumed(fit)), reached_table(fit),
             ]),
-            Section("The moduli over strain", [_moduli(fit, folder)]),
+            Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
             Section(_beside_model(fit), [
                 part for name, exhibit in exhibits.items()
                 for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
@@ -419,8 +419,8 @@ def _page(fit: Fit, folder: Path) -> Report:
                 *_determined(fit), *_beside(fit), *_pinned(fit, folder), *_pinned_table(fit.pinned),
             ]),
             Section("How it was found", [
-                Facts(found_by(fit)), _optima(fit, folder), starts_table(fit), bounds_table(fit),
-                *coefficients_table(fit),
+                Facts(found_by(fit)), _saved(optima(fit), folder / OPTIMA), starts_table(fit),
+                bounds_table(fit), *coefficients_table(fit),
             ]),
             Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
             Section("How to cite", citation()),
@@ -436,17 +436,16 @@ def _beside_model(fit: Fit) -> str:
     return f"{'Known' if known else 'Measured'} beside modelled"
 
 
-def _optima(fit: Fit, folder: Path) -> Charts:
+def optima(fit: Fit) -> Charts:
+    """Return the chart of the optima of all starts."""
     words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
     if fit.coarse_to_fine is not None:
         words += "; starts with the same optimum on the coarse mesh have one on the full mesh"
     objectives = [np.nan if r.objective is None else r.objective for r in fit.best.records]
-    charts = optima_chart(objectives, words)
-    save(folder / OPTIMA, charts)
-    return charts
+    return optima_chart(objectives, words)
 
 
-def _moduli(fit: Fit, folder: Path) -> Charts:
+def moduli(fit: Fit) -> Charts:
     """Return the chart of the moduli over the strains that they are fitted to."""
     strains = _strains(fit)
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
@@ -464,9 +463,52 @@ def _moduli(fit: Fit, folder: Path) -> Charts:
     if band is not None:
         words += f"; with their bands ({percent(LEVEL)}, noise and mesh together)"
     caption = f"Tangent moduli of the best fits over the strains reached{words}"
-    charts = moduli_charts(strains, curves, truth, band, caption)
-    save(folder / MODULI_PICTURE, charts)
+    return moduli_charts(strains, curves, truth, band, caption)
+
+
+def _saved(charts: Charts, path: Path) -> Charts:
+    save(path, charts)
     return charts
+
+
+def draw_moduli(fit: Fit) -> Drawing:
+    """Return the moduli for a notebook."""
+    return Drawing(moduli(fit))
+
+
+def draw_starts(fit: Fit) -> Drawing:
+    """Return the optima of all starts for a notebook."""
+    return Drawing(optima(fit))
+
+
+def draw_test(fit: Fit, what: str, test: str | None) -> Drawing:
+    """Return what the kind of a test calls by this name: of the first test that has it, or one."""
+    names = [name for name in fit.tests if test in (None, name)]
+    for prepared in fit.setup.tests:
+        own = getattr(report_of(prepared.test.kind), "CHARTS", {})
+        if prepared.test.name in names and what in own:
+            return Drawing(own[what](prepared, fit.tests[prepared.test.name]))
+    problem = f"expected one of {', '.join(fit.tests)}, with {what}; got {test or 'none of them'}"
+    raise InputError(fit.project.path, "test", problem)
+
+
+def draw_residuals(fit: Fit, test: str | None) -> Drawing:
+    """Return modelled less measured values over the measured ones, a chart a quantity."""
+    table = fit.residuals()
+    if test is not None and test not in fit.tests:
+        problem = f"expected one of {', '.join(fit.tests)}, got {test!r}"
+        raise InputError(fit.project.path, "test", problem)
+    table, charts = table[table["test"].isin([test] if test else [*fit.tests])], []
+    for (quantity, unit), rows in table.groupby(["quantity", "unit"], sort=False):
+        series = [
+            dots(f"{name}: {part}" if part != name else str(name), own["measured"],
+                 own["difference"], colour=rank)
+            for rank, ((name, part), own) in enumerate(rows.groupby(["test", "part"], sort=False))
+        ]  # fmt: skip
+        rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
+        title, across = f"{quantity}: RMS {rms:.3g} {unit}", f"measured {quantity}, {unit}"
+        charts.append(Chart(title, across, f"modelled − measured, {unit}", series, title, level=0))
+    return Drawing(Charts("residuals", charts, "What the fit leaves of every matched value."))
 
 
 def _strains(fit: Fit, count: int = SMOOTH) -> Array:
@@ -487,9 +529,7 @@ def _pinned(fit: Fit, folder: Path) -> list[Charts]:
     }
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
-    charts = pinned_charts(_strains(fit, count), sigma, caption)
-    save(folder / PINNED, charts)
-    return [charts]
+    return [_saved(pinned_charts(_strains(fit, count), sigma, caption), folder / PINNED)]
 
 
 FAILED = "This failed, and there is no result."

@@ -19,10 +19,12 @@ import numpy as np
 from markupsafe import Markup, escape
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import InputError
 from ..files import replacing, write_text
-from ..meshes.mesh import Mesh
-from .charts import Array, Chart, Shades, dots, ends_of
-from .vega import COLOURS, PALETTE, view
+from ..meshes.mesh import Mesh, meshio_of
+from ..solvers.base import History
+from .charts import Array, Chart, Charts, Shades, dots, ends_of, faces, shades_of
+from .vega import COLOURS, PALETTE, Drawing, view
 
 #: Steps between the least and the largest value; one more stands for what is not there.
 STEPS = 65534
@@ -235,6 +237,44 @@ def solid_data(solid: Solid) -> dict[str, Any]:
     }  # fmt: skip
 
 
+#: What a history is drawn of: unit, factor and names of its components.
+DRAWN = {
+    "strain": ("%", 100.0, ("log strain along the warp", "along the fill", "in shear")),
+    "stress": ("MPa", 1.0, ("stress along the warp", "along the fill", "in shear")),
+}
+#: Height over width at rest up to which a mesh is a sheet, and not a tube.
+FLAT = 0.2
+
+
+def draw_history(name: str, history: History, quantity: str, component: int, frame: int) -> Drawing:
+    """Return the deformed mesh coloured by its strain or stress: a tube from the side."""
+    count = len(history.load)
+    for field, good, expected in (
+        ("quantity", quantity in DRAWN, " or ".join(DRAWN)),
+        ("component", component in (0, 1, 2), "0 (warp), 1 (fill) or 2 (shear)"),
+        ("frame", -count <= frame < count, f"{-count} to {count - 1}"),
+    ):
+        if not good:
+            raise InputError(None, field, f"expected {expected}")
+    unit, factor, names = DRAWN[quantity]
+    every = history.strain() if quantity == "strain" else history.stress()
+    values, rest = factor * every[frame, :, component], history.mesh.points
+    now, size = rest + history.displacement[frame], np.ptp(rest, axis=0)
+    labels, (least, up, across) = ["x, mm", "y, mm", "z, mm"], np.argsort(size, kind="stable")
+    if size[2] > FLAT * size[across]:  # a tube, along its longest side
+        flat, depth, axes = now[:, [across, up]], now[:, least], (labels[across], labels[up])
+    elif np.ptp(now[:, 2]) > 0:  # a sheet that is inflated
+        (flat, depth), axes = seen(now, TURN, RAISE), ("seen from above and aside, mm", "mm")
+    else:
+        flat, depth, axes = now[:, :2], now[:, 2], (labels[0], labels[1])
+    order = np.argsort(depth[history.mesh.quads].mean(axis=1))
+    body = faces("", flat[history.mesh.quads[order]], values[order])
+    said = f"{names[component]}, {unit}"
+    chart = Chart(name, *axes, [body], f"{name}: {said}", equal=True, scale=said,
+                  shades=shades_of(values))  # fmt: skip
+    return Drawing(Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}"))
+
+
 #: Classes of a surface's values.
 CLASSES = len(COLOURS["from least"])
 WIDTH, HEIGHT, MARGIN = 570.0, 430.0, 12.0
@@ -345,17 +385,9 @@ def write_vtu(
     subtracted (ParaView: Warp By Vector, scale -1). point_data, cell_data : (n, ...), (m, ...).
     Raises OutputError, and ValueError for a field that does not have one row a node.
     """
-    import meshio
-
-    u = np.asarray(displacement, dtype=float)
-    points = {"displacement": u} | {n: np.asarray(own) for n, own in (point_data or {}).items()}
-    for name, own in points.items():
-        if len(own) != len(mesh.points):
-            raise ValueError(f"{name}: {len(own)} rows for {len(mesh.points)} nodes")
-    cells = {name: [np.asarray(own)] for name, own in (cell_data or {}).items()}
-    grid = meshio.Mesh(mesh.points + u, [("quad", mesh.quads)], points, cells)
+    grid = meshio_of(mesh, displacement, point_data or {}, cell_data or {})
     with replacing(path) as temporary:
-        meshio.write(temporary, grid, file_format="vtu")
+        grid.write(temporary, file_format="vtu")
     return Path(path)
 
 

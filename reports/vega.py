@@ -15,7 +15,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -25,7 +25,7 @@ from zlib import crc32
 
 from markupsafe import Markup, escape
 
-from ..errors import OutputError
+from ..errors import InputError, OutputError
 from ..files import cache_folder, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
 
@@ -72,6 +72,8 @@ UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]
 ROUND = (
     "indexof([1, 2, 5], round(datum.value / pow(10, floor(log(datum.value) / LN10 + 1e-9)))) >= 0"
 )
+#: Files that can be written, and what notebooks call a specification for Vega.
+SUFFIXES, VEGA = (".png", ".svg", ".pdf"), "application/vnd.vega.v6+json"
 #: Pixels of a file for each of Vega's.
 DOTS = 2.0
 CONFIG: Spec = {
@@ -99,9 +101,32 @@ def save(path: Path | str, charts: Charts) -> Path:
 
 def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
-    if suffix not in (".png", ".svg", ".pdf"):
-        raise ValueError(f"{suffix}: expected .png, .svg or .pdf")
+    if suffix not in SUFFIXES:
+        raise ValueError(f"{suffix}: expected {', '.join(SUFFIXES)}")
     return _drawn(suffix[1:], picture(charts))
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Charts that a notebook shows, and a script saves."""
+
+    charts: Charts
+
+    @property
+    def spec(self) -> Spec:
+        """Return the specification for Vega."""
+        return picture(self.charts)
+
+    def save(self, path: Path | str) -> Path:
+        """Write PNG, SVG or PDF by suffix; InputError : another one. OutputError."""
+        if Path(path).suffix.lower() not in SUFFIXES:
+            raise InputError(Path(path), "", f"expected a name that ends in {', '.join(SUFFIXES)}")
+        return save(path, self.charts)
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
+        png = base64.b64encode(rendered(self.charts, ".png")).decode()
+        said = "; ".join(chart.alt or chart.title for chart in self.charts.charts)
+        return {VEGA: self.spec, "image/png": png, "text/plain": self.charts.caption or said}
 
 
 class _Converter:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
 from ..experiments.kinds import Expected, FittableTest, Judgement, files_of, judged
 from ..experiments.registry import kinds
-from ..files import __version__, one_blas_thread
+from ..files import __version__, html_table, one_blas_thread
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project, plain, settings_of
@@ -437,6 +437,9 @@ class Check:
             f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
             for test, severity, name, text in self.rows()
         ]
+
+    def _repr_html_(self) -> str:
+        return html_table(self.setup.project.title, ["test", "", "doubt", ""], self.rows())
 
     def report(self, folder: Path | str) -> Path:
         """Write check.json, figures and report.html; return the page's path."""

@@ -356,6 +356,11 @@ def write_report(result: Any, folder: Path | str) -> Path:
     return page
 
 
+def draw(module: str, what: str, *given: Any) -> Any:
+    """Return the drawing that the function `draw_`what of a module of `reports` makes."""
+    return getattr(import_module(f"bubblefit.reports.{module}"), f"draw_{what}")(*given)
+
+
 class Presented:
     """A result that its presenter writes."""
 

@@ -24,7 +24,7 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import report_of
-from ..files import __version__
+from ..files import __version__, html_table
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
 from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import Posterior
@@ -34,8 +34,9 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE, Record, versions, write_report, write_table
+from .folder import PROVENANCE, Record, draw, versions, write_report, write_table
 from .setup import CoarseToFine, FitSetup
+from .simulation import Histories
 from .starts import coarse_columns
 
 if TYPE_CHECKING:
@@ -202,6 +203,68 @@ class Fit:
             }  # fmt: skip
             rows.append(pd.DataFrame(columns))
         return pd.concat(rows, ignore_index=True)
+
+    def bands(self) -> pd.DataFrame:
+        """Return the 95 % band of `moduli`: modulus, strain, lower_MPa, upper_MPa."""
+        return self.moduli()[["modulus", "strain", "lower_MPa", "upper_MPa"]]
+
+    def draw_laws(self, count: int = 100, *, seed: int = 0) -> list[HypoelasticLaw]:
+        """Return random laws that agree with the data: 95 % of them lie within the band.
+
+        The same seed draws the same laws. InputError : the fit has no uncertainty to draw from.
+        """
+        if self._known is None or self.best.certainty is None:
+            problem = "the solver gives no derivatives, so that nothing is known to draw from"
+            raise InputError(self.project.path, "draw_laws", problem)
+        return self.best.certainty.laws(self.law, count, np.random.default_rng(seed))
+
+    def history(self) -> Histories:
+        """Return the analyses of the best fit by name of the comparison, on the mesh of the fit."""
+        unknowns, y = self.problem.unknowns, self.best.point.unknowns
+        law = unknowns.law(self.problem.law, y)
+        pairs = zip(self.problem.comparisons, self.best.point.histories, strict=True)
+        return Histories({
+            c.name: replace(h, model=c.model_at(unknowns.nuisance_values(c.name, y)), law=law)
+            for c, h in pairs
+        })  # fmt: skip
+
+    def plot_moduli(self) -> Any:
+        """Return a drawing of the moduli with their bands, as on the page.
+
+        A notebook shows it; `save("moduli.png")` (.svg, .pdf) writes it, and `spec` is Vega's
+        specification. The charts are Vega's: into axes of matplotlib draw the columns of `moduli`.
+        """
+        return draw("fit_page", "moduli", self)
+
+    def plot_starts(self) -> Any:
+        """Return a drawing of the optima of all starts, as `plot_moduli`."""
+        return draw("fit_page", "starts", self)
+
+    def plot_residuals(self, test: str | None = None) -> Any:
+        """Return a drawing of modelled less measured values of a test, or of all."""
+        return draw("fit_page", "residuals", self, test)
+
+    def plot_loads(self, test: str | None = None) -> Any:
+        """Return a drawing of measured and modelled load curves, of the first test that has any."""
+        return draw("fit_page", "test", self, "loads", test)
+
+    def plot_heights(self, test: str | None = None) -> Any:
+        """Return a drawing of cuts through a bubble, measured and modelled."""
+        return draw("fit_page", "test", self, "heights", test)
+
+    def plot_history(self, name: str | None = None, **look: Any) -> Any:
+        """Return a drawing of one of `history`, as `Histories.plot`."""
+        return self.history().plot(name, **look)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [a.modulus, f"{100 * a.strain:.3g} %", f"{a.value:.4g}",
+             "" if a.band is None else "{:.4g} to {:.4g}".format(*a.band), f"{a.per_width:.4g}"]
+            for a in answers(self)
+        ]  # fmt: skip
+        words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
+        words += f"best of {len(self.best.ranked)} starts, {len(self.notes)} notes"
+        return html_table(words, ["", "strain", "MPa", "95 % band", "kN/m"], rows)
 
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: value, sigma, bounds, correlation with each other one."""

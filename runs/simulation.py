@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
 from ..errors import lines as note_lines
@@ -30,7 +30,7 @@ from ..project.schema import FITTED, usual_folder
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import Once, RunCache, run_cache
-from .folder import RESULT, Store
+from .folder import RESULT, Store, draw
 from .starts import timed
 
 #: A remark on a run that has no result.
@@ -96,10 +96,26 @@ class Analyses:
                 self.solver.progress = None
 
 
+class Histories(dict[str, History]):
+    """Analyses by name, each with its model and law."""
+
+    def plot(
+        self, name: str | None = None, *, quantity: Literal["strain", "stress"] = "strain",
+        component: int = 0, frame: int = -1,
+    ) -> Any:  # fmt: skip
+        """Return a drawing of a deformed mesh, the first unless named; see `Fit.plot_moduli`.
+
+        component : 0 along the warp, 1 along the fill, 2 in shear. frame : from 0; -1 the last.
+        InputError : no analysis of that name, or no such component or frame.
+        """
+        chosen = next(iter(self)) if name is None else name
+        if chosen not in self:
+            raise InputError(None, "name", f"expected one of {', '.join(self)}, got {chosen!r}")
+        return draw("maps", "history", chosen, self[chosen], quantity, component, frame)
+
+
 @checked
-def simulate(
-    test: Test, card: MaterialCard, solver: str = "membrane", **options: Any
-) -> dict[str, History]:
+def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options: Any) -> Histories:
     """Run one test with a card and its thickness; return histories by part of the test.
 
     InputError : no such solver, or an option it does not know. SolverFailure.
@@ -107,7 +123,10 @@ def simulate(
     runs = usable_solver(solver, options, cache=run_cache())
     check_carries(runs, card.law)
     models = test.models(card.thickness)
-    return {part: runs.run(model, card.law) for part, model in models.items()}
+    return Histories({
+        part: replace(runs.run(model, card.law), model=model, law=card.law)
+        for part, model in models.items()
+    })  # fmt: skip
 
 
 def simulate_cards(

@@ -6,17 +6,21 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.law import HypoelasticLaw
-from ..meshes.mesh import Mesh, log_strain_of
+from ..materials.wrinkles import relaxed_increments
+from ..meshes.mesh import Mesh, log_strain_of, meshio_of, surface_strain
 from .membrane.kernel import reference_elements
+
+if TYPE_CHECKING:
+    import meshio
 
 #: Kinds of notes that are made here.
 EARLY = NoteKind("stopped early", mark=4)
@@ -29,6 +33,10 @@ T = TypeVar("T")
 Array = NDArray[np.float64]
 #: Loads that are named one by one; of more, the first and the last.
 FEW = 3
+#: Places of strain and stress: the middle of each element, or its Gauss points.
+Places = Literal["elements", "points"]
+#: Names of strain and stress in files for ParaView.
+STRAIN_DATA, STRESS_DATA = "log_strain_1_2_12", "stress_1_2_12_MPa"
 
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
@@ -63,7 +71,9 @@ class History:
     remarks: notes for the reader (plain words are of the kind "of the solver"); early: the solver's
     reason for an end before the model's last frame (no equilibrium further on), "" where there is
     none: fewer frames without it are no result; seconds of the run itself, where a cache keeps
-    them; from_cache: whether it was made earlier and nothing ran now.
+    them; from_cache: whether it was made earlier and nothing ran now; relaxed: the wall wrinkled as
+    a tension field; model, law: what was run, which `simulate` and `Fit.history` add and the
+    methods below need.
     """
 
     load: Array
@@ -83,11 +93,79 @@ class History:
     early: str = ""
     seconds: float | None = None
     from_cache: bool = False
+    relaxed: bool = False
+    model: Any = None
+    law: HypoelasticLaw | None = None
 
     @property
     def stable(self) -> bool | None:
         """Return whether every reported equilibrium is stable; None where nobody looked."""
         return None if self.unstable is None else not self.unstable
+
+    @property
+    def mesh(self) -> Mesh:
+        """Return the mesh of the model, at rest; InputError where the model is not known."""
+        if self.model is None:
+            raise InputError(None, "model", "is not known here: simulate(...) and fit.history() do")
+        return cast(Mesh, self.model.mesh)
+
+    def strain(self, at: Places = "elements") -> Array:
+        """Return log strain (eps1, eps2, gamma12) since the sheet was without stress.
+
+        (frames, elements, 3) in the middle of each element, (frames, elements, 4, 3) at its Gauss
+        points, where strain_min and strain_max are taken. InputError : other places.
+        """
+        return np.array([self._strained(u, at) for u in self.displacement])
+
+    def stress(self, at: Places = "elements") -> Array:
+        """Return Cauchy stress (MPa) along the turned warp and fill, and shear, shaped as `strain`.
+
+        The law is integrated along the increments that the solver kept; a tension field carries no
+        compression.
+        """
+        mesh, law = self.mesh, self.law
+        if law is None:
+            raise InputError(None, "law", "is not known here: simulate(...) and fit.history() do")
+        path, reported = self._steps()
+        shape = (len(mesh.quads), 3) if at == "elements" else (len(mesh.quads), 4, 3)
+        fabric = stress = np.zeros((int(np.prod(shape[:-1])), 3))
+        every = []
+        for u in path:
+            strain = self._strained(u, at).reshape(-1, 3)
+            if self.relaxed:
+                fabric, stress = relaxed_increments(
+                    law.pieces, law.coupling, strain, fabric, stress
+                )
+            else:
+                stress, fabric = law.increment(fabric, strain, stress)[0], strain
+            every.append(stress.reshape(shape))
+        return np.array(every)[reported]
+
+    def to_meshio(self, frame: int = -1) -> meshio.Mesh:
+        """Return the deformed mesh of a frame, with displacement, strain and stress as its data."""
+        cells = {STRAIN_DATA: self.strain()[frame], STRESS_DATA: self.stress()[frame]}
+        return meshio_of(self.mesh, self.displacement[frame], {}, cells)
+
+    def _strained(self, u: Array, at: Places) -> Array:
+        """Return the strain of one displacement (nodes, 3)."""
+        mesh, quads = self.mesh, self.mesh.quads
+        rest = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
+        warp = getattr(self.model, "warp", mesh.warp)
+        yarn = np.broadcast_to([1.0, 0.0, 0.0] if warp is None else warp, (len(quads), 3))
+        if at not in ("elements", "points"):
+            raise InputError(None, "at", f"expected 'elements' or 'points', got {at!r}")
+        sheet, moved = replace(mesh, points=rest, warp=yarn), mesh.points + u - rest
+        return surface_strain(sheet, moved) if at == "elements" else log_strain(sheet, [moved])[0]
+
+    def _steps(self) -> tuple[Array, list[int]]:
+        """Return displacements from increment to increment, and the place of each frame there."""
+        places: list[int] = []
+        for place, u in enumerate(() if self.path is None else self.path):
+            if len(places) < len(self.load) and np.array_equal(u, self.displacement[len(places)]):
+                places.append(place)
+        if self.path is None or len(places) < len(self.load):
+            return self.displacement, list(range(len(self.load)))
+        return self.path, places
 
 
 @dataclass(frozen=True)
@@ -364,12 +442,14 @@ def cell_blocks(
     return [(name, np.array(rows)) for name, rows in cells]
 
 
-def log_strain(mesh: Mesh, displacements: Array, warp: Array | None = None) -> Array:
+def log_strain(mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None) -> Array:
     """Return (frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
 
-    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; x unless given.
+    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; the mesh's, or x,
+    unless given.
     """
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    warp = mesh.warp if warp is None else warp
     yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
     slopes = reference_elements(points, quads, yarn).slopes
     frames = []

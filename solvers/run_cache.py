@@ -58,7 +58,8 @@ OLD = 86400.0
 #: First bytes of every file, with the number of its layout.
 TITLE = b"bubblefit run 1\n"
 #: Fields that are no arrays, and fields that are not of the run itself.
-WORDS, NOT_WRITTEN = ("iterations", "unstable", "remarks", "early"), ("seconds", "from_cache")
+WORDS = ("iterations", "unstable", "remarks", "early", "relaxed")
+NOT_WRITTEN = ("seconds", "from_cache", "model", "law")
 
 
 def digest_of(*things: object) -> str:
@@ -278,6 +279,7 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
     words = {
         "key": key, "seconds": float(seconds), "iterations": int(history.iterations),
         "unstable": unstable, "remarks": remarks, "early": str(history.early),
+        "relaxed": bool(history.relaxed),
     }  # fmt: skip
     content = io.BytesIO()
     np.savez_compressed(content, words=np.array(json.dumps(words)), **arrays)
@@ -314,6 +316,7 @@ def from_bytes(content: bytes, key: str) -> History:
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
             early=str(words["early"]), seconds=float(words["seconds"]), from_cache=True,
+            relaxed=bool(words.get("relaxed", False)),
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         if isinstance(error, Damaged):

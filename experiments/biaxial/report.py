@@ -15,6 +15,7 @@ from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
+from ...reports.charts import Charts
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import save
@@ -203,18 +204,27 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     return Findings({"ratios": numbers}, warnings, (summary,), summary, summary)
 
 
+def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
+    """Return charts of strain over load, measured and modelled."""
+    panels = []
+    for p in prepared.fitted_paths(fitted):
+        curve = ("model", p.path.larger, PERCENT * p.objective.modelled(p.history))
+        strain = PERCENT * p.objective.strain
+        panels.append(BiaxialPanel(p.path.ratio, p.path.larger, strain, (curve,)))
+    caption = "Strain over the larger load: measured and modelled"
+    return biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
+
+
+#: Charts of a fitted test by name, for notebooks.
+CHARTS = {"loads": fitted_paths}
+
+
 def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
     paths = prepared.fitted_paths(fitted)
     with replacing(out.path("paths.csv")) as path:
         path_table(paths).to_csv(path, index=False, float_format="%.9g")
-    panels = []
-    for p in paths:
-        curve = ("model", p.path.larger, PERCENT * p.objective.modelled(p.history))
-        strain = PERCENT * p.objective.strain
-        panels.append(BiaxialPanel(p.path.ratio, p.path.larger, strain, (curve,)))
-    caption = "Strain over the larger load: measured and modelled"
-    charts = biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
+    charts = fitted_paths(prepared, fitted)
     save(out.path("paths.png"), charts)
     facts = [("ratios matched", ", ".join(p.path.ratio for p in paths))]
     files = [

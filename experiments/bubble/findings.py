@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -43,10 +43,7 @@ def objective_of(fitted: FittedTest) -> FieldObjective:
 def fitted_model(fitted: FittedTest) -> BubbleModel:
     """Return the model with its parameters as the fit found them."""
     (comparison,) = fitted.comparisons
-    model: BubbleModel = comparison.model
-    own = [n for n in comparison.nuisance if n.model_parameter is not None]
-    values = {str(n.model_parameter): n.scale * fitted.nuisance[n.name] for n in own}
-    return model.with_parameters(values)
+    return cast(BubbleModel, comparison.model_at(fitted.nuisance))
 
 
 def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any]:

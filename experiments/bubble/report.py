@@ -271,6 +271,10 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     )
 
 
+#: Charts of a fitted test by name, for notebooks.
+CHARTS = {"heights": profile_charts}
+
+
 def _source(prepared: PreparedBubble) -> str:
     """Return the name of the data: only what a camera saw is measured."""
     return "measured" if prepared.known is None else "known"

@@ -16,7 +16,6 @@ from ...inference.comparison import Nuisance
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes
-from ...meshes.mesh import surface_strain
 from ...readers.fields import DisplacementField
 from ...solvers.base import History
 from .section import Sheet
@@ -199,26 +198,10 @@ def inflated_sheets(
     model: BubbleModel, history: History, law: HypoelasticLaw
 ) -> Iterator[InflatedSheet]:
     """Yield a sheet a reported pressure, the law integrated along the increments of the history."""
-    path, reported = history.path, model.reported
-    if path is None or len(path) != len(model.increments):
-        path, reported = history.displacement, np.arange(len(history.displacement))
-    frames = {int(step): frame for frame, step in enumerate(reported)}
-    strain = stress = np.zeros((len(model.mesh.quads), 3))
-    for step, u in enumerate(path):
-        before, strain = strain, sheet_strain(model, u)
-        stress, _ = law.increment(before, strain, stress)
-        if step in frames:
-            load = float(history.load[frames[step]])
-            yield InflatedSheet(load, u, strain, stress, states(stress))
-
-
-def sheet_strain(model: BubbleModel, displacement: Array) -> Array:
-    """Return (quads, 3) log strain since the sheet was without stress; displacement (nodes, 3)."""
-    mesh, rest = model.mesh, model.stress_free
-    warp = mesh.warp
-    if warp is None:
-        warp = np.tile([1.0, 0.0, 0.0], (len(mesh.quads), 1))
-    return surface_strain(replace(mesh, points=rest, warp=warp), mesh.points + displacement - rest)
+    known = replace(history, model=model, law=law)
+    frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
+    for load, u, strain, stress in frames:
+        yield InflatedSheet(float(load), u, strain, stress, states(stress))
 
 
 def states(stress: Array) -> NDArray[np.intp]:

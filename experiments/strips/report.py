@@ -17,6 +17,7 @@ from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import middle_strain
 from ...meshes.strip_models import UniaxialModel
+from ...reports.charts import Charts
 from ...reports.content import Exhibit, Table
 from ...reports.maps import write_vtu
 from ...reports.moduli import moduli_together
@@ -345,17 +346,27 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     )
 
 
-def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
-    """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-    test, strips = prepared.test, prepared.fitted_strips(fitted)
-    with replacing(out.path("loads.csv")) as path:
-        load_table(strips).to_csv(path, index=False)
+def fitted_loads(prepared: PreparedStrips, fitted: FittedTest) -> Charts:
+    """Return charts of load over elongation, measured and modelled, and of their difference."""
+    strips = prepared.fitted_strips(fitted)
     models = {
         s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
     }
     panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
     caption = "Load over gauge elongation: measured and modelled"
-    charts = load_charts(f"{test.name} loads", panels, caption)
+    return load_charts(f"{prepared.test.name} loads", panels, caption)
+
+
+#: Charts of a fitted test by name, for notebooks.
+CHARTS = {"loads": fitted_loads}
+
+
+def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+    """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
+    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    with replacing(out.path("loads.csv")) as path:
+        load_table(strips).to_csv(path, index=False)
+    charts = fitted_loads(prepared, fitted)
     save(out.path("loads.png"), charts)
     figures: list[Shown] = []
     files = [

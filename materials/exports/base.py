@@ -1,15 +1,16 @@
 """Describe formats of exports and their options, head their text, and write CSV tables."""
 
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, Note, NoteKind, one_line
-from ...files import __version__
+from ...errors import InputError, Note, NoteKind, OutputError, one_line
+from ...files import __version__, write_text
 from ..card import LEVEL, MaterialCard, strains_of
 from ..forms.base import COMPONENTS, UNLIMITED, Array, ratios_of
 from ..law import HypoelasticLaw
@@ -73,6 +74,15 @@ class Export:
 
     files: Mapping[str, str]
     says: Says
+
+
+def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None:
+    """Write the files of an export; OutputError : one is there, or cannot be written."""
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise OutputError(f"{path}: is already there; use --force (overwrite) or another --out")
+    for path, text in zip(paths, export.files.values(), strict=True):
+        write_text(path, text)
 
 
 def check_positive(card: MaterialCard) -> None:
@@ -221,6 +231,15 @@ class Format:
         if card.certainty is None:
             return export
         return replace(export, files={**export.files, BAND_FILE: band_table(card)})
+
+    def write_files(
+        self, card: MaterialCard, stem: Path, overwrite: bool = False, **given: Any
+    ) -> list[Path]:
+        """Write the files of a card, the stem with a suffix each, and return them."""
+        export = self.export(card, **given)
+        paths = [stem.with_name(f"{stem.name}{suffix}") for suffix in export.files]
+        write_export(export, paths, overwrite)
+        return paths
 
     def check(self, names: Iterable[str]) -> None:
         """Raise InputError for the name of an option that this format does not take."""

@@ -164,7 +164,7 @@ def analyse(
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
-        remarks=tuple(remarks), early=early,
+        remarks=tuple(remarks), early=early, relaxed=membrane.wrinkle_stiffness is not None,
     )  # fmt: skip
 
 
@@ -261,7 +261,7 @@ def analyse_inflated(
         history = History(
             levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
             cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
-            wrinkled=wrinkled, remarks=remarks,
+            wrinkled=wrinkled, remarks=remarks, relaxed=membrane.wrinkle_stiffness is not None,
         )  # fmt: skip
     return history, np.zeros((*history.displacement.shape, 0))
 
