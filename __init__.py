@@ -25,6 +25,7 @@ import bubblefit.solvers.marc.t19  # noqa: F401
 from .files import __version__ as __version__
 
 if TYPE_CHECKING:
+    from .experiments.strips.cycles import cycles
     from .materials.card import MaterialCard, read_card
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
@@ -35,8 +36,8 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "check", "fit", "plan", "predict",
-           "profile", "read_card", "read_project", "simulate"]  # fmt: skip
+__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "check", "cycles", "fit", "plan",
+           "predict", "profile", "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -46,6 +47,7 @@ _PLACES = {
     "Project": "project.project",
     "bootstrap": "runs.bootstrap",
     "check": "runs.fit",
+    "cycles": "experiments.strips.cycles",
     "fit": "runs.fit",
     "plan": "runs.plan",
     "predict": "runs.predictions",

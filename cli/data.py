@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,13 +13,16 @@ from typing import Any
 
 import click
 import numpy as np
+import pandas as pd
 
 from ..errors import InputError, OutputError
 from ..errors import lines as note_lines
+from ..errors import rows as note_rows
 from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest
+from ..experiments.strips.cycles import cycles
 from ..experiments.strips.gauge import (
     GaugeTable,
     PairedLoads,
@@ -34,6 +38,7 @@ from ..readers.sections import LENGTH_UNITS
 from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.run_pages import write_constants
+from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run
@@ -84,7 +89,20 @@ POSITIVE = click.FloatRange(min=0, min_open=True)
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace the files of --out.")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
 #: Arguments that are options of the same name.
-ARGUMENTS = "|".join([*OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit"])
+ARGUMENTS = "|".join(
+    [
+        *OF_LOADS,
+        "columns",
+        "max_gap",
+        "flag_column",
+        "format",
+        "length_unit",
+        "reference_load",
+        "length",
+        "width",
+        "strain_unit",
+    ]
+)
 
 
 @command(
@@ -352,3 +370,54 @@ def biaxial_command(**options: Any) -> None:
     Store(folder).finish(result)
     said = [line for one in evaluations for line in lines_of(one)]
     show(result, [*said, *note_lines(notes), written_to(folder)], options["as_json"])
+
+
+@command(
+    "cycles",
+    "bubblefit cycles strap.csv --reference-load 178",
+    "bubblefit cycles warp*.csv --length 200 --width 50 --out out/conditioning",
+)
+@click.argument("files", nargs=-1, required=True, type=FILE)
+@click.option("--reference-load", type=POSITIVE, metavar="N",
+              help="Load at which permanent strains are read; every branch has to pass it"
+              " [above the highest load at which a branch begins or ends].")  # fmt: skip
+@click.option("--length", type=POSITIVE, metavar="MM",
+              help="That the elongation is of, where a file has no strain.")  # fmt: skip
+@click.option("--width", type=POSITIVE, metavar="MM", help="For stiffness per width, N/mm.")
+@click.option("--load-unit", type=click.Choice(["N", "kN", "lbf"]),
+              help="Where a file names none.")  # fmt: skip
+@click.option("--strain-unit", type=click.Choice(["%", "mm/mm"]), help="Where a file names none.")
+@click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the numbers.")
+@given.out_option("out/cycles")
+@given.OVERWRITE
+@given.AS_JSON
+def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
+    """Evaluate the load histories of FILES, a specimen each, as test machines export them.
+
+    Prints for each cycle the strain kept at the reference load, the tangent stiffness between 40
+    and 90 % of its peak on loading and unloading, and the energy lost. Writes cycles.csv,
+    holds.csv (creep and relaxation) and cycles.png. Slip and drift of an extensometer are noted.
+    """
+    out, overwrite, as_json = (options.pop(name) for name in ("out", "overwrite", "as_json"))
+    folder = Path("out/cycles") if out is None else out
+    check_out(folder / "cycles.csv", files, overwrite)
+    with _naming_options():
+        found = cycles(files, **options)
+    tables = {
+        "cycles": found.table,
+        "holds": found.holds,
+        "notes": pd.DataFrame(note_rows(found.notes)),
+    }
+    for name, table in tables.items():
+        with replacing(folder / f"{name}.csv") as path:
+            table.to_csv(path, index=False, float_format="%.9g")
+    drawn = [
+        (one.name, one.history.load, one.history.strain - one.zero,
+         [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in one.values])
+        for one in found.histories
+    ]  # fmt: skip
+    save(folder / "cycles.png", cycle_charts(drawn))
+    result = {"command": "cycles"} | {
+        name: json.loads(table.to_json(orient="records")) for name, table in tables.items()
+    }
+    show(result, [*found.lines(), *note_lines(found.notes), written_to(folder)], as_json)

@@ -26,6 +26,7 @@ COMMANDS = {
     "bubble": ("fits", "Fit a material to bubble inflation tests only."),
     "uniaxial": ("fits", "Fit a material to warp, fill and bias strip tests only."),
     "biaxial": ("data", "Evaluate designers' linear constants from biaxial tests."),
+    "cycles": ("data", "Evaluate load cycles: permanent strain, stiffness, energy lost."),
     "check": ("data", "Check the data before a fit."),
     "bend": ("predict", "Inflate and bend cylinders with material cards."),
     "validate": ("studies", "Cross-validate a fit: predict each test from the others."),

@@ -23,6 +23,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
         "Projects, fits, predictions",
         ("project.project:read_project,Project", "runs.fit:fit", "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
+         "experiments.strips.cycles:cycles,Cycles,EvaluatedHistory,CycleValues",
          "materials.card:MaterialCard,read_card,write_card,thickness_difference"),
     ),
     "studies": (

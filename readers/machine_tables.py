@@ -197,6 +197,16 @@ def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...
     return found.table.numbers(name) * TIME_UNITS[unit] if stamps is None else stamps
 
 
+def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
+    """Return the column of times in s that never falls, None where the table has none."""
+    names = [str(name) for name in found.table.cells.columns]
+    for i in columns_of(names, "time", named):
+        values = _times(found, {"time": names[i]}, ("time",))
+        if (np.diff(values) >= 0).all():
+            return values
+    return None
+
+
 @dataclass(frozen=True)
 class Channel:
     """A column of readings: the value is scale * reading + offset, in `unit`.

@@ -442,6 +442,17 @@ def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> lis
     return found
 
 
+def strain_columns(
+    names: list[str], units: Mapping[str, str], named: Mapping[str, str]
+) -> list[str]:
+    """Return the columns of strains along the specimen, the nearest to it first."""
+    if "strain" in named:
+        return [names[i] for i in called(names, named["strain"].strip())]
+    found = [n for n in names if STRAIN_WORDS & (own := _words(n)) and NEVER.isdisjoint(own)]
+    found = [n for n in found if not units[n] or units[n] in STRAIN_UNITS]
+    return sorted(found, key=distance_to_strip)
+
+
 def called(names: Sequence[str], asked: str) -> list[int]:
     """Return the columns of this name, else those that have it without their unit."""
     exact = [i for i, name in enumerate(names) if name == asked]

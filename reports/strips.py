@@ -239,6 +239,27 @@ def _grips(rest: Array, now: Array) -> list[Series]:
     return series
 
 
+def cycle_charts(
+    histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]]]],
+) -> Charts:
+    """Return load over strain of histories: name, load (n,) N, strain (n,), rows of each cycle.
+
+    Rows are where a cycle begins, is highest and ends; unloading is dashed.
+    """
+    charts = []
+    for name, load, strain, rows in histories:
+        series = []
+        for number, (start, peak, end) in enumerate(rows):
+            up, down = slice(start, peak + 1), slice(peak, end + 1)
+            colour, label = number % 6, f"cycle {number + 1}"
+            series.append(line(label, 100 * strain[up], load[up], colour=colour))
+            below = line("", 100 * strain[down], load[down], colour=colour, dashes=1)
+            series.append(below)
+        alt = f"{name}: load over strain, cycle by cycle; unloading dashed"
+        charts.append(Chart(name, "strain, %", "load, N", series, alt, from_zero=True))
+    return Charts("cycles", charts, "Load over strain; unloading dashed")
+
+
 def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
     """Return the strains of both yarns over the larger load, a chart a ratio."""
     if not panels:

@@ -26,6 +26,7 @@ from bubblefit.experiments.kinds import (
     UNSTABLE,
 )
 from bubblefit.experiments.registry import report_of
+from bubblefit.experiments.strips.cycles import CHANGING, DRIFT, GRIPS, SLIP
 from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
 from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
@@ -131,6 +132,11 @@ CASES = (
     (LOST, series.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
     (ORDER, series.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
     (NO_LOAD, series.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
+    (SLIP, series.notes_of_cycles, r"cycle 3 is a negative loop \(-"),
+    (SLIP, series.notes_of_cycles, r"at the peak of cycle 2 0\.0004 less strain than in cycle 1"),
+    (DRIFT, series.notes_of_cycles, "the strain moves by 2e-05 a second before the load does"),
+    (GRIPS, series.notes_of_cycles, "strains are travel of the machine"),
+    (CHANGING, series.notes_of_cycles, r"lost\.csv: no cycle repeats the one before"),
     (LOSES, series.notes_of_exports, "there the curve ends at 30 % of log strain"),
     (CONFIRM, series.notes_of_exports,
      "that tables of G12 are looked up with the engineering shear"),

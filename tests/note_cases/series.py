@@ -22,6 +22,7 @@ from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import History
 
+from .. import load_cycles
 from ..bars import BarKind, BarSolver, BarTest, project_of
 
 LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
@@ -91,6 +92,14 @@ def gauge(folder: Path) -> GaugeTable:
 
 def notes_of_gauge(folder: Path, _: Any) -> list[Note]:
     return gauge(folder).notes
+
+
+def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
+    time, load, strain = load_cycles.made()
+    travel = folder / "travel.csv"
+    load_cycles.write(travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain))
+    faulty = list(load_cycles.faulty(folder).values())
+    return [*bf.cycles(faulty).notes, *bf.cycles(travel, length=200.0).notes]
 
 
 def notes_of_exports(*_: Any) -> list[Note]:

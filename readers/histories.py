@@ -1,0 +1,218 @@
+"""Load over strain of a specimen through all its cycles, and the branches of the history.
+
+A turn of the load counts by its share of the rise or fall before it, so that small cycles beside a
+large one are found; noise, overshoot of the machine's control and the ends of holds are no cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .machine_tables import (
+    MachineTable,
+    TableOptions,
+    called_times,
+    column_of,
+    measured,
+    read_machine_table,
+)
+from .tables import (
+    LENGTH_UNITS,
+    LOAD_UNITS,
+    STRAIN_UNITS,
+    distance_to_strip,
+    is_between_grips,
+    means,
+    strain_columns,
+)
+
+Array = NDArray[np.float64]
+QUANTITIES = ("load", "strain", "elongation", "travel", "time")
+#: Of the rise before it, the part that an unloading goes back; of the unloading, that a loading
+#: rises again; and of the range of all loads, the least change that is no noise.
+BACK, AGAIN, FLOOR = 0.7, 0.2, 0.005
+#: A strain without a unit is a number of one where it changes by less than this, else not known.
+PLAIN = 0.5
+#: A hold: a way along the curve slower than this share of the cycle's usual speed.
+SLOW, FEWEST = 0.2, 4
+
+
+@dataclass(frozen=True, eq=False)
+class LoadHistory:
+    """Load (n,) N and strain (n,), as recorded; time (n,) s and travel (n,) mm, or None.
+
+    travel : of the machine. measured : "extensometer" or "grips", where the strain was measured.
+    """
+
+    path: Path
+    load: Array
+    strain: Array
+    time: Array | None = None
+    travel: Array | None = None
+    measured: Literal["extensometer", "grips"] = "extensometer"
+    notes: tuple[str, ...] = ()
+
+
+def read_history(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    length: float | None = None,
+    load_unit: str | None = None,
+    strain_unit: str | None = None,
+    length_unit: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+    sheet: str | None = None,
+    format: str | None = None,
+) -> LoadHistory:
+    """Read a whole load history: a plain table, or the export of an Instron, Zwick or MTS machine.
+
+    columns : the file's own names of `QUANTITIES`. The strain is that of the column nearest to the
+    specimen; length : mm between the points an elongation is of. units : where the file names none.
+    """
+    path, named = Path(path), dict(columns or {})
+    for name in named:
+        if name not in QUANTITIES:
+            problem = f"unknown quantity {name!r}; expected {', '.join(QUANTITIES)}"
+            raise InputError(None, "columns", problem)
+    if length is not None and not length > 0:
+        raise InputError(None, "length", f"expected a length above 0 mm, got {length:g}")
+    along = {**named, **({"elongation": named["strain"]} if "strain" in named else {})}
+    found = read_machine_table(path, TableOptions(along, decimal=decimal, sheet=sheet), format)
+    load = measured(found, column_of(found, "load", named), "load", LOAD_UNITS, load_unit)
+    names, notes = [str(name) for name in found.table.cells.columns], found.notes
+    # A strain that is computed from the travel is the travel's.
+    strains = [] if "elongation" in named else strain_columns(names, found.units, named)
+    strains = [n for n in strains if "strain" in named or not is_between_grips(n, False)]
+    grips = False
+    if strains:
+        column = strains[0]
+        strain, more = _strain(found, column, strain_unit)
+        others = f", not {' and '.join(map(repr, strains[1:]))}" if strains[1:] else ""
+        notes += (f"{path.name}: the strain is column {column!r}{others}{more}",)
+    else:
+        column = column_of(found, "elongation", along)
+        if found.units[column] in STRAIN_UNITS:
+            strain = measured(found, column, "strain", STRAIN_UNITS, strain_unit)
+        else:
+            at = f"line {found.header}, column {column!r}"
+            if length is None:
+                problem = "is an elongation: say the length in mm that it is of, length"
+                raise InputError(path, at, problem)
+            strain = measured(found, column, "length", LENGTH_UNITS, length_unit) / length
+        grips = is_between_grips(column, "elongation" in named)
+    machine = [
+        n for n in names
+        if n and n != column and means(n, "elongation") and distance_to_strip(n)
+        and found.units[n] in LENGTH_UNITS
+    ]  # fmt: skip
+    moved = named.get("travel") or (machine[0] if machine else "")
+    travel = measured(found, moved, "length", LENGTH_UNITS, length_unit) if moved else None
+    if len(load) < 2 or not np.ptp(strain) > 0:
+        raise InputError(path, f"column {column!r}", "the strain does not change: nothing to read")
+    where: Literal["extensometer", "grips"] = "grips" if grips else "extensometer"
+    return LoadHistory(path, load, strain, called_times(found, named), travel, where, notes)
+
+
+def _strain(found: MachineTable, column: str, unit: str | None) -> tuple[Array, str]:
+    if found.units[column] or unit:
+        return measured(found, column, "strain", STRAIN_UNITS, unit), ""
+    strain = found.table.numbers(column)
+    if np.ptp(strain) > PLAIN:
+        problem = f"changes by {np.ptp(strain):.3g} and names no unit; say strain_unit, % or mm/mm"
+        raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
+    return strain, ", which names no unit: mm/mm is taken"
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Rows of one cycle: loading from `start` to `peak`, unloading from there to `end`.
+
+    number : from 1. unloaded : whether it unloads; a record may end, or a specimen break, before.
+    """
+
+    number: int
+    start: int
+    peak: int
+    end: int
+    unloaded: bool = True
+
+
+def find_cycles(load: Array) -> list[Cycle]:
+    """Return the cycles of loads (n,); those whose unloading has fewer than 5 rows have none."""
+    rows, least = _turns(load), len(load) - 1
+    cycles = []
+    for k in range(0, len(rows) - 1, 2):
+        end = rows[k + 2] if k + 2 < len(rows) else least
+        cycles.append(Cycle(k // 2 + 1, rows[k], rows[k + 1], end, k + 2 < len(rows)))
+    return [c if c.end - c.peak >= 5 else replace(c, unloaded=False) for c in cycles]
+
+
+def _turns(load: Array) -> list[int]:
+    """Return rows of a valley, the peak after it, the next valley and so on."""
+    floor = FLOOR * float(np.ptp(load)) if len(load) else 0.0
+    if not floor > 0:
+        return []
+    found: list[int] = []
+    far, sign = 0, -1.0  # the first turn is a valley
+    for i, value in enumerate(load):
+        if sign * (value - load[far]) > 0:
+            far = i
+            continue
+        before = abs(load[far] - load[found[-1]]) if found else 0.0
+        if sign * (load[far] - value) > max(floor, (BACK if sign > 0 else AGAIN) * before):
+            found.append(far)
+            far, sign = i, -sign
+    return [*found, far]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Rows of a hold, first and last, of a cycle: at its top, or at its bottom after it."""
+
+    cycle: int
+    at: Literal["top", "bottom"]
+    first: int
+    last: int
+
+
+def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
+    """Return the holds in order of time; none where the file has no time."""
+    found: list[Hold] = []
+    ends = [*(c.start for c in cycles[1:]), len(history.load) - 1]
+    for c, end in zip(cycles, ends, strict=True):
+        rows = slice(c.start, max(end, c.end) + FEWEST)
+        if history.time is None or not np.ptp(history.strain[rows]) > 0:
+            continue
+        load, strain = (x[rows] / np.ptp(x[rows]) for x in (history.load, history.strain))
+        way = np.hypot(np.diff(load), np.diff(strain))
+        speed = way / np.maximum(np.diff(history.time[rows]), 1e-9)
+        # Half of the way is gone slower: however long the holds are, hardly any way is theirs.
+        order = np.argsort(speed)
+        usual = speed[order][int(np.searchsorted(np.cumsum(way[order]), 0.5 * way.sum()))]
+        slow = np.array([False, *(speed < SLOW * usual), False])
+        runs = np.flatnonzero(slow[1:] != slow[:-1]).reshape(-1, 2) + c.start
+        for first, last in runs.tolist():
+            top = 2 * history.load[first] > history.load[c.peak] + history.load[c.start]
+            before = first < c.peak and not top  # the beginning of a first loading
+            if last - first >= FEWEST and not before and all(h.last < first for h in found):
+                found.append(Hold(c.number, "top" if top else "bottom", first, last))
+    return found
+
+
+def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:
+    """Return the row before the first passage of a load level and the strain there; NaN if none."""
+    side = load >= level
+    change = np.flatnonzero(side[1:] != side[:-1])
+    if not len(change):
+        return -1, float("nan")
+    i = int(change[0])
+    share = (level - load[i]) / (load[i + 1] - load[i])
+    return i, float(strain[i] + share * (strain[i + 1] - strain[i]))

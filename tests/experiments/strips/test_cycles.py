@@ -1,0 +1,221 @@
+"""Load histories: cycles found, values by hand, slip and holds; formats of machines and units."""
+
+import csv
+import json
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bubblefit import cycles
+from bubblefit.errors import InputError
+from bubblefit.experiments.strips.cycles import DRIFT, SLIP
+from bubblefit.readers.histories import find_cycles, find_holds, read_history
+
+from ...commands import in_process
+from ...load_cycles import LOW, MADE, faulty, made, write
+from ...places import ROOT
+
+LBF, INCH = 4.4482216152605, 25.4
+
+
+@pytest.fixture
+def plain(tmp_path):
+    time, load, strain = made()
+    return write(tmp_path / "strap.csv", ["time_s,load_N,strain"], (time, load, strain))
+
+
+def test_straight_branches_give_their_own_slopes_and_areas(plain):
+    found = cycles(plain, reference_load=100.0).histories[0]
+    start, zero = 0.0, 0.010 * (100.0 - LOW) / (3000.0 - LOW)
+    assert [v.cycle.number for v in found.values] == [1, 2, 3]
+    for v, (kept, top, peak) in zip(found.values, MADE, strict=True):
+        up, down = (peak - LOW) / (top - start), (peak - LOW) / (top - kept)
+        permanent = kept + (100.0 - LOW) / down - zero
+        mean = 0.5 * (peak + 100.0)
+        work, back = ((peak - 100.0) / slope * mean for slope in (up, down))
+        values = v.EA_loading, v.EA_unloading, v.secant_loading, v.secant_unloading
+        assert values == pytest.approx((up, down, up, down), rel=1e-9)
+        assert (v.permanent, v.top) == pytest.approx((permanent, top - zero), rel=1e-9)
+        assert (v.work, v.loss) == pytest.approx((work, work - back), rel=1e-9)
+        start = kept
+    table = cycles(plain, width=50.0).table
+    assert table["EA_loading_N_per_mm"][0] == pytest.approx((3000 - LOW) / 0.010 / 50)
+    assert table["loading_N_per_s"][0] == pytest.approx(2 * (3000 - LOW) / 39)
+
+
+@pytest.mark.parametrize("machine", ["instron", "zwick", "mts"])
+def test_machines_and_units_give_the_same_history(plain, tmp_path, machine):
+    time, load, strain = made()
+    path = tmp_path / f"{machine}.csv"
+    if machine == "instron":
+        head = ['"Total Time (s)","Cycle Elapsed Time (s)","Position (in)","Load (lbf)",'
+                '"Strain(8800:Extensometer) (in/in)",']  # fmt: skip
+        columns = (time, time % 7, 300 / INCH * strain, load / LBF, strain)
+        write(path, head, columns, end=",")
+    elif machine == "zwick":
+        head = ["Prüfzeit;Standardkraft;Standardweg;Feindehnung", "s;kN;mm;%"]
+        write(path, head, (time, load / 1e3, 300 * strain, 100 * strain), ";", comma=True)
+    else:
+        head = ["Running Time\tAxial Force\tAxial Displacement\tAxial Strain",
+                "(s)\t(kN)\t(mm)\t(mm/mm)"]  # fmt: skip
+        write(path, head, (time, load / 1e3, 300 * strain, strain), "\t")
+    one, other = read_history(plain), read_history(path)
+    np.testing.assert_allclose(other.load, one.load, rtol=1e-9)
+    np.testing.assert_allclose(other.strain, one.strain, atol=1e-12)
+    np.testing.assert_allclose(other.time, time)
+    np.testing.assert_allclose(other.travel, 300 * strain, atol=1e-9)
+    assert other.measured == "extensometer"
+
+
+def test_an_elongation_between_grips_needs_its_length_and_is_doubted(tmp_path):
+    time, load, strain = made()
+    path = write(
+        tmp_path / "g.csv", ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain)
+    )
+    with pytest.raises(InputError, match="length"):
+        cycles(path)
+    found = cycles(path, length=200.0)
+    assert found.histories[0].values[0].top == pytest.approx(0.010, rel=0.03)
+    assert any(note.kind == "strain between grips" for note in found.notes)
+
+
+def test_small_cycles_beside_a_large_one_are_found_and_overshoot_is_none():
+    load = np.concatenate([
+        np.linspace(25, 330, 30), np.linspace(330, 140, 10), np.linspace(140, 200, 10),
+        np.linspace(200, 52, 30), np.linspace(52, 56, 8), np.linspace(56, 204, 30),
+        np.linspace(204, 52, 30), np.linspace(52, 6680, 40), np.linspace(6680, 25, 40),
+    ])  # fmt: skip
+    load += np.random.default_rng(1).normal(0, 0.5, len(load))
+    tops = [load[c.peak] for c in find_cycles(load)]
+    assert tops == pytest.approx([330, 204, 6680], abs=3)
+
+
+def test_slip_and_drift_are_named(tmp_path):
+    files = faulty(tmp_path)
+    found = cycles(list(files.values()))
+    by = {kind: {n.of for n in found.notes if n.kind == kind} for kind in (SLIP, DRIFT)}
+    assert by == {SLIP: {"negative.csv", "lost.csv"}, DRIFT: {"drifting.csv"}}
+    assert found.histories[1].values[2].loss < 0
+
+
+def test_a_hold_gives_creep_per_decade(tmp_path):
+    time, load, strain = made(points=80, made=MADE[:1])
+    top = int(np.argmax(load))
+    since = np.arange(1, 401) * 0.5
+    creep = strain[top] + 1e-4 * np.log10(1 + since / 0.01)
+    joined = (
+        np.r_[time[: top + 1], time[top] + since, time[top + 1 :] + since[-1]],
+        np.r_[load[: top + 1], np.full(400, load[top]), load[top + 1 :]],
+        np.r_[strain[: top + 1], creep, strain[top + 1 :] + creep[-1] - strain[top]],
+    )
+    path = write(tmp_path / "held.csv", ["time_s,load_N,strain"], joined)
+    history = read_history(path)
+    (hold,) = find_holds(history, find_cycles(history.load))
+    assert hold.at == "top"
+    row = cycles(path).holds.iloc[0]
+    assert row["strain_per_decade"] == pytest.approx(1e-4, rel=0.05)
+    assert row["load_N_per_decade"] == pytest.approx(0.0, abs=1e-9)
+    assert row["duration_s"] == pytest.approx(200.0, rel=0.05)
+
+
+def test_the_stable_cycle_is_the_first_that_repeats_the_one_before(tmp_path):
+    several = ((0.004, 0.010, 3000.0), (0.0048, 0.0102, 3000.0), (0.0049, 0.01025, 3000.0),
+               (0.00492, 0.01026, 3000.0))  # fmt: skip
+    path = write(tmp_path / "four.csv", ["time_s,load_N,strain"], made(made=several))
+    assert cycles(path).histories[0].stable == 4
+    assert cycles(path).table["state"].tolist() == ["first", "", "", "conditioned"]
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [({"reference_load": 2.0}, "reference load"), ({"reference_load": 2900.0}, "reference load"),
+     ({"reference_load": -1.0}, "reference_load"), ({"length": 0.0}, "length"),
+     ({"columns": {"pressure": "p"}}, "columns")],
+)  # fmt: skip
+def test_what_cannot_be_evaluated_is_named(plain, given, field):
+    with pytest.raises(InputError) as failed:
+        cycles(plain, **given)
+    assert failed.value.field == field
+
+
+def test_a_strain_in_percent_without_unit_is_asked_for(tmp_path):
+    time, load, strain = made()
+    path = write(tmp_path / "p.csv", ["time_s,load_N,strain"], (time, load, 100 * strain))
+    with pytest.raises(InputError, match="strain_unit"):
+        cycles(path)
+    assert cycles(path, strain_unit="%").histories[0].values[0].top == pytest.approx(0.01, rel=0.03)
+
+
+def test_command(plain, golden, tmp_path):
+    done = in_process("cycles", plain.name, "--reference-load", 100, cwd=tmp_path)
+    golden("cycles", done.stdout, tmp_path)
+    out = tmp_path / "out" / "cycles"
+    assert {p.name for p in out.iterdir()} == {"cycles.csv", "holds.csv", "notes.csv", "cycles.png"}
+    run = ("cycles", plain.name, "--json", "--length", 1)
+    assert "--overwrite" in in_process(*run, cwd=tmp_path, code=2).stderr
+    rows = json.loads(in_process(*run, "--overwrite", cwd=tmp_path).stdout)["cycles"]
+    assert rows[2]["peak_N"] == pytest.approx(6000.0)
+    said = in_process(
+        "cycles", plain.name, "--reference-load", 9, "--overwrite", cwd=tmp_path, code=2
+    )
+    assert "reference load" in said.stderr
+
+
+def by_hand(path, reference):
+    """Return permanent strain, both stiffnesses and loss by cycle, from the file's own steps."""
+    with open(path, newline="") as stream:
+        rows = [row for row in csv.DictReader(stream) if float(row["cycle"]) > 0]
+    found, zero = [], None
+    for number in sorted({int(row["cycle"]) for row in rows}):
+        own = [(float(r["load_N"]), float(r["strain"])) for r in rows if int(r["cycle"]) == number]
+        top = max(range(len(own)), key=lambda i: own[i][0])
+        peak, up, down = own[top][0], own[: top + 1], own[top:]
+
+        def passed(points):
+            for (f, e), (g, d) in pairwise(points):
+                if (f < reference) != (g < reference):
+                    return e + (reference - f) / (g - f) * (d - e)
+            return math.nan
+
+        def slope(points, peak=peak):
+            kept = [p for p in points if 0.4 * peak <= p[0] <= 0.9 * peak]
+            n, sx, sy = len(kept), sum(e for _, e in kept), sum(f for f, _ in kept)
+            sxy, sxx = sum(f * e for f, e in kept), sum(e * e for _, e in kept)
+            return (n * sxy - sx * sy) / (n * sxx - sx * sx)
+
+        start, end = passed(up), passed(down)
+        zero = start if zero is None else zero
+        above = [(reference, start), *(p for p in up if p[0] >= reference)]
+        back = [*(p for p in down if p[0] >= reference), (reference, end)]
+        area = [sum(0.5 * (f + g) * (d - e) for (f, e), (g, d) in pairwise(part))
+                for part in (above, back)]  # fmt: skip
+        found.append((end - zero, slope(up), slope(down), area[0] + area[1]))
+    return found
+
+
+def test_measured_straps_and_cords_are_as_by_hand(shared_data, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    import bench_cycles
+
+    files = sorted((shared_data / "webbing").glob("*.csv"))
+    assert len(files) >= 8
+    for path in files:
+        one = bench_cycles.evaluated(path)
+        hand = by_hand(path, one.reference)
+        assert len(hand) == len(one.values), path.name
+        for v, values in zip(one.values, hand, strict=True):
+            ours = v.permanent, v.EA_loading, v.EA_unloading, v.loss
+            assert ours == pytest.approx(values, rel=0.02), (path.name, v.cycle.number)
+
+
+def test_the_raw_export_is_its_plain_table(shared_data):
+    raw = shared_data / "webbing" / "raw_instron" / "st_1p75in_Test1.Stop.csv"
+    found = cycles([raw, shared_data / "webbing" / "st_1p75in_test1.csv"], reference_load=178.0)
+    for a, b in zip(found.histories[0].values, found.histories[1].values, strict=True):
+        assert (a.permanent, a.EA_loading, a.loss) == pytest.approx(
+            (b.permanent, b.EA_loading, b.loss), rel=0.02
+        )
+    # Ranges published with the data: 1.75 in strap, cycles 1 and 3.
+    assert found.histories[0].values[0].permanent == pytest.approx(0.0123, rel=0.02)
+    assert found.histories[0].values[2].loss == pytest.approx(20.7, rel=0.02)
