@@ -25,8 +25,10 @@ import bubblefit.solvers.marc.t19  # noqa: F401
 from .files import __version__ as __version__
 
 if TYPE_CHECKING:
+    from .experiments.kinds import Fabric
     from .experiments.strips.cycles import cycles
     from .materials.card import MaterialCard, read_card
+    from .project.objects import Bubble, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
     from .runs.fit import check, fit
@@ -36,15 +38,22 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-__all__ = ["Fit", "MaterialCard", "Project", "bootstrap", "check", "cycles", "fit", "plan",
-           "predict", "profile", "read_card", "read_project", "simulate"]  # fmt: skip
+__all__ = ["Bubble", "Fabric", "Fit", "Law", "MaterialCard", "Project", "Registration", "Sheet",
+           "Strips", "bootstrap", "check", "cycles", "fit", "plan", "predict", "profile",
+           "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
 _PLACES = {
+    "Bubble": "project.objects",
+    "Fabric": "experiments.kinds",
     "Fit": "runs.result",
+    "Law": "project.objects",
     "MaterialCard": "materials.card",
     "Project": "project.project",
+    "Registration": "project.objects",
+    "Sheet": "project.objects",
+    "Strips": "project.objects",
     "bootstrap": "runs.bootstrap",
     "check": "runs.fit",
     "cycles": "experiments.strips.cycles",

@@ -101,6 +101,8 @@ def _fits(value: Any, kind: Any) -> bool:
     if origin is Mapping:
         pairs = value.items() if isinstance(value, Mapping) else [(None, None)]
         return all(_fits(key, inside[0]) and _fits(one, inside[1]) for key, one in pairs)
+    if kind is Any:
+        return True
     if kind in (int, float):
         return hasattr(value, f"__{'index' if kind is int else 'float'}__")
     whole = origin or kind

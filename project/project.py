@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,31 +14,51 @@ from pydantic import ValidationError
 
 from ..errors import InputError, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
-from ..experiments.registry import kinds
-from ..files import content_of, is_file
+from ..experiments.registry import kind_named, kinds
+from ..files import content_of, is_file, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import form_settings
-from ..readers.sections import LENGTH_UNITS, MODULUS_UNITS, PRESSURE_UNITS, beside, first_error
+from ..readers.sections import (
+    LENGTH_UNITS,
+    MODULUS_UNITS,
+    PRESSURE_UNITS,
+    beside,
+    first_error,
+    in_base_units,
+)
 from ..solvers.registry import overridden, solver_sections, solver_settings
 from ..solvers.run_cache import RunCache, run_cache
 from ..solvers.settings import SCHEDULER
+from .objects import (
+    PYTHON,
+    Definition,
+    Law,
+    arguments_named,
+    definition_of,
+    plain,
+    scratch_folder,
+)
 from .schema import (
     FITTED,
     Cards,
+    CardSection,
     FitSection,
     LawSection,
     NamedCard,
     ProjectFile,
-    parse,
     read_cards,
+    read_content,
     usual_folder,
+    validated,
 )
 
 Settings = dict[str, Any]
 #: Data folders: of all tests, or by the name of a test.
 Folders = Path | Mapping[str, Path]
 NO_FILES = "is computed (known_solution) and reads no files; leave --data out"
+#: Of every number of an object.
+UNITS = {"modulus": "MPa", "pressure": "MPa", "length": "mm"}
 HEAD = "# As it was run: what the project says, with the options of the command.\n"
 
 
@@ -47,7 +68,8 @@ class Written:
 
     common : [fabric] and [units]. tests : the section of each test by its name, with the folder of
     its data, without defaults (which need not go with each other when they are said). whole : each
-    with its defaults. kinds : of the tests, by name. cards : each [[card]].
+    with its defaults. kinds : of the tests, by name. cards : each [[card]]. made : the objects that
+    the tests are of, by name, with arrays and cards in files below `held`; none of a file.
     """
 
     text: str
@@ -56,6 +78,8 @@ class Written:
     whole: Mapping[str, Settings]
     kinds: Mapping[str, str]
     cards: Sequence[Settings] = ()
+    made: Mapping[str, Definition] = field(default_factory=dict)
+    held: Path | None = None
 
 
 def section_as_run(
@@ -100,9 +124,10 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
         "law": plain(project.law.model_dump()),
         "fit": plain(project.fit.model_dump()),
     }
-    if isinstance(folder := settings["fit"].get("cache"), str):
-        settings["fit"]["cache"] = os.path.abspath(beside(project.path.parent, folder))
-    if options := _solver_options(project):
+    for key in ("cache", "earlier"):
+        if isinstance(folder := settings["fit"].get(key), str):
+            settings["fit"][key] = os.path.abspath(beside(project.path.parent, folder))
+    if options := _solver_options(project, project.fit.solver):
         settings["solver"] = {project.fit.solver: options}
     for name in tests:
         if name in written.tests:  # the others were made from Python, beside the file
@@ -118,14 +143,19 @@ def settings_of_predictions(
     assert written is not None
     settings = settings_of(project, tests)
     del settings["law"]  # each card says its own
-    own = dict(zip(project.cards, written.cards, strict=True))
-    settings["card"] = []
-    for card in cards:
-        said = dict(own.get(str(card), {"file": os.path.abspath(card)}))
-        if "file" in said and str(card) in own:
-            said["file"] = os.path.abspath(project.path.parent / said["file"])
-        settings["card"].append(said)
+    own = dict(zip(project.cards, _cards(project), strict=True))
+    settings["card"] = [own.get(str(card), {"file": os.path.abspath(card)}) for card in cards]
     return settings
+
+
+def _cards(project: Project) -> list[Settings]:
+    """Return each [[card]], its file in full."""
+    assert project.written is not None
+    here = project.path.parent
+    return [
+        {**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
+        for said in project.written.cards
+    ]
 
 
 def project_text(settings: Mapping[str, Any]) -> str:
@@ -133,10 +163,10 @@ def project_text(settings: Mapping[str, Any]) -> str:
     return HEAD + "\n" + tomli_w.dumps(settings)
 
 
-def _solver_options(project: Project) -> Settings:
-    """Return the options that the table of the solver that runs may hold, paths in full."""
-    section = solver_sections().get(project.fit.solver)
-    options = _in_full(plain(project.solver_options.get(project.fit.solver, {})))
+def _solver_options(project: Project, solver: str) -> Settings:
+    """Return the options that the table of a solver may hold, paths in full."""
+    section = solver_sections().get(solver)
+    options = _in_full(plain(project.solver_options.get(solver, {})))
     return {k: v for k, v in options.items() if section is None or k in section.model_fields}
 
 
@@ -146,15 +176,6 @@ def _in_full(value: Any) -> Any:
     if isinstance(value, str) and os.sep in value and os.path.exists(value):
         return os.path.abspath(value)
     return value
-
-
-def plain(value: Any) -> Any:
-    """Return what TOML and JSON can say: without None, tuples as lists, paths as text."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items() if v is not None}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    return str(value) if isinstance(value, Path) else value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -189,6 +210,96 @@ class Project:
                 problem += " or ".join(map(repr, others))
                 raise InputError(self.path, "fit.constraints", problem)
 
+    @classmethod
+    def of(
+        cls,
+        tests: Definition | Sequence[Definition],
+        law: Law | None = None,
+        *,
+        fabric: Fabric,
+        cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]] = (),
+        solver_options: Mapping[str, Mapping[str, Any]] | None = None,
+        folder: Path | str | None = None,
+        need_data: bool = True,
+        **fit: Any,
+    ) -> Project:
+        """Put a project together from objects, in mm, N and MPa.
+
+        cards : by name, or what each [[card]] says. solver_options : by name of a solver. folder :
+        in which arrays are kept as files, below data; a temporary one unless given. fit : keys of
+        [fit]. InputError names the argument; OutputError.
+        """
+        made = [tests] if isinstance(tests, Definition) else list(tests)
+        needed = isinstance(cards, Mapping) or any(own.files for own in made)
+        held = Path(folder) / "data" if folder is not None else scratch_folder() if needed else None
+        content = plain({
+            "fabric": asdict(fabric), "units": UNITS, "law": law, "fit": fit,
+            "solver": solver_options, "card": _card_tables(cards, held),
+        })  # fmt: skip
+        for own in made:
+            content.setdefault(own.kind, []).append(own.placed(held) if held else own.section)
+        with arguments_named(made):
+            project = _project(content, PYTHON, project_text(content), None, need_data, made)
+        assert project.written is not None
+        return replace(project, written=replace(project.written, held=held))
+
+    @property
+    def definitions(self) -> dict[str, Definition]:
+        """Return the tests as objects, by name; those of a file with the folder of their data."""
+        if (written := self.written) is None:
+            return {}
+        return {
+            name: written.made.get(name) or _definition(written.kinds[name], said, self.scales)
+            for name, said in written.tests.items()
+        }
+
+    @property
+    def objects(self) -> dict[str, Any]:
+        """Return the arguments with which `Project.of` makes the same project."""
+        law, fit = (plain(own.model_dump(exclude_unset=True)) for own in (self.law, self.fit))
+        cards = [] if self.written is None else _cards(self)
+        return {
+            "tests": list(self.definitions.values()),
+            "law": Law.of(in_base_units(LawSection, law, self.scales)),
+            "fabric": self.fabric,
+            "cards": [in_base_units(CardSection, card, self.scales) for card in cards],
+            "solver_options": {name: _solver_options(self, name) for name in self.solver_options},
+            **in_base_units(FitSection, fit, self.scales),
+        }
+
+    def to_toml(self, path: Path | str) -> Path:
+        """Write the project file, and its arrays below a folder beside it; return its path.
+
+        `read_project` reads the same project from it. Files of the tests stay where they are.
+        InputError : a test that was made without a definition. OutputError.
+        """
+        path = Path(path)
+        for name in self.tests:
+            if self.written is None or name not in self.written.tests:
+                problem = "is of no file and no definition, and cannot be written"
+                raise InputError(None, f"test {name!r}", problem)
+        settings, made = settings_of(self, list(self.tests)), self.definitions
+        options = {name: _solver_options(self, name) for name in self.solver_options}
+        more = {"solver": {name: own for name, own in options.items() if own}, "card": _cards(self)}
+        settings.update({key: value for key, value in more.items() if value})
+        held = None if self.written is None else self.written.held
+        data = path.parent / f"{path.stem}-data"
+        for card in settings.get("card", []):
+            if held is not None and Path(file := card.get("file", "")).parent == held.absolute():
+                write_text(data / Path(file).name, Path(file).read_text(encoding="utf-8"))
+                card["file"] = f"{data.name}/{Path(file).name}"
+        for kind in kinds():
+            for k, said in enumerate(settings.get(kind, [])):
+                if (own := made[said["name"]]).files:
+                    placed = own.placed(data, path.parent)
+                    settings[kind][k] = {**placed, "name": said["name"]}
+        write_text(path, tomli_w.dumps(settings))
+        return path
+
+    def naming_arguments(self) -> AbstractContextManager[None]:
+        """Return the context in which errors name the arguments of objects."""
+        return arguments_named([] if self.written is None else list(self.written.made.values()))
+
     @property
     def title(self) -> str:
         """Return the fabric's name, else that of the folder."""
@@ -220,6 +331,29 @@ class Project:
         except ValidationError as errors:
             raise first_error(None, errors, FitSection) from None
         return replace(self, fit=self.fit.model_copy(update={k: getattr(valid, k) for k in given}))
+
+    def with_weights(self, weights: Mapping[str, float]) -> Project:
+        """Return the project with other weights of tests, by their name or kind; InputError."""
+        tests: dict[str, Any] = dict(self.tests)
+        named = {*tests, *(test.kind for test in tests.values())}
+        for key in weights:
+            if key not in named:
+                problem = f"there is no such test; the project has: {', '.join(tests)}"
+                raise InputError(None, f"weights.{key}", problem)
+        given = {n: w for n, t in tests.items()
+                 if (w := weights.get(n, weights.get(t.kind))) is not None}  # fmt: skip
+        made = {name: self.definitions[name].with_keys(weight=w) for name, w in given.items()}
+        tests |= {name: replace(tests[name], weight=float(w)) for name, w in given.items()}
+        written = self.written
+        if written is not None:
+            said, whole = (
+                {name: {**own, **({"weight": given[name]} if name in given else {})}
+                 for name, own in sections.items()}
+                for sections in (written.tests, written.whole)
+            )  # fmt: skip
+            objects = {name: made.get(name, own) for name, own in written.made.items()}
+            written = replace(written, tests=said, whole=whole, made=objects)
+        return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
         """Return the project with another form of the moduli; its settings stay unless given."""
@@ -275,7 +409,21 @@ def read_project(
     they must be there. InputError: in one line, the file and the dotted key.
     """
     path, data = Path(path), Path(data) if isinstance(data, str) else data
-    file = parse(path)
+    content = read_content(path)
+    text = content_of(path).decode("utf-8")
+    return _project(content, path, text, data, need_data)
+
+
+def _project(
+    content: Mapping[str, Any],
+    path: Path,
+    text: str,
+    data: Folders | None,
+    need_data: bool,
+    made: Sequence[Definition] = (),
+) -> Project:
+    """Return the project of a file's content, or of objects: one way for both."""
+    file = validated(content, path)
     said, units = file.fabric, file.units
     length, names = LENGTH_UNITS[units.length], (units.modulus, units.pressure, units.length)
     fabric = Fabric(said.name, said.thickness * length, said.thickness_change, said.lab)
@@ -285,8 +433,31 @@ def read_project(
     return Project(
         path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
         cards=read_cards(place, file.card), solver_options=solver_settings(path, file.solver),
-        written=_written(file, path, tests, data),
+        written=_written(file, path, text, tests, data, made),
     )  # fmt: skip
+
+
+def _definition(kind: str, said: Settings, scales: Scales) -> Definition:
+    """Return a test of a file as an object, its numbers in mm, N and MPa."""
+    own = kind_named(kind)
+    if (text_units := getattr(own, "with_units", None)) is not None:
+        said = text_units(said, scales)
+    return definition_of(kind, in_base_units(own.section, said, scales))
+
+
+def _card_tables(
+    cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]], held: Path | None
+) -> list[Mapping[str, Any]]:
+    """Return [[card]] tables; those of objects are written below the folder `held`."""
+    if not isinstance(cards, Mapping):
+        return list(cards)
+    said: list[Mapping[str, Any]] = []
+    for k, (name, card) in enumerate(cards.items(), start=1):
+        assert held is not None
+        held.mkdir(parents=True, exist_ok=True)
+        card.write(file := held / f"card-{k}.toml", unit="MPa")
+        said.append({"name": name, "file": os.path.abspath(file)})
+    return said
 
 
 def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, Test]:
@@ -314,21 +485,29 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
 
 
 def _written(
-    file: ProjectFile, path: Path, tests: Mapping[str, Test], data: Folders | None
+    file: ProjectFile,
+    path: Path,
+    text: str,
+    tests: Mapping[str, Test],
+    data: Folders | None,
+    made: Sequence[Definition],
 ) -> Written:
     sections, whole = {}, {}
+    objects: dict[str, Definition] = {}
     for name, kind in kinds().items():
         own = file.tests(name)
+        given = [one for one in made if one.kind == name]
         for section, test in zip(own, _names(name, own), strict=True):
             folder = data.get(test) if isinstance(data, Mapping) else data
             key = getattr(kind, "folder_key", None)
             said = section.model_dump(exclude_unset=True)
             sections[test] = section_as_run(said, test, key, path.parent, folder)
             whole[test] = section.model_dump(exclude_none=True)
+        objects |= dict(zip(_names(name, own), given, strict=bool(made)))
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
     by_kind = {name: test.kind for name, test in tests.items()}
-    return Written(content_of(path).decode("utf-8"), common, sections, whole, by_kind, cards)
+    return Written(text, common, sections, whole, by_kind, cards, objects)
 
 
 def _reads(test: Test) -> bool:

@@ -20,7 +20,9 @@ from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import (
+    Length,
     LengthUnit,
+    Modulus,
     ModulusUnit,
     Name,
     Number,
@@ -29,6 +31,7 @@ from ..readers.sections import (
     PressureUnit,
     Section,
     StrainTriple,
+    Unit,
     first_error,
 )
 from ..solvers.registry import solver_sections
@@ -40,7 +43,7 @@ class FabricSection(Section):
     """[fabric]: the one fabric that all tests are of."""
 
     name: str = ""
-    thickness: Positive
+    thickness: Length
     thickness_change: Literal["constant", "incompressible"] = "constant"
     lab: str = ""
 
@@ -82,8 +85,8 @@ class LawSection(Section):
     form: Name = "cubic"
     nu12: Annotated[float, Field(ge=0, lt=1)] = 0.24
     strain_range: StrainTriple | None = None
-    bounds: BoundsSection | None = None
-    margin: MarginSection | None = None
+    bounds: Annotated[BoundsSection | None, Unit("modulus")] = None
+    margin: Annotated[MarginSection | None, Unit("modulus")] = None
 
 
 class UnknownSection(Section):
@@ -97,7 +100,7 @@ class UnknownsSection(Section):
     """[fit.unknowns]: what is fitted beside the moduli, one value for all tests."""
 
     nu12: UnknownSection | None = None
-    thickness: UnknownSection | None = None
+    thickness: Annotated[UnknownSection | None, Unit("length")] = None
 
 
 class FitSection(Section):
@@ -147,10 +150,10 @@ class CardSection(Section):
 
     name: Name | None = None
     file: str | None = None
-    beta: list[Number] | None = None
+    beta: list[Modulus] | None = None
     form: str | None = None
     nu12: Annotated[float, Field(ge=0, lt=1)] | None = None
-    thickness: Positive | None = None
+    thickness: Length | None = None
     thickness_change: Literal["constant", "incompressible"] | None = None
     strain_range: StrainTriple | None = None
     test: str | None = None
@@ -191,12 +194,11 @@ def _list_of(section: type[BaseModel]) -> Any:
     return list[section]  # type: ignore[valid-type]
 
 
-def parse(path: Path) -> ProjectFile:
-    """Parse a project file; tests have the keys of [defaults.KIND] that they do not say.
+def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
+    """Check a whole project file; tests have the keys of [defaults.KIND] that they do not say.
 
-    InputError: in one line, the file and the dotted key. PlugInFailure: of a kind of test.
+    InputError: in one line, the file `path` and the dotted key. PlugInFailure: of a kind of test.
     """
-    content = _content(path)
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
         raise InputError(path, "project.kind", OLD)
     model = project_file()
@@ -209,7 +211,8 @@ def parse(path: Path) -> ProjectFile:
         raise first_error(path, errors, cast(type[BaseModel], model)) from None
 
 
-def _content(path: Path) -> dict[str, Any]:
+def read_content(path: Path) -> dict[str, Any]:
+    """Read a project file as it is; InputError."""
     try:
         return toml_of(path)
     except FileNotFoundError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -27,6 +28,18 @@ LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0}
 HUGE = 1e18
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
 Positive = Annotated[float, Field(gt=0, le=HUGE)]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A mark of keys whose numbers are in a unit of [units]: modulus, pressure or length."""
+
+    name: Literal["modulus", "pressure", "length"]
+
+
+Length = Annotated[Positive, Unit("length")]
+Pressure = Annotated[Positive, Unit("pressure")]
+Modulus = Annotated[Number, Unit("modulus")]
 #: Logarithmic, so 2 is 640 %: who writes 13 means percent.
 Strain = Annotated[float, Field(gt=0, le=2)]
 #: Lower and upper bound.
@@ -104,3 +117,48 @@ def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def model_of(section: type[BaseModel], dotted: str) -> type[BaseModel]:
+    """Return the model of a table below a section, by its dotted name; "" for the section's own."""
+    for part in dotted.split(".") if dotted else ():
+        section = next(_sections(section.model_fields[part].annotation))
+    return section
+
+
+def in_base_units(section: type[BaseModel], said: Mapping[str, Any], scales: Any) -> dict[str, Any]:
+    """Return what a table says with the numbers of marked keys in mm, N and MPa.
+
+    scales : mm and MPa per unit, by the names of `Unit`.
+    """
+    whole = dict(said)
+    for key, value in said.items():
+        if (field := section.model_fields.get(key)) is None:
+            continue  # of a form of the moduli: a strain or a count
+        inside = next(_sections(field.annotation), None)
+        marks = [*field.metadata, *_marks(field.annotation)]
+        unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
+        if unit is not None:
+            whole[key] = _times(value, getattr(scales, unit.name))
+        elif inside is not None:
+            tables = value if isinstance(value, list) else [value]
+            tables = [
+                in_base_units(inside, own, scales) if isinstance(own, Mapping) else own
+                for own in tables
+            ]
+            whole[key] = tables if isinstance(value, list) else tables[0]
+    return whole
+
+
+def _times(value: Any, scale: float) -> Any:
+    """Return every number of a value times a scale."""
+    if isinstance(value, Mapping):
+        return {key: _times(own, scale) for key, own in value.items()}
+    return [_times(own, scale) for own in value] if isinstance(value, list) else value * scale
+
+
+def _marks(annotation: Any) -> Iterator[Any]:
+    """Yield what the parts of an annotation are marked with."""
+    yield from getattr(annotation, "__metadata__", ())
+    for inside in getattr(annotation, "__args__", ()):
+        yield from _marks(inside)

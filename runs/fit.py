@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
-from ..experiments.kinds import Expected, FittableTest, Judgement, files_of, judged
+from ..experiments.kinds import Expected, Fabric, FittableTest, Judgement, files_of, judged
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
 from ..inference.problem import FitProblem
 from ..materials.forms.base import COMPONENTS
-from ..project.project import Project, plain, settings_of
+from ..project.objects import Definition, Law, plain
+from ..project.project import Project, settings_of
 from ..solvers.base import Solver
 from .best import BestFit, best_fit, with_certainty
 from .executor import Task, executor_of
@@ -212,9 +213,13 @@ Progress = Callable[[FitEvent | None], None]
 
 @checked
 def fit(
-    project: Project,
-    tests: str | Sequence[str] | None = None,
+    project: Project | Definition | Sequence[Definition],
+    tests: str | Sequence[str] | Law | None = None,
     *,
+    law: Law | None = None,
+    fabric: Fabric | None = None,
+    weights: Mapping[str, float] | None = None,
+    solver_options: Mapping[str, Mapping[str, Any]] | None = None,
     starts: int | None = None,
     seed: int | None = None,
     starts_from: str | None = None,
@@ -228,10 +233,13 @@ def fit(
     overwrite: bool = False,
     progress: Progress | None = None,
     command_line: Sequence[str] | None = None,
+    **settings: Any,
 ) -> Fit:
     """Fit the law of a project to its tests, from random feasible starts.
 
-    tests : names of tests, or a kind of test; by default all that can be fitted.
+    project : one that was read; or tests as objects, and then the law follows, and `fabric` and
+        `solver_options` are given by name. tests : names of tests, or a kind of test; by default
+        all that can be fitted. weights : by name or kind of test, in place of their own.
     starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
     scheduler : address of a Dask scheduler, whose workers run the starts.
     starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", from the evaluations in
@@ -239,14 +247,27 @@ def fit(
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
         content. progress : receives every record, None now and then. command_line : for the record.
+        settings : any other key of [fit].
     InputError : in the project or its data, or nothing to resume. OutputError. NoFeasibleStart : of
         all starts. SolverFailure : the solver is not there, failed in every start, or the best fit
         does not run again or gives another objective: then the page in `out` says so.
     """
     begun = time.perf_counter()
     check_asked(out, resume, overwrite)
-    project = project.with_fit(
-        starts=starts, seed=seed, method=method, jobs=jobs, trust=[*project.fit.trust, *trust],
+    if not isinstance(project, Project):
+        law = law or (tests if isinstance(tests, Law) else None)
+        if law is None or fabric is None:
+            name, such = ("law", "Law()") if law is None else ("fabric", "Fabric('', 0.8)")
+            raise InputError(None, name, f"is needed beside tests as objects, such as {such}")
+        project = Project.of(project, law, fabric=fabric, solver_options=solver_options, folder=out)
+        tests = None
+    elif law or fabric or solver_options or isinstance(tests, Law):
+        why = "law, fabric and solver_options go with tests as objects; a project has its own"
+        raise InputError(None, "project", why)
+    assert not isinstance(tests, Law)
+    project = project.with_weights(weights or {}).with_fit(
+        **settings, starts=starts, seed=seed, method=method, jobs=jobs,
+        trust=[*project.fit.trust, *trust],
         starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute()),
     ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
@@ -260,8 +281,8 @@ def fit(
     for judgement in judgements:
         judgement.demand(project.path)
     named = [(test.test.name, test) for test in setup.tests]
-    settings = settings_of(project, [n for n, _ in named]) if project.written is not None else None
-    record = Record.of(project, settings, named, problem.solver, command_line)
+    as_run = settings_of(project, [n for n, _ in named]) if project.written is not None else None
+    record = Record.of(project, as_run, named, problem.solver, command_line)
     files = None
     done: list[StartRecord] = []
     if out is not None:

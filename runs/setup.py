@@ -399,6 +399,11 @@ def prepare_fit(
     InputError : in the project or its data. SolverFailure : the solver is not there, or a known
         solution cannot be run.
     """
+    with project.naming_arguments():
+        return _prepared(project, tests, saw)
+
+
+def _prepared(project: Project, tests: Sequence[FittableTest], saw: Saw) -> FitSetup:
     fit = project.fit
     options = project.options_of(fit.solver)
     # Once here, in one line, rather than as the failure of every analysis.

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 from ...errors import InputError
 from ...files import is_file
 from ...meshes.strip_models import PatchModel
-from ...readers.sections import Name, Number, Positive, Section, beside
+from ...readers.sections import Length, Name, Number, Positive, Section, beside
 from ..kinds import Place, Reach, Refined, named_format
 from .data import (
     BiaxialPath,
@@ -71,7 +71,7 @@ class BiaxialSection(Section):
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
-    width: Positive | None = None
+    width: Length | None = None
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     cycle: Literal["last"] | Annotated[int, Field(ge=1)] = "last"

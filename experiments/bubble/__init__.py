@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .prepared import candidates, prepare
-from .section import BubbleSection
+from .section import BubbleSection, with_units
 from .test import STUDIED, read
 
 NAMES = (
@@ -27,6 +27,7 @@ class BubbleKind:
     read = staticmethod(read)
     prepare = staticmethod(prepare)
     candidates = staticmethod(candidates)
+    with_units = staticmethod(with_units)
 
 
 KIND = BubbleKind()

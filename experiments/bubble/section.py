@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, StringConstraints
@@ -12,9 +12,17 @@ from pydantic import Field, StringConstraints
 from ...errors import InputError
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
 from ...meshes.mesh import Facet
-from ...readers.sections import LengthUnit, Number, Positive, Section
+from ...readers.sections import (
+    Length,
+    LengthUnit,
+    Modulus,
+    Number,
+    Positive,
+    Pressure,
+    Section,
+)
 from ...readers.sections import Name as Name_of_sections
-from ..kinds import ChannelSection, Place
+from ..kinds import ChannelSection, Place, Scales
 from .registration import PlaneOf, RegistrationOptions
 
 Words = Annotated[
@@ -46,10 +54,10 @@ class CorrelationSection(Section):
 class FilterSection(Section):
     """The camera's filter: the model is read as the camera reads the fabric."""
 
-    facet: Positive
+    facet: Length
     order: Literal[1, 2] = 1
     smoothing: int = 1
-    step: Positive | None = None
+    step: Length | None = None
 
 
 def facet_of(
@@ -74,8 +82,8 @@ def facet_of(
 class EllipseSection(Section):
     """[bubble.ellipse]: the clamped edge is an ellipse, in place of `radius`."""
 
-    major: Positive
-    minor: Positive
+    major: Length
+    minor: Length
     angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
 
 
@@ -138,7 +146,7 @@ class PressureSection(Section):
     offset: Number = 0.0
     log: LogSection | None = None
     frames: Annotated[int, Field(ge=1, le=10000)] | None = None
-    tolerance: Positive | None = None
+    tolerance: Pressure | None = None
 
 
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
@@ -181,6 +189,17 @@ def _point(given: list[float], scale: float) -> tuple[float, float, float]:
     return x, y, z
 
 
+def with_units(said: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
+    """Return a section that says the units which its files have by [units] where it does not."""
+    data = said.get("data", {})
+    if "points" not in data:
+        return dict(said)
+    points = {"length_unit": scales.length_unit, **data["points"]}
+    if points.get("pressure", {}).get("from_name"):
+        points["pressure"] = {"unit": scales.pressure_unit, **points["pressure"]}
+    return {**said, "data": {**data, "points": points}}
+
+
 Direction = Literal["dx", "dy", "dz"]
 DIRECTIONS: tuple[Direction, ...] = ("dx", "dy", "dz")
 FULL = "a sheet that is not doubly symmetric needs symmetry = 'full'"
@@ -192,13 +211,13 @@ class SheetSection(Section):
     surface: Literal["flat", "measured"] = "flat"
     degree: Annotated[int, Field(ge=2, le=14)] = 8
     modes: Annotated[int, Field(ge=0, le=45)] = 0
-    prior: Positive | None = None
+    prior: Length | None = None
     slack: bool = False
     slack_prior: Positive = 0.3
-    misfit: Positive | None = None
+    misfit: Length | None = None
     rim: Literal["fixed", "measured"] = "fixed"
     constant_field: list[Direction] = Field(default_factory=list)
-    from_pressure: Positive | None = None
+    from_pressure: Pressure | None = None
 
 
 @dataclass(frozen=True)
@@ -300,10 +319,10 @@ Symmetry = Literal["full", "quarter"]
 class KnownSolutionSection(Section):
     """[bubble.data.known_solution]: data are computed from these coefficients."""
 
-    beta: list[Number]
+    beta: list[Modulus]
     form: str = "cubic"
     elements: Elements | None = None
-    increments: list[Positive] | None = None
+    increments: list[Pressure] | None = None
     symmetry: Symmetry | None = None
     solver: Name_of_sections | None = None
 
@@ -368,15 +387,15 @@ class BubbleSection(Section):
 
     name: Name_of_sections | None = None
     weight: Positive = 1.0
-    radius: Positive | None = None
+    radius: Length | None = None
     ellipse: EllipseSection | None = None
-    pressures: Annotated[list[Positive], Field(min_length=1)] | None = None
-    increments: list[Positive] | None = None
+    pressures: Annotated[list[Pressure], Field(min_length=1)] | None = None
+    increments: list[Pressure] | None = None
     elements: Elements = 800
     symmetry: Symmetry = "full"
     generator: Literal["blocks", "gmsh"] = "blocks"
     objective: Literal["e", "mm"] = "e"
-    noise: Positive | None = None
+    noise: Length | None = None
     match: MatchSection = MatchSection()
     nuisance: NuisanceSection = NuisanceSection()
     sheet: SheetSection = SheetSection()

@@ -29,7 +29,7 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve, read_bending_curves
 from ...readers.frames import FrameSource
-from ...readers.sections import Name, Number, Positive, Section
+from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Unit
 from ..kinds import (
     ChannelSection,
     DataFile,
@@ -43,22 +43,22 @@ from ..kinds import (
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]
-Lengths = Annotated[list[Positive], Field(min_length=1)]
-NotNegative = Annotated[float, Field(ge=0, le=1e18)]
+Lengths = Annotated[list[Length], Field(min_length=1)]
+NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
 
 
 class CollarSection(Section):
     """The ring that bends the cylinder; by its diameter unless given."""
 
-    inner_diameter: Positive
-    length: Positive
-    fillet: Positive | None = None
+    inner_diameter: Length
+    length: Length
+    fillet: Length | None = None
 
 
 class GasSection(Section):
     """The gas that fills the cylinder."""
 
-    ambient: Positive | None = None
+    ambient: Pressure | None = None
     temperature: Positive | None = None
     density: Positive | None = None
 
@@ -82,20 +82,20 @@ class CylinderSection(Section):
     """Section [[cylinder]]: inflated, laid on two supports, bent by a collar."""
 
     name: Name | None = None
-    diameter: Positive
-    pressure: Positive
-    length: Positive | None = None
+    diameter: Length
+    pressure: Pressure
+    length: Length | None = None
     seam_width: NotNegative | None = None
-    element_size: Positive | None = None
+    element_size: Length | None = None
     symmetry: Literal["full", "quarter"] = "quarter"
-    span: Positive | None = None
-    support_diameter: Positive | None = None
+    span: Length | None = None
+    support_diameter: Length | None = None
     collar: CollarSection | None = None
-    deflection: Positive | None = None
+    deflection: Length | None = None
     frames: Frames | None = None
     deflections: Lengths | None = None
     places: Lengths | None = None
-    slope_over: Positive | None = None
+    slope_over: Length | None = None
     cap_warp: Literal["x", "y"] = "x"
     gas: GasSection = GasSection()
     measured: MeasuredSection = MeasuredSection()

@@ -35,7 +35,7 @@ from ...readers.curves import (
     specimen_scatter,
     split_at_restarts,
 )
-from ...readers.sections import Name, Positive, Section, beside
+from ...readers.sections import Length, Name, Positive, Section, beside
 from ..kinds import Place, Reach, Refined, named_format
 from .data import Strip
 
@@ -49,8 +49,8 @@ Unit = Literal["N", "relative"]
 class GaugeSection(Section):
     """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
 
-    gauge_length: Positive | None = None
-    final_length: Positive | None = None
+    gauge_length: Length | None = None
+    final_length: Length | None = None
 
 
 class ColumnsSection(Section):
@@ -108,8 +108,8 @@ class StripsSection(Section):
     """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
 
     name: Name | None = None
-    width: Positive | None = None
-    grip_distance: Positive | None = None
+    width: Length | None = None
+    grip_distance: Length | None = None
     bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
     increments: Annotated[int, Field(ge=1, le=10000)] = 100
     warp: GaugeSection | None = None
@@ -117,7 +117,7 @@ class StripsSection(Section):
     bias: GaugeSection | None = None
     data: CurvesSection
     noise: Positive | None = None
-    rate: Positive | None = None
+    rate: Length | None = None
     conditioning: Name | None = None
     match: Match = "polynomial"
     objective: Unit = "N"

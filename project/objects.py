@@ -1,0 +1,544 @@
+"""Tests, sheets and laws as objects: what the tables of a project file say, in mm, N and MPa.
+
+`Bubble(points, displacements, pressures, radius=100.0)` is what [[bubble]] says with the data in
+memory; `Bubble.read(files, ...)` names files, `Bubble.of(radius=..., data={...})` says each key as
+the file does. Keywords are the keys of [[bubble]] and of the table of its data. Arrays become plain
+files where a project is put together, so that all that follows (registration, doubts, provenance,
+worker processes) is the same for both.
+"""
+
+from __future__ import annotations
+
+import atexit
+import csv
+import difflib
+import hashlib
+import io
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
+
+from ..errors import InputError
+from ..experiments.bubble.section import RegistrationSection, SheetSection
+from ..experiments.kinds import Output
+from ..experiments.registry import kind_named
+from ..files import is_file, write_text
+from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
+from ..readers.curves import DIRECTIONS, read_load_curves
+from ..readers.frames import QUANTITIES, frame_files
+from ..readers.sections import first_error, model_of
+from .schema import LawSection
+
+Array: TypeAlias = NDArray[np.float64]
+#: Numbers as users have them: arrays, lists, or one array a frame; a pandas DataFrame.
+Numbers: TypeAlias = Any
+Table: TypeAlias = Any
+#: Files by name or by pattern.
+Files: TypeAlias = str | Path | Sequence[str | Path]
+
+#: In place of the file of a project that is made from objects.
+PYTHON = Path("python")
+#: Bounds of coated fabrics as `bubblefit init` writes them, MPa.
+BOUNDS = {"E1": [20.0, 2000.0], "E2": [20.0, 1000.0], "G12": [1.0, 200.0]}
+#: MPa: a membrane bursts long before.
+MOST_PRESSURE = 5.0
+
+
+def plain(value: Any) -> Any:
+    """Return what TOML and JSON can say: without None, arrays as lists, paths as text."""
+    if isinstance(value, Keys):
+        return value.said
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items() if v is not None}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return str(value) if isinstance(value, Path) else value
+
+
+def checked_keys(section: type[BaseModel], said: Mapping[str, Any], at: str = "") -> dict[str, Any]:
+    """Return what a table says as plain values; InputError names the wrong key."""
+    values: dict[str, Any] = plain(said)
+    try:
+        section.model_validate(values)
+    except ValidationError as errors:
+        raise first_error(None, errors, section, at) from None
+    return values
+
+
+class Keys:
+    """Keys of one table of a project file, checked as they are given; `said` holds them."""
+
+    section: ClassVar[type[BaseModel]]
+
+    def __init__(self, **said: Any) -> None:
+        self.said = checked_keys(self.section, said)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({_words(self.said)})"
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any]) -> Self:
+        """Return the keys as they are said, without values of our own."""
+        made = cls.__new__(cls)
+        made.said = checked_keys(cls.section, said)
+        return made
+
+
+class Sheet(Keys):
+    """The sheet of a bubble: the keys of [bubble.sheet]; prior and misfit in mm."""
+
+    section = SheetSection
+
+
+class Registration(Keys):
+    """Steps of a registration that are given: the keys of [bubble.data.points.registration]."""
+
+    section = RegistrationSection
+
+
+class Law(Keys):
+    """The form of the moduli, and between what they are looked for: the keys of [law].
+
+    bounds : [least, largest] of E1, E2 and G12 in MPa, those of coated fabrics unless given.
+    Keywords beside nu12, strain_range and margin are settings of the form, such as knots.
+    """
+
+    section = LawSection
+
+    def __init__(self, form: str = "cubic", **said: Any) -> None:
+        if form not in form_names():
+            form_named(form, {}, [UNLIMITED] * 3)  # says which there are
+        _check_names(said, [*LawSection.model_fields, *form_settings(form)])
+        super().__init__(**{"form": form, "bounds": BOUNDS, **said})
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A file whose content is in memory: the argument it is of, and its columns by name."""
+
+    argument: str
+    columns: Mapping[str, Sequence[Any]]
+
+    @property
+    def text(self) -> str:
+        """Return the table; every number in full."""
+        out = io.StringIO()
+        lines = csv.writer(out, lineterminator="\n")
+        lines.writerow(self.columns)
+        lines.writerows(zip(*self.columns.values(), strict=True))
+        return out.getvalue()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Definition:
+    """A test as its table [[kind]] of a project file says it, in mm, N and MPa.
+
+    section : the keys of the table, files by full paths. files : that stand in the section by name
+    and are held in memory. InputError: names the key that is wrong.
+    """
+
+    kind: str
+    section: Mapping[str, Any]
+    files: Mapping[str, Held] = field(default_factory=dict)
+    of_kind: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        try:
+            said = checked_keys(kind_named(self.kind).section, self.section)
+        except InputError as error:
+            raise InputError(None, self.argument(error.field), error.problem) from None
+        object.__setattr__(self, "section", said)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({_words(self.section)})"
+
+    @property
+    def name(self) -> str:
+        """Return the name of the test, that of its kind where none is given."""
+        return str(self.section.get("name", self.kind))
+
+    @classmethod
+    def of(cls, **section: Any) -> Self:
+        """Return the test whose table says this, key by key."""
+        return cls._made(section)
+
+    @classmethod
+    def _made(cls, section: Mapping[str, Any], files: Mapping[str, Held] | None = None) -> Self:
+        made = cls.__new__(cls)
+        Definition.__init__(made, cls.of_kind, section, files or {})
+        return made
+
+    def with_keys(self, **keys: Any) -> Definition:
+        """Return the test with other values of some keys of its section."""
+        made = object.__new__(type(self))
+        Definition.__init__(made, self.kind, {**self.section, **keys}, self.files)
+        return made
+
+    def argument(self, field: str) -> str:
+        """Return the argument that a dotted key of the section stands for."""
+        return field.removeprefix(f"{_data_table(self.kind)}.").removeprefix("data.")
+
+    @property
+    def prefix(self) -> str:
+        """Return the beginning of the name of the folder of its files."""
+        return Output.of(Path(), self.name, True).prefix
+
+    def placed(self, folder: Path, beside: Path | None = None) -> dict[str, Any]:
+        """Return the section with its files written below a folder; raises OutputError.
+
+        The name of their folder tells data apart, so that nothing else is written over. beside :
+        the folder from which the section names it.
+        """
+        if not self.files:
+            return dict(self.section)
+        texts = {name: file.text for name, file in self.files.items()}
+        digest = hashlib.sha256("".join(texts.values()).encode()).hexdigest()[:8]
+        own = folder / f"{self.prefix}{digest}"
+        for name, text in texts.items():
+            write_text(own / name, text)
+        said = str(own) if beside is None else own.relative_to(beside).as_posix()
+        return _with(self.section, f"{_data_table(self.kind)}.folder", said)
+
+
+def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
+    """Return the definition of a section in mm, N and MPa, of its kind's own class."""
+    ours = {own.of_kind: own for own in (Bubble, Strips)}
+    own = ours.get(kind)
+    return Definition(kind, section) if own is None else own.of(**section)
+
+
+class Bubble(Definition):
+    """A bubble inflation test: a clamped disk, its points in each frame."""
+
+    of_kind = "bubble"
+
+    def __init__(
+        self,
+        points: Numbers | Table,
+        displacements: Numbers = None,
+        pressures: Numbers = None,
+        *,
+        radius: float | None = None,
+        ellipse: Mapping[str, float] | None = None,
+        sheet: Sheet | Mapping[str, Any] | None = None,
+        registration: Registration | Mapping[str, Any] | None = None,
+        name: str = "bubble",
+        **keys: Any,
+    ) -> None:
+        """Make the test from arrays; x is warp, y is fill, z is up, and NaN a lost point.
+
+        points : (m, 3), or (frames, m, 3), or an array a frame, mm, without load. displacements :
+        (frames, m, 3), or an array a frame, mm. pressures : (frames,) MPa, rising. Or a DataFrame
+        with columns x y z dx dy dz and frame or pressure. radius : mm of the clamped edge. keys :
+        of [[bubble]] and of [bubble.data.points]. InputError names the argument.
+        """
+        if hasattr(points, "columns"):
+            points, displacements, pressures = _frames_of(points, pressures)
+        moved = _per_frame("displacements", displacements)
+        rest = _per_frame("points", points, len(moved))
+        loads = _pressures(pressures, len(moved))
+        files = {}
+        for k, (at, by) in enumerate(zip(rest, moved, strict=True)):
+            if at.shape != by.shape:
+                problem = f"expected {at.shape} as the points of the frame, got {by.shape}"
+                raise InputError(None, f"displacements[{k}]", problem)
+            whole = np.isfinite(at[:, :2]).all(axis=1) & np.isfinite(by).all(axis=1)
+            if not whole.any():
+                raise InputError(None, f"displacements[{k}]", "every point is lost (NaN)")
+            table = np.column_stack([at, by]).T.tolist()
+            columns = {f"{q} [mm]": v for q, v in zip(QUANTITIES, table, strict=True)}
+            argument = f"points and displacements, frame {k}"
+            files[f"frame-{k + 1:03d}.csv"] = Held(argument, columns)
+        data = {"files": list(files), "format": "csv", "registration": registration}
+        said = {"pressures": loads, "radius": radius, "ellipse": ellipse, "sheet": sheet}
+        section = _sorted("bubble", {**said, "name": name, **data, **keys})
+        super().__init__("bubble", section, files)
+
+    @classmethod
+    def read(cls, files: Files, pressures: Numbers = None, **keys: Any) -> Self:
+        """Return the test of files of any reader, in the order of rising pressure.
+
+        files : paths or patterns, one a frame or all in one. pressures : (frames,) MPa; none where
+        the keyword pressure says where they stand. keys : as of `Bubble`.
+        """
+        if pressures is not None:
+            keys["pressures"] = _pressures(pressures, None)
+        return cls._made(_sorted("bubble", {**keys, "files": _paths(files)}))
+
+
+class Strips(Definition):
+    """Cut strips pulled along warp, fill and across the yarns."""
+
+    of_kind = "strips"
+
+    def __init__(
+        self,
+        curves: Mapping[str, Any] | Table,
+        *,
+        width: float | None = None,
+        gauge: float | Mapping[str, float] | None = None,
+        name: str = "strips",
+        **keys: Any,
+    ) -> None:
+        """Make the test from load curves.
+
+        curves : by direction (warp, fill, bias) a list of specimens, each (elongation mm, load N)
+        or (n, 2); or a DataFrame with columns direction, specimen, elongation and load. width : mm
+        of the strip. gauge : mm, the length over which elongation is measured; by direction where
+        they differ. keys : of [[strips]] and of [strips.data]. InputError names the argument.
+        """
+        rows = _curve_rows(curves, DIRECTIONS, "elongation", "load")
+        names = ("direction", "specimen", "elongation (mm)", "load (N)")
+        files = {"curves.csv": Held("curves", _columns(names, rows))}
+        tables = _gauges(gauge, keys, {row[0] for row in rows})
+        said = {"width": width, "name": name, "files": list(files), **tables}
+        super().__init__("strips", _sorted("strips", {**keys, **said}), files)
+
+    @classmethod
+    def read(
+        cls,
+        files: Files | Mapping[str, Files],
+        *,
+        gauge: float | Mapping[str, float] | None = None,
+        **keys: Any,
+    ) -> Self:
+        """Return the test of files of load curves, or of files by direction; keys : as above."""
+        if isinstance(files, Mapping):
+            listed: Any = {d: _paths(own) for d, own in files.items()}
+            here: Iterable[str] = listed
+        else:
+            listed, here = _paths(files), [d for d in DIRECTIONS if d in keys]
+            if not here and isinstance(gauge, (int, float)):
+                names = ("columns", "load_unit", "length_unit", "comment", "decimal", "format",
+                         "width", "sheet")  # fmt: skip
+                how = {name: keys[name] for name in names if name in keys}
+                known = dict.fromkeys(DIRECTIONS, gauge)
+                every = [read_load_curves(one, gauge_length=known, **how) for one in listed]
+                here = {curve.direction for own in every for curve in own}
+        return cls._made(_sorted("strips", {**keys, **_gauges(gauge, keys, here), "files": listed}))
+
+
+def _frames_of(table: Table, pressures: Numbers) -> tuple[list[Array], list[Array], Numbers]:
+    """Return places, displacements and pressures of a DataFrame, frame by frame."""
+    missing = [q for q in QUANTITIES if q not in table.columns and q != "z"]
+    by = next((name for name in ("frame", "pressure") if name in table.columns), None)
+    if missing or by is None:
+        lacks = ", ".join(missing) or "frame or pressure"
+        there = ", ".join(map(str, table.columns))
+        raise InputError(None, "points", f"expected a column {lacks}; the table has: {there}")
+    groups = [own for _, own in table.groupby(by, sort=by == "pressure")]
+    if pressures is None and "pressure" in table.columns:
+        pressures = [own["pressure"].iloc[0] for own in groups]
+    whole = [own.assign(z=own["z"] if "z" in own else np.nan) for own in groups]
+    places, moved = (
+        [own[list(names)].to_numpy(dtype=float) for own in whole]
+        for names in (QUANTITIES[:3], QUANTITIES[3:])
+    )
+    return places, moved, pressures
+
+
+def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list[Array]:
+    """Return (m, 3) mm of every frame; one array stands for each of so many frames."""
+    shape = "(m, 3) or (frames, m, 3)" if frames is not None else "(frames, m, 3)"
+    try:
+        parts = [np.asarray(value, dtype=float)]
+    except (TypeError, ValueError):
+        try:
+            parts = [np.asarray(one, dtype=float) for one in value]
+        except (TypeError, ValueError):
+            problem = f"expected numbers {shape}, got {type(value).__name__}"
+            raise InputError(None, argument, problem) from None
+    whole = parts[0].shape if len(parts) == 1 else f"shapes {[p.shape for p in parts]}"
+    if len(parts) == 1 and parts[0].ndim == 3:
+        parts = list(parts[0])
+    elif len(parts) == 1:
+        parts *= frames or 1
+    if not parts or any(p.ndim != 2 or p.shape[1] != 3 for p in parts):
+        raise InputError(None, argument, f"expected {shape}, got {str(whole)[:60]}")
+    if frames is not None and len(parts) != frames:
+        problem = f"expected as many frames as displacements, {frames}, got {len(parts)}"
+        raise InputError(None, argument, problem)
+    if any(np.isinf(p).any() for p in parts):
+        raise InputError(None, argument, "expected finite numbers, or NaN for a lost point")
+    return parts
+
+
+def _pressures(value: Numbers, frames: int | None) -> list[float]:
+    """Return rising pressures in MPa, as many as frames."""
+    found = numbers("pressures", value)
+    if found.ndim != 1 or frames not in (None, len(found)):
+        expected = "(frames,)" if frames is None else f"{(frames,)}, one a frame"
+        raise InputError(None, "pressures", f"expected {expected}, got {found.shape}")
+    for k, pressure in enumerate(found):
+        if not pressure > 0:
+            problem = f"expected MPa above 0, got {pressure:g}; leave the frame without load out"
+            raise InputError(None, f"pressures[{k}]", problem)
+        if k and not pressure > found[k - 1]:
+            problem = f"expected rising pressures, got {pressure:g} after {found[k - 1]:g}"
+            raise InputError(None, f"pressures[{k}]", problem)
+    check_pressure("pressures", float(found.max(initial=0.0)))
+    return [float(p) for p in found]
+
+
+def numbers(argument: str, value: Numbers) -> Array:
+    """Return a value as an array; InputError names the argument."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        problem = f"expected numbers, got {repr(value)[:40]}"
+        raise InputError(None, argument, problem) from None
+
+
+def check_pressure(argument: str, largest: float) -> None:
+    """Refuse pressures that are kPa by mistake."""
+    if largest > MOST_PRESSURE:
+        problem = f"expected MPa, got up to {largest:g}: far beyond a membrane's; are these kPa? "
+        raise InputError(None, argument, problem + "Divide by 1000")
+
+
+def _curve_rows(curves: Any, groups: Sequence[str], *names: str) -> list[tuple[Any, ...]]:
+    """Return rows (group, specimen, a value of each name) of curves by group, or of a table."""
+    if hasattr(curves, "columns"):
+        first = "direction"
+        missing = [n for n in (first, *names) if n not in curves.columns]
+        if missing:
+            there = ", ".join(map(str, curves.columns))
+            problem = f"expected a column {missing[0]}; the table has: {there}"
+            raise InputError(None, "curves", problem)
+        which = "specimen" if "specimen" in curves.columns else first
+        return [tuple(row) for row in curves[[first, which, *names]].to_numpy().tolist()]
+    if not isinstance(curves, Mapping):
+        problem = f"expected curves by {', '.join(groups)}, or a table, got {type(curves).__name__}"
+        raise InputError(None, "curves", problem)
+    _check_names(curves, groups, "curves.")
+    rows: list[tuple[Any, ...]] = []
+    for group, given in curves.items():
+        for k, curve in enumerate(_specimens(given, len(names))):
+            at = f"curves.{group}[{k}]"
+            if hasattr(curve, "columns"):
+                if lost := [n for n in names if n not in curve.columns]:
+                    raise InputError(None, at, f"expected a column {lost[0]}")
+                curve = curve[list(names)].to_numpy()
+            found = numbers(at, curve)
+            # An array has a row a reading; a pair of arrays is elongation and load.
+            found = found.T if isinstance(curve, np.ndarray) else found
+            if found.ndim != 2 or len(found) != len(names) or not np.isfinite(found).all():
+                expected = f"finite numbers ({', '.join(names)}), each (n,)"
+                raise InputError(None, at, f"expected {expected}, got shape {found.shape}")
+            rows += [(group, f"{group} {k + 1}", *values) for values in found.T.tolist()]
+    return rows
+
+
+def _specimens(given: Any, width: int) -> list[Any]:
+    """Return the curves of one direction: a list of them, or the one."""
+    if hasattr(given, "columns") or isinstance(given, tuple):
+        return [given]
+    if isinstance(given, np.ndarray) and given.ndim == 2:
+        return [given]
+    return list(given)
+
+
+def _columns(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
+    if not rows:
+        raise InputError(None, "curves", "expected one curve at least, got none")
+    return {name: list(own) for name, own in zip(names, zip(*rows, strict=True), strict=True)}
+
+
+def _gauges(
+    gauge: float | Mapping[str, float] | None,
+    keys: Mapping[str, Any],
+    here: Iterable[str],
+) -> dict[str, Any]:
+    """Return the tables of directions with the length of their gauge, where it is given."""
+    if gauge is None:
+        return {}
+    lengths = gauge if isinstance(gauge, Mapping) else dict.fromkeys(here, gauge)
+    _check_names(lengths, DIRECTIONS, "gauge.")
+    return {d: {"gauge_length": own, **(keys.get(d) or {})} for d, own in lengths.items()}
+
+
+def _paths(files: Files) -> list[str]:
+    """Return full paths of files or patterns; InputError where there is none."""
+    given = [files] if isinstance(files, (str, Path)) else list(files)
+    full = [os.path.abspath(os.path.expanduser(one)) for one in given]
+    found, _ = frame_files(full)
+    for file in found:
+        if not is_file(file):
+            raise InputError(None, "files", f"there is no file {file}")
+    return list(map(str, found))
+
+
+def _data_table(kind: str) -> str:
+    """Return the dotted name of the table that says the files of a kind of test."""
+    return str(getattr(kind_named(kind), "folder_key", "")).rpartition(".")[0]
+
+
+def _sorted(kind: str, said: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a section: keys of the table of its data go there, all others into the test's own."""
+    at, outer = _data_table(kind), kind_named(kind).section
+    inner = model_of(outer, at)
+    _check_names(said, [*outer.model_fields, *inner.model_fields])
+    own = {k: v for k, v in said.items() if v is not None}
+    section = {k: v for k, v in own.items() if k in outer.model_fields}
+    for key in own.keys() - section.keys():
+        section = _with(section, f"{at}.{key}", own[key])
+    return section
+
+
+def _with(table: Mapping[str, Any], dotted: str, value: Any) -> dict[str, Any]:
+    """Return the table with one more key, in tables below it."""
+    first, _, rest = dotted.partition(".")
+    return {**table, first: _with(table.get(first, {}), rest, value) if rest else value}
+
+
+def _check_names(said: Iterable[str], known: Sequence[str], at: str = "") -> None:
+    for key in said:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            problem = f"unknown; {meant}known here: {', '.join(known)}"
+            raise InputError(None, f"{at}{key}", problem)
+
+
+def _words(said: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key}={repr(value)[:60]}" for key, value in said.items())
+
+
+def scratch_folder() -> Path:
+    """Return a new folder for arrays of a project without one; removed when Python ends."""
+    folder = tempfile.mkdtemp(prefix="bubblefit-arrays-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@contextmanager
+def arguments_named(made: Sequence[Definition]) -> Iterator[None]:
+    """Let InputErrors of a project made from objects name the argument, not a key or a file."""
+    try:
+        yield
+    except InputError as error:
+        if error.path == PYTHON:
+            key = re.match(r"(\w+)\[(\d+)\]\.?(.*)", error.field)
+            own = [one for one in made if key and one.kind == key[1]]
+            if key and int(key[2]) < len(own):
+                test = own[int(key[2])]
+                raise InputError(test.name, test.argument(key[3]), error.problem) from None
+            raise InputError(None, error.field.removeprefix("fit."), error.problem) from None
+        file = Path(error.path or "")
+        for test in made:
+            if file.name in test.files and file.parent.name.startswith(test.prefix):
+                at = ", ".join(filter(None, (test.files[file.name].argument, error.field)))
+                raise InputError(test.name, at, error.problem) from None
+        raise
