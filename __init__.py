@@ -26,8 +26,10 @@ from .files import __version__ as __version__
 
 if TYPE_CHECKING:
     from .experiments.kinds import Fabric
+    from .experiments.own import OwnTest
     from .experiments.strips.cycles import cycles
     from .materials.card import MaterialCard, read_card
+    from .materials.forms.spline import Form
     from .project.objects import Bubble, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
@@ -38,9 +40,9 @@ if TYPE_CHECKING:
     from .runs.result import Fit
     from .runs.simulation import simulate
 
-__all__ = ["Bubble", "Fabric", "Fit", "Law", "MaterialCard", "Project", "Registration", "Sheet",
-           "Strips", "bootstrap", "check", "cycles", "fit", "plan", "predict", "profile",
-           "read_card", "read_project", "simulate"]  # fmt: skip
+__all__ = ["Bubble", "Fabric", "Fit", "Form", "Law", "MaterialCard", "OwnTest", "Project",
+           "Registration", "Sheet", "Strips", "bootstrap", "check", "cycles", "fit", "plan",
+           "predict", "profile", "read_card", "read_project", "simulate"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -48,8 +50,10 @@ _PLACES = {
     "Bubble": "project.objects",
     "Fabric": "experiments.kinds",
     "Fit": "runs.result",
+    "Form": "materials.forms.spline",
     "Law": "project.objects",
     "MaterialCard": "materials.card",
+    "OwnTest": "experiments.own",
     "Project": "project.project",
     "Registration": "project.objects",
     "Sheet": "project.objects",

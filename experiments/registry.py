@@ -8,11 +8,12 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any
+from typing import Any, cast
 
 from ..errors import InputError, PlugInFailure
 from ..files import Group, names_with, plug_in_named, plug_ins
 from .kinds import Kind
+from .own import KIND as OWN
 
 GROUP: Group = "bubblefit.tests"
 #: What a plug-in's kind must have to be one.
@@ -40,6 +41,8 @@ def kinds() -> Mapping[str, Kind]:
 def kind_named(name: str) -> Kind:
     """Return the kind of this name, importing no other; raises InputError, PlugInFailure."""
     made: Kind
+    if name == OWN.name:  # of objects, not of a project file: it is none of `kinds`
+        return cast(Kind, OWN)
     if name in _folders():
         made = import_module(f".{name}", __package__).KIND
         return made

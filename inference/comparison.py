@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import copy
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, Protocol
@@ -154,6 +155,90 @@ class Objective(Protocol):
     def shifted(self, here: History, there: History) -> Objective:
         """Return the objective of a model that shows `here` where this one shows `there`."""
         ...
+
+
+#: Relative step of a central difference; probes of what noise makes of a function's values.
+STEP, PROBES = 1e-5, 4
+
+
+class OwnObjective:
+    """Residuals that a function of one's own makes of what an objective with `columns` compares.
+
+    function : of modelled and measured values, a list of frames (m, 3) or (frames, m, 3) of a
+    field, (m,) loads; returns a vector, or several in a list: e adds up their RMS. derivative : of
+    both and of a change of what is modelled, the change of the same; None: differences. relative :
+    a vector counts by its largest value for a model that does not move, and as one of so many.
+    """
+
+    def __init__(
+        self, inner: Any, function: Callable[..., Any], relative: bool = False, weight: float = 1.0
+    ) -> None:
+        self.inner, self.function, self.by = inner, function, np.zeros_like(inner.measured)
+        self.derivative = getattr(function, "derivative", None)
+        self.unit, self.least_noise, self.noise_is = inner.unit, inner.least_noise, inner.noise_is
+        self.sizes = tuple(map(len, self._vectors(function, self.by)))
+        still, near = (self._values(share * inner.measured) for share in (0.0, 0.9))
+        self.data, blocks = (*inner.data, still, near), Blocks(self.sizes)
+        largest = np.maximum.reduceat(np.abs(still), blocks.starts)
+        usable = relative & np.isfinite(largest) & (largest > 0)
+        unit = np.where(usable, largest, 1.0) * (len(largest) if relative else 1)
+        self._unit = (unit * np.sqrt(self.sizes) / weight)[blocks.of]
+        # What the function makes of the noise of the values says how much a residual has of it.
+        size = self.least_noise or STEP * np.abs(inner.measured).max()
+        noise = np.random.default_rng(0).choice([-1.0, 1.0], (1 + PROBES, len(self.by)))
+        made = [self._along(inner.measured + size * noise[0], one) for one in noise[1:]]
+        gain = blocks.norms(np.sqrt(np.mean(np.square(made), axis=0))) / np.sqrt(self.sizes)
+        self.scale = self._unit / np.where(np.isfinite(gain) & (gain > 0), gain, 1.0)[blocks.of]
+
+    def _vectors(self, function: Any, *values: Array) -> list[Array]:
+        def arranged(flat: Array) -> Any:
+            parts, columns = np.split(flat, np.cumsum(self.inner.sizes)[:-1]), self.inner.columns
+            if columns == 1:
+                return parts[0]
+            starts = range(0, len(parts), columns)
+            frames = [np.stack(parts[k : k + columns], axis=1) for k in starts]
+            return np.stack(frames) if len(set(map(len, frames))) == 1 else frames
+
+        modelled, *change = map(arranged, values)
+        found = function(modelled, arranged(self.inner.measured), *change)
+        several = isinstance(found, (list, tuple)) and all(map(np.ndim, found))
+        return [np.ravel(np.asarray(one, dtype=float)) for one in (found if several else [found])]
+
+    def _values(self, *values: Array) -> Array:
+        """Return the residuals (m,) of modelled values; by their change as well, its own."""
+        found = self._vectors(self.derivative if values[1:] else self.function, *values)
+        if tuple(map(len, found)) != self.sizes or 0 in self.sizes:
+            problem = f"expected vectors of {self.sizes} residuals, got {[*map(len, found)]}"
+            raise InputError(None, "objective", problem)
+        return np.concatenate(found)
+
+    def _along(self, at: Array, change: Array) -> Array:
+        if self.derivative is not None:
+            return self._values(at, change)
+        step = STEP * np.abs(at).max() / max(float(np.abs(change).max()), 1e-300)
+        change = step * change
+        return np.asarray((self._values(at + change) - self._values(at - change)) / (2 * step))
+
+    def _modelled(self, history: History) -> Array:
+        off = self.inner.residual(history, {}) * self.inner.scale
+        return np.asarray(self.inner.measured + off + self.by)
+
+    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
+        return self._values(self._modelled(history)) / self._unit
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        at, changes = self._modelled(history), self.inner.jacobian(history, slope).T
+        columns = [self._along(at, self.inner.scale * change) for change in changes]
+        return np.column_stack(columns) / self._unit[:, None]
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        problem = f"leave out {', '.join(names)}: a function of one's own has to allow for them"
+        raise InputError(None, "objective", problem)
+
+    def shifted(self, here: History, there: History) -> OwnObjective:
+        other = copy.copy(self)
+        other.by = self.by + self._modelled(here) - self._modelled(there)
+        return other
 
 
 @dataclass(eq=False)

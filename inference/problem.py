@@ -84,8 +84,9 @@ class FitProblem:
 
     @property
     def solver(self) -> Solver:
-        """Return the solver that counts (each comparison has one of its own, of the same kind)."""
-        return self.comparisons[0].solver
+        """Return the solver that counts: the first that runs a model (each comparison has one)."""
+        solvers = [comparison.solver for comparison in self.comparisons]
+        return next((one for one in solvers if not getattr(one, "closed", False)), solvers[0])
 
     @property
     def differentiates(self) -> bool:

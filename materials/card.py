@@ -220,21 +220,29 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
     law, scale = card.law, UNITS[unit]
     named = zip(STRAIN_NAMES, law.strain_range, strict=True)
-    sure = card.certainty
+    sure, of_form = card.certainty, law.form.to_card()
+    pieces = of_form.pop("pieces", {})
     content: dict[str, Any] = {
         "format": FORMAT if sure is None else WITH_CERTAINTY, "name": card.name,
         "source": card.source, "law": LAW, "form": law.form.name, "unit": unit,
         "beta": [float(b) / scale for b in law.beta], "nu12": law.nu12,
         "thickness_mm": card.thickness, "thickness_change": law.thickness_change,
         "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
-        **law.form.to_card()
+        **of_form
     }  # fmt: skip
     if sure is not None:
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}
     words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
     header = "".join(f"# {line}\n" for line in words)
-    write_text(path, header + tomli_w.dumps(content) + _bands_text(sure, scale))
+    text = header + tomli_w.dumps(content) + _bands_text(sure, scale) + _pieces_text(pieces)
+    write_text(path, text)
+
+
+def _pieces_text(table: Mapping[str, Any]) -> str:
+    """Return the table of a form that has no name, a line a key."""
+    lines = [f"{key} = {json.dumps(own, ensure_ascii=False)}" for key, own in table.items()]
+    return "\n".join(["", "[pieces]", *lines, ""]) if table else ""
 
 
 def _bands_text(sure: CardCertainty | None, scale: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -14,11 +14,13 @@ from pydantic import ValidationError
 
 from ..errors import InputError, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
+from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kinds
 from ..files import content_of, is_file, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
-from ..materials.forms.base import form_settings
+from ..materials.forms.base import Form, form_settings
+from ..materials.forms.spline import Form as OwnForm
 from ..readers.sections import (
     LENGTH_UNITS,
     MODULUS_UNITS,
@@ -184,7 +186,8 @@ class Project:
 
     tests, cards : in the file's order. law, fit : the sections, in the units of `scales`.
     solver_options : by name of a solver. written : None without a file. scheduler : address of the
-    Dask scheduler whose workers do the runs. InputError: settings that contradict each other.
+    Dask scheduler whose workers do the runs. form, objectives : objects instead of [law] form and,
+    by name, of the objective of a test. InputError: settings that contradict each other.
     """
 
     path: Path
@@ -197,6 +200,8 @@ class Project:
     solver_options: Mapping[str, Mapping[str, Any]]
     written: Written | None = None
     scheduler: str | None = None
+    form: OwnForm | Form | None = None
+    objectives: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         name = self.fit.method
@@ -361,7 +366,33 @@ class Project:
         said = self.law.model_dump(exclude=set(own), exclude_unset=True)
         kept = {key: value for key, value in own.items() if key in known}
         law = LawSection.model_validate({**said, **kept, **(settings or {}), "form": form})
-        return replace(self, law=law)
+        return replace(self, law=law, form=None)
+
+    def with_form(self, given: Any) -> Project:
+        """Return the project with the form of the moduli of a class or an object; InputError."""
+        form = given() if isinstance(given, type) else given
+        if not isinstance(form, (OwnForm, Form)):
+            problem = "expected a subclass of bubblefit.Form, or an object of one, got "
+            raise InputError(None, "form", problem + repr(given))
+        return replace(self.with_law(type(form).__name__), form=form)
+
+    def with_tests(self, *tests: OwnTest) -> Project:
+        """Return the project with tests of one's own beside its others; InputError."""
+        made = {**self.tests}
+        for test in tests:
+            if not isinstance(test, OwnTest) or test.name in made:
+                problem = "expected an object of a subclass of bubblefit.OwnTest, and a new name"
+                raise InputError(None, "tests", f"{problem}, got {test!r}")
+            thicker = self.fabric.thickness - test.thickness
+            made[test.name] = test.with_parameters({"thickness": thicker})
+        return replace(self, tests=made)
+
+    def with_objective(self, test: str, function: Callable[..., Any]) -> Project:
+        """Return the project that fits a test by a function (`comparison.OwnObjective`)."""
+        if test not in self.tests or not callable(function):
+            problem = f"expected a function of one of {', '.join(self.tests)}, got {function!r}"
+            raise InputError(None, "objective", f"{problem} of {test!r}")
+        return replace(self, objectives={**self.objectives, test: function})
 
     def with_solver(
         self, name: str | None, options: Mapping[str, Any], settings: Sequence[str] = ()
@@ -384,7 +415,7 @@ class Project:
         """
         known = kinds()
         names = None if which is None else [which] if isinstance(which, str) else list(which)
-        able = [t for t in self.tests.values() if fitted in (None, known[t.kind].fitted)]
+        able = [t for t in self.tests.values() if fitted in (None, kind_named(t.kind).fitted)]
         for name in names or ():
             if name not in self.tests and name not in known:
                 problem = f"there is no test {name!r}; the project has: {', '.join(self.tests)}"

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import NOTES, NOTES_ARE, InputError
-from ..experiments.kinds import by_strain
+from ..experiments.kinds import Findings, FittedTest, Output, by_strain
 from ..experiments.registry import report_of
 from ..files import __version__, replacing, write_notes
 from ..inference.linear import PRIOR
@@ -25,8 +25,8 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
 from ..runs.result import USABLE, Fit, answers, coefficients_of, next_step, reaches
-from .charts import Chart, Charts, dots
-from .content import Download, Facts, Listing, Part, Report, Section, Table, Words
+from .charts import Chart, Charts, dots, line
+from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
 from .moduli import moduli_charts, pinned_charts
 from .studies import optima_chart
@@ -385,7 +385,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
 def _page(fit: Fit, folder: Path) -> Report:
     result = fit.result
     exhibits = {
-        t.test.name: report_of(t.test.kind).show(
+        t.test.name: getattr(report_of(t.test.kind), "show", _plain)(
             t, fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
         )
         for t in fit.setup.tests
@@ -428,6 +428,19 @@ def _page(fit: Fit, folder: Path) -> Report:
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],
         versions=result["versions"],
     )  # fmt: skip
+
+
+def _plain(prepared: Any, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+    """Return the one fact and the residuals of a test whose kind shows nothing of its own."""
+    table = report_of(prepared.test.kind).residuals(prepared, fitted)
+    names, unit = list(table.columns), table["unit"].iloc[0]
+    label = names[1] if names.index("quantity") > 1 else "number"
+    x = table[label] if label in names else table.index + 1
+    curve = line("modelled", x, table["modelled"])
+    series = [dots("measured", x, table["measured"], colour=7), curve]
+    chart = Chart(prepared.test.name, label, str(unit), series, "measured and modelled values")
+    charts = Charts(f"{out.prefix}values", [chart], "Every matched value beside the model's")
+    return Exhibit(facts=[(prepared.test.name, found.summary)], parts=[charts])
 
 
 def _beside_model(fit: Fit) -> str:

@@ -168,7 +168,9 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
         comparison
         for test, weighting in zip(setup.tests, setup.weightings, strict=True)
         if isinstance(test, Refinable)
-        for comparison in test.finer(setup.make_solver, weighting, FINER)
+        for comparison in setup.judged(
+            test, test.finer(setup.make_solver, weighting, FINER), weighting
+        )
     ]
     finer = [*with_shared(finer, problem.unknowns.nuisance.shared)]
     residual = residual_of(problem, finer, best.differentiated, best.law)

@@ -517,7 +517,7 @@ def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
     units = {f"units.{key}": value for key, value in whole["units"].items()}
     return {
         "settings": {**fabric, **units, **law, **fit},
-        "tests": {name: _without(written.whole[name]) for name in names},
+        "tests": {name: _without(written.whole.get(name, {})) for name in names},
     }
 
 

@@ -24,7 +24,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kind_named
 from ..files import one_blas_thread
-from ..inference.comparison import Comparison, Nuisance
+from ..inference.comparison import Comparison, Nuisance, OwnObjective
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
 from ..inference.unknowns import (
@@ -36,6 +36,7 @@ from ..inference.unknowns import (
     Unknowns,
 )
 from ..materials.forms.base import Form, form_named, form_settings, of_strain
+from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..project.schema import BoundsSection, UnknownSection
@@ -64,7 +65,9 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     section, path = project.law, project.path
     ends = _strain_range(project, reaches)
     try:
-        form = form_named(section.form, _form_settings(project, reaches, ends), ends)
+        own = project.form
+        form = own.pieces(ends) if isinstance(own, OwnForm) else own
+        form = form or form_named(section.form, _form_settings(project, reaches, ends), ends)
     except InputError as error:
         field = f"law.{error.field}" if error.field else "law.form"
         raise InputError(path, field, error.problem) from None
@@ -95,7 +98,7 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
         known = [e for reach in reaches if (e := reach.strain[i]) is not None]
         if known:
             ends.append(max(known))
-        elif not of_strain(project.law.form):
+        elif not getattr(project.form, "of_strain", of_strain(project.law.form)):
             ends.append(UNBOUNDED_RANGE)
         else:
             problem = (
@@ -340,6 +343,8 @@ class FitSetup:
         """Return the objective in words."""
         if len(self.tests) > 1:
             return "weighted sum of the tests' mean relative RMS errors"
+        if self.tests[0].test.name in self.project.objectives:
+            return "sum of the RMS of the residuals of a function of one's own"
         return self.tests[0].objective_is
 
     def problem(self, masks: Masks | None = None) -> FitProblem:
@@ -347,12 +352,29 @@ class FitSetup:
         comparisons = [
             comparison
             for test, weighting in zip(self.tests, self.weightings, strict=True)
-            for comparison in test.comparisons(self.make_solver, weighting, masks)
+            for comparison in self.judged(
+                test, test.comparisons(self.make_solver, weighting, masks), weighting
+            )
         ]
         problem = self.problem_of(comparisons)
         if masks is not None and isinstance(self.starts, ProposedStarts):
             problem.starts = RandomStarts()  # nothing of the points left out may be in them
         return problem
+
+    def judged(
+        self, test: PreparedTest, comparisons: Sequence[Comparison], weighting: Weighting
+    ) -> tuple[Comparison, ...]:
+        """Return comparisons of a test with the objective that the project has for it, if any."""
+        function, found = self.project.objectives.get(test.test.name), []
+        if function is None:
+            return tuple(comparisons)
+        weight = weighting.weight / len(comparisons) if weighting.relative else 1.0
+        for one in comparisons:
+            own = OwnObjective(one.objective, function, weighting.relative, weight)
+            more = float(np.median(one.objective.scale) / np.median(own.scale))
+            priors = tuple(replace(n, weight=more * n.weight) for n in one.nuisance)
+            found.append(replace(one, objective=own, nuisance=priors))
+        return tuple(found)
 
     def problem_of(self, comparisons: Sequence[Comparison]) -> FitProblem:
         """Return the fit of comparisons of its tests, led by `SURROGATE` without derivatives."""
@@ -361,7 +383,9 @@ class FitSetup:
         unknowns = Unknowns.of(law.form, law.nu12, ends, self.bounds, comparisons)
         problem = FitProblem(tuple(comparisons), self.law, unknowns, starts=self.starts)
         if not isinstance(problem.solver, DifferentiatingSolver):
-            problem.surrogate = problem.with_solvers([solver_named(SURROGATE) for _ in comparisons])
+            pairs = [(c.solver, isinstance(c.solver, DifferentiatingSolver)) for c in comparisons]
+            leading = [own if able else solver_named(SURROGATE) for own, able in pairs]
+            problem.surrogate = problem.with_solvers(leading)
         return problem
 
     def make_solver(self, name: str | None = None) -> Solver:
@@ -479,7 +503,7 @@ def coarse_problem(setup: FitSetup) -> FitProblem | None:
     comparisons = [
         comparison
         for (test, weighting), own in zip(pairs, coarse, strict=True)
-        for comparison in own or test.comparisons(make, weighting)
+        for comparison in setup.judged(test, own or test.comparisons(make, weighting), weighting)
     ]
     return setup.problem_of(comparisons)
 

@@ -21,7 +21,7 @@ from ..experiments.kinds import (
     notes_of,
     other_thickness,
 )
-from ..experiments.registry import kinds, report_of
+from ..experiments.registry import kind_named, report_of
 from ..files import json_text, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
@@ -254,8 +254,7 @@ class Series(Analyses):
 
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests that a study can run, as `Project.chosen`; InputError: there is none."""
-    known = kinds()
-    able = [t for t in project.chosen(tests or None) if known[t.kind].studied is not None]
+    able = [t for t in project.chosen(tests or None) if kind_named(t.kind).studied is not None]
     if not able:
         raise InputError(project.path, "", "no study can run the tests of this project")
     return able
@@ -271,7 +270,7 @@ def parts_of(
     """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
     parts: dict[str, Part] = {}
     for test in tests:
-        studied = kinds()[test.kind].studied
+        studied = kind_named(test.kind).studied
         assert studied is not None
         try:
             models = test.models(thickness, what, factor)

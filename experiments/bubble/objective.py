@@ -83,7 +83,7 @@ class FieldObjective:
     InputError for a direction without any displacement to normalise by.
     """
 
-    unit = "mm"
+    unit, columns = "mm", 3
 
     def __init__(
         self,
@@ -117,6 +117,11 @@ class FieldObjective:
         """Return everything measured that the residual depends on."""
         places = [t.sample.data for t in self.targets if t.sample is not None]
         return (*(t.displacement for t in self.targets), *places)
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured displacements as the residuals are arranged, (m,) mm."""
+        return np.concatenate([target.displacement.T.reshape(-1) for target in self.targets])
 
     @property
     def places(self) -> tuple[Array, ...]:

@@ -51,7 +51,7 @@ class LoadObjective:
     loads that err as one, at least. specimens : (n,) number of each load's specimen.
     """
 
-    unit = "N"
+    unit, columns = "N", 1
 
     def __init__(
         self,
@@ -89,6 +89,11 @@ class LoadObjective:
     def scale(self) -> Array:
         """Return newtons in one unit of each residual, (n,)."""
         return np.full(len(self.load), self._unit)
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured loads, (n,) N."""
+        return self.load
 
     @property
     def data(self) -> tuple[Array, ...]:

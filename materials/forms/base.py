@@ -177,13 +177,17 @@ Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
 
 @dataclass(frozen=True)
 class Offer:
-    """A form by name: its maker, its settings, what its moduli depend on."""
+    """A form by name: its maker, its settings, what its moduli depend on.
+
+    of_card : whether it is what a card says of a form that has no name, and no choice of its own.
+    """
 
     name: str
     make: Maker
     settings: tuple[str, ...] = ()
     of_strain: bool = True
     of_load_ratio: bool = False
+    of_card: bool = False
 
 
 _OFFERS: dict[str, Offer] = {}
@@ -198,7 +202,7 @@ def form_names() -> tuple[str, ...]:
     _import_forms()
     # By module, whichever was imported first.
     ours = sorted(_OFFERS.values(), key=lambda offer: offer.make.__module__)
-    return names_with(GROUP, [offer.name for offer in ours])
+    return names_with(GROUP, [offer.name for offer in ours if not offer.of_card])
 
 
 def form_settings(name: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Moduli in pieces: splines by their values at knots; tri-linear (Ambroziak and Klosowski)."""
+"""Moduli in pieces: splines by knots; tri-linear (Ambroziak and Klosowski); forms of one's own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
-from .base import COMPONENTS, GRID, ORDER, STRAIN_NAMES, UNLIMITED, Array, Offer, register_form
+from .base import (
+    COMPONENTS,
+    GRID,
+    ORDER,
+    STRAIN_NAMES,
+    UNLIMITED,
+    Array,
+    Offer,
+    modulus_rows,
+    register_form,
+)
 
 #: Parts of a piece between which positivity and bounds are asked: a cubic that is positive at
 #: their ends can dip between them by no more than 4 % of its largest value in the piece.
@@ -83,9 +93,7 @@ class Spline:
         return np.array([[*row[1:], *[UNLIMITED] * (most + 1 - len(row))] for row in self.knots])
 
     def grid(self, component: int, end: float) -> Array:
-        ends = [knot for knot in self.knots[component] if knot < end] + [end]
-        at = np.linspace(0.0, len(ends) - 1, PARTS * (len(ends) - 1) + 1)
-        return np.interp(at, np.arange(len(ends)), ends)
+        return _between([*(knot for knot in self.knots[component] if knot < end), end], PARTS)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         return np.eye(self.size)
@@ -99,6 +107,12 @@ class Spline:
             f"Cubic splines through their values at the knots: beta lists G12 at {shear} knots of "
             f"|gamma12|, then E2 at {fill} of eps2, then E1 at {warp} of eps1."
         )
+
+
+def _between(ends: Sequence[float], parts: int) -> Array:
+    """Return the ends of pieces, and strains between them: so many parts a piece."""
+    at = np.linspace(0.0, len(ends) - 1, parts * (len(ends) - 1) + 1)
+    return np.interp(at, np.arange(len(ends)), ends)
 
 
 def _coefficients(knots: Sequence[float]) -> Array:
@@ -281,3 +295,169 @@ def _rising(pair: Any) -> bool:
 
 
 register_form(Offer("trilinear", trilinear_named, ("breaks",)))
+
+
+#: Nodes of a cubic in its piece, and places between them where it is compared, as shares of it.
+NODES, BETWEEN = np.array([0.0, 0.25, 0.75, 1.0]), np.array([0.1, 0.5, 0.9])
+#: Error of the cubics of a function over its largest value; halvings of a piece; strains at which
+#: a modulus is asked in all its pieces; size of what the others cannot make of a function.
+CLOSE, HALVINGS, ASKED, DEPENDENT = 1e-5, 6, 60, 1e-7
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Moduli as given piecewise cubics, linear in beta: a form of one's own in fits and cards.
+
+    modulus_of : of each unknown. upper, cubics : (3, P), (3, P, 4, size), as of `Form`.
+    """
+
+    title: str
+    labels: tuple[str, ...]
+    modulus_of: tuple[str, ...]
+    upper: tuple[tuple[float, ...], ...]
+    cubics: tuple[Any, ...]
+
+    name = "pieces"
+
+    @property
+    def size(self) -> int:
+        return len(self.labels)
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        return tuple(range(self.size))
+
+    def piece_map(self) -> Array:
+        return np.array(self.cubics)
+
+    def uppers(self) -> Array:
+        return np.array(self.upper)
+
+    def grid(self, component: int, end: float) -> Array:
+        ends = [0.0, *sorted({own for own in self.upper[component] if own < end}), end]
+        return _between(ends, max(2, min(PARTS, ASKED // (len(ends) - 1))))
+
+    def from_values(self, strain_range: Sequence[float]) -> Array:
+        """Return the map from values where the functions differ most; InputError: they do not."""
+        from scipy.linalg import qr  # heavy, and only forms of one's own need it
+
+        whole = np.zeros((self.size, self.size))
+        for name in ORDER:
+            own = np.flatnonzero(np.array(self.modulus_of) == name)
+            strain = self.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
+            rows = modulus_rows(self, name, strain, strain_range)[:, own]
+            scaled = rows / np.maximum(np.abs(rows).max(axis=0), 1e-300)
+            _, sizes, places = qr(scaled.T, mode="economic", pivoting=True)
+            if not np.abs(np.diag(sizes)).min() > DEPENDENT:
+                problem = f"the functions of {name} are not independent up to a strain of "
+                raise InputError(None, "form", f"{problem}{strain[-1]:g}; leave one out")
+            whole[np.ix_(own, own)] = np.linalg.inv(rows[np.sort(places[: len(own)])])
+        return whole
+
+    def to_card(self) -> dict[str, Any]:
+        said = {"labels": self.labels, "modulus_of": self.modulus_of}
+        arrays = {"uppers": self.uppers().tolist(), "map": self.piece_map().tolist()}
+        return {"pieces": {"title": self.title, **{k: list(v) for k, v in said.items()}, **arrays}}
+
+    def describe(self) -> str:
+        said = ", ".join(self.labels)
+        return f"{self.title}, by the cubics of [pieces], highest power first; beta lists {said}."
+
+
+def pieces_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Pieces:
+    """Return the form of the table `pieces` of a card."""
+    try:
+        said = settings["pieces"]
+        labels, owners = (tuple(map(str, said[key])) for key in ("labels", "modulus_of"))
+        upper, cubics = (np.array(said[key], dtype=float) for key in ("uppers", "map"))
+        good = set(owners) == set(ORDER) and len(labels) == len(owners) and bool(
+            cubics.shape == (3, upper.shape[1], 4, len(labels)) and np.isfinite(cubics).all()
+            and (np.diff(upper, prepend=0.0) >= 0).all() and (upper[:, -1] == UNLIMITED).all()
+        )  # fmt: skip
+    except (TypeError, ValueError, KeyError, IndexError, OverflowError):
+        good = False
+    if not good:
+        problem = "expected labels and modulus_of (n), uppers (3, P), that increase, and map "
+        raise InputError(None, "pieces", f"{problem}(3, P, 4, n): copy them from the card of a fit")
+    return Pieces(str(said.get("title", "")), labels, owners, _fixed(upper), _fixed(cubics))
+
+
+def _fixed(values: Any) -> Any:
+    return values.item() if np.ndim(values) == 0 else tuple(map(_fixed, values))
+
+
+register_form(Offer("pieces", pieces_named, ("pieces",), of_card=True))
+
+
+class Form:
+    """Base class of a form of one's own (`bf.Form`): moduli that are sums of functions of strain.
+
+    A subclass has `functions`. A fit takes its piecewise cubics, so that worker processes, cards
+    and other programs need no class. labels : of the unknowns, by modulus. breaks : strains of a
+    kink or jump in a function; each belongs to what is below it. of_strain : False for constants.
+    """
+
+    labels: Mapping[str, Sequence[str]] = {}
+    breaks: Sequence[float] = ()
+    of_strain = True
+
+    def functions(self, modulus: str, strain: Array) -> Sequence[ArrayLike]:
+        """Return the functions of E1, E2 or G12 at strains (n,) of its own, from 0, sizes of shear.
+
+        The modulus is the sum of each, (n,) or a number, times an unknown in MPa.
+        """
+        raise NotImplementedError(f"{type(self).__name__} needs functions(modulus, strain)")
+
+    def pieces(self, strain_range: Sequence[float]) -> Pieces:
+        """Return the form up to these strains (eps1, eps2, gamma12); InputError: no such form."""
+        labels, owners, found = list[str](), list[str](), {}
+        for name in ORDER:
+            end = float(strain_range[COMPONENTS[name]])
+            close = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
+            ends = [0.0, *sorted(b for b in self.breaks if 0 < b < end), end]
+            parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, close)]
+            parts.append((UNLIMITED, np.eye(4)[:, 3:] @ np.vander([end], 4) @ parts[-1][1]))
+            own = self.labels.get(name) or [f"{name} {k + 1}" for k in range(len(close))]
+            if len(own) != len(close):
+                problem = f"expected {len(close)} of {name}, one of each function, got {len(own)}"
+                raise InputError(None, "form.labels", problem)
+            found[COMPONENTS[name]] = len(labels), parts
+            labels, owners = [*labels, *own], [*owners, *[name] * len(own)]
+        most = max(len(parts) for _, parts in found.values())
+        upper, cubics = np.full((3, most), UNLIMITED), np.zeros((3, most, 4, len(labels)))
+        for component, (start, parts) in found.items():
+            for k in range(most):
+                upper[component, k], piece = parts[min(k, len(parts) - 1)]
+                cubics[component, k, :, start : start + piece.shape[1]] = piece
+        title = type(self).__name__
+        made = Pieces(title, tuple(labels), tuple(owners), _fixed(upper), _fixed(cubics))
+        made.from_values(strain_range)  # says what is wrong with them
+        return made
+
+    def _values(self, name: str, strain: Array) -> Array:
+        """Return (unknowns, n) values of the functions; InputError: they are none."""
+        why = ""
+        try:
+            own = [np.broadcast_to(one, strain.shape) for one in self.functions(name, strain)]
+            values = np.array(own, dtype=float)
+        except (TypeError, ValueError) as error:
+            values, why = np.empty((0, 0)), f" ({error})"
+        if not len(values) or not np.isfinite(values).all():
+            problem = f"{type(self).__name__}.functions({name!r}, strain): expected finite values, "
+            raise InputError(None, "form", f"{problem}(n,) for n strains, of each unknown{why}")
+        return values
+
+    def _cubics(
+        self, name: str, lower: float, upper: float, close: Array, halvings: int = HALVINGS
+    ) -> list[tuple[float, Array]]:
+        """Return upper end and cubics (4, unknowns) of as many pieces as the functions need."""
+        at = lower + (upper - lower) * NODES
+        at[0] = np.nextafter(lower, upper) if lower > 0 else 0.0
+        scaled = np.linalg.solve(np.vander(at / upper, 4), self._values(name, at).T)
+        cubics = scaled / upper ** np.arange(3.0, -1.0, -1.0)[:, None]
+        between = lower + (upper - lower) * BETWEEN
+        off = np.abs(np.vander(between, 4) @ cubics - self._values(name, between).T).max(axis=0)
+        if halvings and (off > close).any():
+            ends = pairwise([lower, 0.5 * (lower + upper), upper])
+            return [p for a, b in ends for p in self._cubics(name, a, b, close, halvings - 1)]
+        return [(upper, cubics)]

@@ -1,0 +1,207 @@
+"""Tests of one's own: the base class `OwnTest`, and what makes a closed form take part in a fit."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ..inference.comparison import Comparison, NoiseIs
+from ..materials.law import HypoelasticLaw, law_slopes
+from ..solvers.base import History, SolverCheck
+from . import kinds
+from .kinds import Array, MakeSolver, Masks, Weighting
+
+#: Relative step of the central differences, and noise of values, of the largest, unless given.
+STEP, NOISE = 1e-5, 0.01
+#: The law at which the values of a test stand for its code in the record of a fit.
+USUAL = HypoelasticLaw.linear(300.0, 200.0, 10.0)
+
+
+class OwnTest:
+    """Base class of a test of one's own (`bf.OwnTest`); a subclass has `measured` and `modelled`.
+
+    measured : (n,) values. unit, noise : of one of them; 1 % of the largest unless given. strain :
+    largest logarithmic (eps1, eps2, gamma12) that they depend on, None for none. places : columns
+    (n,) of the table of residuals, the first is the x axis of the chart. weight : among other
+    tests. thickness : mm, of the fabric that the test is fitted with.
+    """
+
+    name: str = "own"
+    measured: ArrayLike = ()
+    unit: str = "N"
+    noise: float | None = None
+    strain: tuple[float | None, float | None, float | None] = (None, None, None)
+    places: Mapping[str, ArrayLike] = {}
+    weight: float = 1.0
+    thickness: float = 1.0
+    kind, reads_files, parameters = "own", False, ("thickness",)
+
+    def modelled(self, law: HypoelasticLaw) -> ArrayLike:
+        """Return the values (n,) that a law gives."""
+        raise NotImplementedError(f"{type(self).__name__} needs modelled(law)")
+
+    @property
+    def reach(self) -> kinds.Reach:
+        return kinds.Reach(self.strain)
+
+    def models(self, *_: Any, **__: Any) -> Mapping[str, Any]:
+        return {}
+
+    def settings(self) -> Mapping[str, object]:
+        return {"weight": self.weight, "strain": self.strain, "unit": self.unit}
+
+    def with_parameters(self, values: Mapping[str, float]) -> Self:
+        """Return the test of a fabric thicker by values["thickness"] mm."""
+        other = copy.copy(self)
+        other.thickness = self.thickness + values["thickness"]
+        return other
+
+    def values(self, law: HypoelasticLaw) -> Array:
+        """Return `modelled`; InputError unless they are numbers, as many as measured."""
+        found, shape = self.modelled(law), np.shape(self.measured)
+        try:
+            values = np.array(found, dtype=float)
+        except (TypeError, ValueError):
+            values = np.empty(0)
+        if values.shape != shape or len(shape) != 1 or not shape[0]:
+            problem = f"expected {shape} values as measured, (n,), got {np.shape(found)}"
+            raise InputError(None, f"{self.name}.modelled", problem)
+        return values
+
+
+class ClosedForm:
+    """A solver that asks a test of one's own, and differentiates by central differences."""
+
+    name = identity = "closed form"
+    closed, external, load_ratios = True, False, True
+    progress: Callable[[Any], None] | None = None
+
+    def check(self) -> SolverCheck:
+        return SolverCheck(self.name, True, "", True)
+
+    def run(self, model: OwnTest, law: HypoelasticLaw, *_: Any, **__: Any) -> History:
+        ends = np.array([end or 0.0 for end in model.strain])
+        return History(model.values(law), np.zeros((1, 1, 3)), 0.0 * ends, ends, unstable=())
+
+    def run_with_sensitivity(
+        self, model: OwnTest, law: HypoelasticLaw, parameters: Sequence[str], **_: Any
+    ) -> tuple[History, Array]:
+        slope = np.column_stack([_slope(model, law, name) for name in parameters])
+        return replace(self.run(model, law), load_slope=slope), np.zeros((1, 1, 3, len(parameters)))
+
+
+def _slope(test: OwnTest, law: HypoelasticLaw, name: str) -> Array:
+    """Return d values / d parameter, (n,); a step changes moduli by a small share at most."""
+
+    def at(change: float) -> Array:
+        if name == "thickness":
+            return test.with_parameters({name: change}).values(law)
+        if name == "nu12":
+            return test.values(replace(law, nu12=abs(law.nu12 + change)))
+        beta = law.beta.copy()
+        beta[int(name.removeprefix("beta_"))] += change
+        return test.values(law.with_beta(beta))
+
+    powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
+    rows = law_slopes(law, [name], test.thickness)[0][..., 0] * powers
+    size = np.abs((law.pieces[..., 1:] * powers).sum(axis=-1)).max()
+    step = STEP * (size / np.abs(rows).max() if rows.any() else 1.0)
+    return np.asarray((at(step) - at(-step)) / (2 * step))
+
+
+class ValuesObjective:
+    """Residuals (model - measured) / (scale sqrt(n)) of a test of one's own."""
+
+    def __init__(self, test: OwnTest, weighting: Weighting) -> None:
+        self.measured, self.unit = np.array(test.measured, dtype=float), test.unit
+        largest = float(np.abs(self.measured).max())
+        self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
+        self.least_noise = NOISE * largest if test.noise is None else test.noise
+        self.sizes = (len(self.measured),)
+        unit = largest / weighting.weight if weighting.relative and largest > 0 else 1.0
+        self.scale = np.full(len(self.measured), unit * np.sqrt(len(self.measured)))
+        self.data = (self.measured, test.values(USUAL))
+
+    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
+        return np.asarray((history.load - self.measured) / self.scale)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        assert history.load_slope is not None
+        return np.asarray(history.load_slope / self.scale[:, None])
+
+    def nuisance_columns(self, names: Sequence[str]) -> Array:
+        return np.empty((len(self.measured), 0))
+
+    def shifted(self, here: History, there: History) -> ValuesObjective:
+        return self  # it is asked by the same solver, whichever leads
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedOwn:
+    """A test of one's own in a fit."""
+
+    test: OwnTest
+    known = None
+
+    @property
+    def objective_is(self) -> str:
+        return f"RMS error, {self.test.unit}"
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        return {}
+
+    def reach(self, masks: Masks) -> kinds.Reach:
+        return self.test.reach
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None
+    ) -> tuple[Comparison, ...]:
+        objective = ValuesObjective(self.test, weighting)
+        return (Comparison(self.test.name, self.test, ClosedForm(), objective),)
+
+    finer = comparisons  # a closed form has no mesh
+
+
+class OwnKind:
+    """The kind of all tests of one's own, which no project file says, and its presenter."""
+
+    name, fitted, predicted, studied = "own", True, None, None
+
+    @property
+    def report(self) -> OwnKind:
+        return self
+
+    def prepare(self, test: OwnTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedOwn:
+        test.values(USUAL)
+        return PreparedOwn(test)
+
+    def findings(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> kinds.Findings:
+        """Return the RMS error and its share of the largest measured value."""
+        table, unit = self.residuals(prepared, fitted), prepared.test.unit
+        rms = float(np.sqrt(np.mean(table["difference"] ** 2)))
+        share = rms / max(float(table["measured"].abs().max()), 1e-300)
+        words = f"RMS error {rms:.3g} {unit} ({100 * share:.2g} % of the largest value)"
+        numbers = {"rms": rms, "unit": unit, "relative": share}
+        return kinds.Findings(numbers, (), (words,), words, words)
+
+    def residuals(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> Any:
+        """Return the table of every matched value."""
+        import pandas as pd
+
+        test, modelled = prepared.test, fitted.histories[0].load
+        columns = {"part": test.name, **test.places, "quantity": "value", "measured": test.measured}
+        table = pd.DataFrame({**columns, "modelled": modelled, "unit": test.unit})
+        return table.assign(difference=table["modelled"] - table["measured"])
+
+    def simulate(self, *_: Any, **__: Any) -> kinds.Simulation:
+        return kinds.Simulation({"cards": {}})
+
+
+KIND = OwnKind()
