@@ -46,7 +46,7 @@ from ..runs.starts import timed
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .progress import NamedProgress
-from .terminal import FILE, command, group, show, written_to
+from .terminal import FILE, command, group, show, wrapped, written_to
 
 
 @command(
@@ -127,7 +127,9 @@ ARGUMENTS = "|".join(
 @click.option("--direction", metavar="NAME", help="Of the loads: warp, fill or bias.")
 @click.option("--specimen", metavar="NAME", help="Of the loads [name of --out].")
 @click.option("--load-column", metavar="NAME", help="Where it is not found by itself.")
-@click.option("--load-unit", type=click.Choice(["N", "kN"]), help="Where the file names none.")
+@click.option(
+    "--load-unit", type=click.Choice(["N", "kN", "lbf"]), help="Where the file names none."
+)
 @click.option("--load-format", metavar="NAME", help="Of the loads; found by their content.")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the loads and times.")
 @click.option("--frame-times", type=FILE, help="Table of the frames' times: pairs loads by time.")
@@ -158,10 +160,10 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         table = GaugeTable(names, lower, upper, record, note=note)
         # Before the loads, whose error may have this cause.
         for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
-            click.echo(f"note: {words}", err=True)
+            click.echo(wrapped(f"note: {words}"), err=True)
         said = table.notes
         for one in said:
-            click.echo(f"warning: {one.line}", err=True)
+            click.echo(wrapped(f"warning: {one.line}"), err=True)
         if loads is not None:
             table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
@@ -276,7 +278,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     # Notes of the reader appear once, not for every frame.
     words = dict.fromkeys(str(one) for frame in read for one in frame.source.notes)
     for said in [*words, *([] if note is None else [str(note)])]:
-        click.echo(f"note: {said}", err=True)
+        click.echo(wrapped(f"note: {said}"), err=True)
     if out is not None:
         with replacing(out) as path:
             write_table(path, list(rows[0]), [list(row.values()) for row in rows])

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import NOTES, InputError, Note, foremost
 from ..errors import lines as note_lines
+from ..experiments.kinds import READING
 from ..inference.methods import method_names
 from . import options as given
 from .progress import StudyProgress
@@ -139,7 +140,9 @@ def _end(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> Non
 
 
 def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
-    """Return the summary, moduli first, the page last; with `every`, all notes instead of one."""
+    """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
+    from ..reports.fit_page import verdict_words
+
     return [
         *modulus_lines(fit),
         *misfit_lines(fit),
@@ -151,6 +154,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
         *sure_lines(fit),
         *start_lines(fit),
         *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
+        verdict_words(fit),
         written_to(folder),
     ]
 
@@ -168,7 +172,7 @@ def modulus_lines(fit: Fit) -> list[str]:
         f"{fit.project.title}:",
         f"tangent moduli at logarithmic strains; 1 sigma and band: {of};",
         f"within the bounds of the fit; kN/m: times {fit.thickness:.4g} mm",
-        f"{'':18}{'strain':>8}{'MPa':>10}{'1 sigma':>10}"
+        f"{'':15}{'strain':>8}{'MPa':>10}{'1 sigma':>10}"
         f"{f'{percent(LEVEL)} band, MPa':>20}{'kN/m':>10}",
     ]
     before = ""
@@ -178,8 +182,8 @@ def modulus_lines(fit: Fit) -> list[str]:
         sigma = "not known" if one.sigma is None else sigma_words(one.sigma)
         band = "not known" if one.band is None else "{:.4g} to {:.4g}".format(*one.band)
         lines.append(
-            f"{name:18}{100 * one.strain:>6.3g} %{one.value:>10.4g}{sigma:>10}{band:>20}"
-            f"{one.per_width:>10.4g}{'  (the end)' if one.end else ''}"
+            f"{name:15}{100 * one.strain:>6.3g} %{one.value:>10.4g}{sigma:>10}{band:>20}"
+            f"{one.per_width:>10.4g}{'  (end)' if one.end else ''}"
         )
     return lines
 
@@ -228,11 +232,12 @@ def start_lines(fit: Fit) -> list[str]:
 
 
 def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
-    """Return the gravest note, and where the others are."""
+    """Return the gravest note, how files were read, and where the others are."""
     first = foremost(notes)
     if first is None:
         return []
-    more = len(notes) - 1
+    read = [note for note in notes if note.kind == READING and note is not first]
+    more = len(notes) - len(read) - 1
     where = f"{folder / NOTES} (or --verbose)"
     further = [f"{more} further note{'s' * (more > 1)}: {where}"] if more else []
-    return [f"warning: {first.line}", *further]
+    return [f"warning: {first.line}", *note_lines(read), *further]

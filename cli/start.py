@@ -18,7 +18,7 @@ from ..files import write_text
 from ..project.new_project import writable_kinds, write_project
 from ..project.schema import schema_text
 from .options import numbers
-from .terminal import FILE, command, did_you_mean
+from .terminal import FILE, command, did_you_mean, wrapped
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -95,7 +95,8 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
     if tests["bubble"]:
         words = '[bubble.sheet] surface = "measured" takes the heights z of the files'
-        click.echo(f"note: a bubble's sheet is seldom flat: {words}, modes where there are none")
+        words = f"note: a bubble's sheet is seldom flat: {words}, modes where there are none"
+        click.echo(wrapped(words))
     fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
     then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
     click.echo(f"next: bubblefit {then}")

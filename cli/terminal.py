@@ -13,6 +13,7 @@ import logging
 import os
 import re
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -127,13 +128,33 @@ def resumable(folder: Path) -> Iterator[None]:
 def written_to(folder: Path) -> str:
     """Return the line that names the page to open where there is one, else the folder."""
     page = folder / PAGE
-    there = f"page: {page} (tables and figures beside it)"
-    return there if page.exists() else f"written to {folder}"
+    there = f"page:{TOGETHER}{page} (tables and figures beside it)"
+    return there if page.exists() else f"written to{TOGETHER}{folder}"
 
 
 def show(result: Mapping[str, Any], lines: Sequence[str], as_json: bool) -> None:
-    """Print the lines, or with --json the content of result.json."""
-    click.echo(json_text(result) if as_json else "\n".join(lines) + "\n", nl=False)
+    """Print the lines, wrapped, or with --json the content of result.json."""
+    text = json_text(result) if as_json else "".join(f"{wrapped(line)}\n" for line in lines)
+    click.echo(text, nl=False)
+
+
+#: Letters of a line; rows of tables, whose cells are two blanks apart, may be wider.
+WIDTH = 80
+TABLE = re.compile(r"\S {2,}\S")
+#: The blank between a number and its unit, and one at which no line is broken.
+UNIT, TOGETHER = re.compile(r"(?<=\d) (?=%|(?:m?m|k?N|[kM]Pa|s)\b)"), "\u00a0"
+
+
+def wrapped(text: str) -> str:
+    """Return words in lines of `WIDTH`, of which the further ones are indented by four."""
+    lines = []
+    for line in text.replace(TOGETHER, " ").split("\n"):
+        indent = " " * (len(line) - len(line.lstrip()) + 4)
+        lines += [line] if len(line) <= WIDTH or TABLE.search(line) else textwrap.wrap(
+            UNIT.sub(TOGETHER, line), WIDTH, subsequent_indent=indent, break_long_words=False,
+            break_on_hyphens=False,
+        )  # fmt: skip
+    return "\n".join(lines).replace(TOGETHER, " ")
 
 
 #: Shows the whole help instead of a line, in the versions of click that have it.

@@ -37,8 +37,8 @@ from .tables import (
 
 Array = NDArray[np.float64]
 #: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
-LoadUnit = Literal["N", "kN", "kN/m", "N/mm", "N/5cm"]
-LengthUnit = Literal["mm", "cm", "m", "%"]
+LoadUnit = Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"]
+LengthUnit = Literal["mm", "cm", "m", "in", "%"]
 QUANTITIES = ("elongation", "load", "specimen", "direction", "time")
 #: Directions in which a strip can be pulled, in the order of tables.
 DIRECTIONS = ("warp", "fill", "bias")

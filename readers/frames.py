@@ -31,7 +31,7 @@ QUANTITIES = ("x", "y", "z", "dx", "dy", "dz")
 PLACES = QUANTITIES[:3]
 #: Why rows of a file are not used: what a table of provenance calls it.
 FLAGGED, NEGATIVE_SIGMA = "flagged as doubtful", "sigma below zero"
-ALL_ZERO, LOST, BELOW = "all zero", "without a value", "a row of words below the points"
+ALL_ZERO, LOST, BELOW = "all zero", "without a value", "of words below the points"
 
 
 @dataclass(frozen=True)
@@ -164,6 +164,7 @@ LENGTHS = {
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e3),
     **dict.fromkeys(("µm", "μm", "um", "micron", "microns", "micrometer", "mikrometer"), 1e-3),
     **dict.fromkeys(("in", "inch", "inches", "zoll"), 25.4),
+    **dict.fromkeys(("ft", "foot", "feet"), 304.8),
 }
 PIXELS = frozenset({"px", "pix", "pixel", "pixels"})
 _AXES = {

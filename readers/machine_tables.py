@@ -158,7 +158,7 @@ def read_machine_loads(
     *,
     columns: Mapping[str, str] | None = None,
     timed: bool = False,
-    load_unit: Literal["N", "kN"] | None = None,
+    load_unit: Literal["N", "kN", "lbf"] | None = None,
     comment: str = "#",
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,

@@ -9,7 +9,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from io import StringIO
 from itertools import permutations
@@ -49,8 +49,12 @@ class TextTable:
             plain = plain.str.replace(self.decimal, ".", regex=False)
         value = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
         bad = ~np.isfinite(value)
-        if bad.any() and any(is_grouped(cell.strip(), self.decimal) for cell in text[bad]):
+        stripped = [cell.strip() for cell in text[bad]]
+        if bad.any() and (
             # One cell with both marks says which is which, for the others of its column too.
+            any(is_grouped(cell, self.decimal) for cell in stripped)
+            or are_thousands([cell.strip() for cell in text], self.decimal)
+        ):
             plain = pd.Series([_ungrouped(cell.strip(), self.decimal) for cell in text])
             value = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float)
             bad = ~np.isfinite(value)
@@ -61,6 +65,8 @@ class TextTable:
             first, more = int(np.argmax(bad)), int(bad.sum()) - 1
             cell = text.iloc[first].strip()
             problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
+            if _is_thousands(cell):
+                problem += "; write numbers without marks of thousands"
             if more:
                 problem += f"; so in {more} more row{'s' * (more > 1)}"
             raise InputError(self.path, f"line {self.lines[first]}, column {column!r}", problem)
@@ -107,7 +113,7 @@ class TextTable:
 
     def rows(self, keep: NDArray[np.bool_]) -> TextTable:
         """Return the table with only the rows where `keep` (rows,) is true."""
-        return TextTable(self.path, self.cells[keep], self.lines[keep], self.decimal)
+        return replace(self, cells=self.cells[keep], lines=self.lines[keep])
 
 
 def check_one(path: Path, names: Sequence[str], column: str) -> None:
@@ -225,7 +231,8 @@ def write_table(
 NUMBER = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"
 _NUMBER = re.compile(NUMBER)
 _COMMA = re.compile(r"[+-]?\d*+,\d++([eE][+-]?\d++)?")
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}((,\d{3})+|(\.\d{3})+)")
+_BELOW_1000 = re.compile(r"[+-]?\d{1,3}")
 
 
 #: "1 013,5", "1'013.5": no mark of decimals stands before three digits here.
@@ -238,6 +245,26 @@ def is_grouped(cell: str, decimal: str) -> bool:
     both = rf"[+-]?[1-9]\d{{0,2}}(\{other}\d{{3}})+\{decimal}\d+"
     return bool(re.fullmatch(both, cell)) or (
         bool(_BLANKS.search(cell)) and is_number(_BLANKS.sub("", cell))
+    )
+
+
+def _is_thousands(cell: str) -> bool:
+    return bool(_GROUPED.fullmatch(cell))
+
+
+def are_thousands(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether all cells are whole numbers of which some have marks of thousands.
+
+    Beyond doubt with whole numbers above 99 and no mark among them: they would fall below ten.
+    """
+    other = "," if decimal == "." else "."
+    marked = [cell for cell in cells if other in cell]
+    plain = [cell for cell in cells if other not in cell and cell.casefold() not in HOLES]
+    return (
+        bool(marked)
+        and all(map(_is_thousands, marked))
+        and all(map(_BELOW_1000.fullmatch, plain))
+        and any(len(cell.lstrip("+-")) == 3 for cell in plain)
     )
 
 
@@ -287,8 +314,16 @@ def _day_numbers(dates: Sequence[str]) -> NDArray[np.intp]:
 
 def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
     """Return the decimal mark of cells that should be numbers: (line, column, text)."""
-    commas = [one for one in cells if _COMMA.fullmatch(one[2])]
+    by_column: dict[str, list[str]] = {}
+    for _, name, cell in cells:
+        by_column.setdefault(name, []).append(cell)
     points = any("." in cell and is_number(cell) for _, _, cell in cells)
+    if points and any(_COMMA.fullmatch(cell) for _, _, cell in cells):
+        # Marks of thousands say nothing of the decimal mark, but that it is the other.
+        whole = {n for n, own in by_column.items() for mark in ".," if are_thousands(own, mark)}
+        cells = [one for one in cells if one[1] not in whole]
+        points = any("." in cell and is_number(cell) for _, _, cell in cells)
+    commas = [one for one in cells if _COMMA.fullmatch(one[2])]
     if not commas or points:
         return "."
     if all(_GROUPED.fullmatch(cell) for _, _, cell in commas):
@@ -296,6 +331,24 @@ def decimal_mark(path: Path, cells: Sequence[tuple[int, str, str]]) -> str:
         problem = f"{cell!r}: is the comma a decimal mark, or does it mark thousands? say decimal"
         raise InputError(path, f"line {number}, column {name!r}", problem)
     return ","
+
+
+#: Words of a label of rows that are no readings, one of the first in it and nothing else.
+_STATISTICS = frozenset(
+    "mean average avg mittel mittelwert median std sd stdev stdabw deviation standardabweichung"
+    " variation variationskoeffizient cov cv variance varianz min max minimum maximum range"
+    " spannweite".split()
+)
+_BESIDE = frozenset("standard dev of the coefficient value values wert".split())
+
+
+def has_statistic(row: Sequence[str]) -> bool:
+    """Return whether a cell of a row labels a mean, a deviation, a least or largest value."""
+    for cell in row:
+        words = {*re.split(r"[\W\d_]+", cell.casefold())} - {""} if len(cell) < LONGEST else set()
+        if words & _STATISTICS and words <= _STATISTICS | _BESIDE:
+            return True
+    return False
 
 
 #: Words that make a column one of these quantities, in English and German exports.
@@ -363,10 +416,17 @@ DIRECTION_ALIASES: Mapping[str, str] = {
     **dict.fromkeys("bias bias45 45bias 45 45deg 45degree 45degreebias diagonal".split(), "bias"),
 }
 #: mm in one of each unit of length, N in one of each unit of load.
-LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "µm": 1e-3, "μm": 1e-3, "um": 1e-3}
+LENGTH_UNITS = {
+    "mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "μm": 1e-3, "um": 1e-3, "in": 25.4, "ft": 304.8,
+}  # fmt: skip
 LOAD_UNITS = {
     "N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "kgf": 9.80665, "kp": 9.80665,
     "gf": 9.80665e-3, "lbf": 4.4482216152605,
+}  # fmt: skip
+#: Other names of units, in small letters; a weight is that of its mass.
+OTHER_NAMES = {
+    "n": "N", "kn": "kN", "lb": "lbf", "lbs": "lbf", "lbf": "lbf", "g": "gf", "kg": "kgf",
+    "in": "in", "inch": "in", "inches": "in", "zoll": "in",
 }  # fmt: skip
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {
@@ -386,7 +446,7 @@ TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 LONGEST, MOST_NAMES = 300, 2000
 _KNOWN = (
     r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/5cm|daN/5cm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar"
-    "|psi|lbf/in|lbf|kgf|daN"
+    "|psi|lbf/in|lbf|lbs|lb|kgf|kg|gf|g|daN|inches|inch|in|ft|µm|μm|um"
 )
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
 _UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"
@@ -496,4 +556,4 @@ def is_between_grips(name: str, chosen: bool) -> bool:
 
 def scale_of(unit: str, units: Mapping[str, float]) -> float | None:
     """Return what one `unit` is in mm or N; None for a unit that is not in `units`."""
-    return units.get({"n": "N", "kn": "kN", "KN": "kN"}.get(unit, unit))
+    return units[unit] if unit in units else units.get(OTHER_NAMES.get(unit.casefold(), unit))

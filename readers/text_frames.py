@@ -41,6 +41,7 @@ from .tables import (
     check_row,
     check_width,
     decimal_mark,
+    has_statistic,
     is_number,
     read_lines,
 )
@@ -130,10 +131,12 @@ def find_layout(
 
 
 def _is_summary(text: str, first: str, separator: str | None) -> bool:
-    """Return whether a row begins with a word, such as "Mean", and the `first` with a number."""
-    word, number = ((cells_of(one, separator) or [""])[0] for one in (text, first))
-    known = word.casefold() in {*HOLES, *WORDS}
-    return word[:1].isalpha() and not known and is_number(number)
+    """Return whether a row has a label, "Mean", or begins with a word, unlike the `first`."""
+    row, before = (cells_of(one, separator) or [""] for one in (text, first))
+    if has_statistic(row) and not has_statistic(before):
+        return True
+    known = row[0].casefold() in {*HOLES, *WORDS}
+    return row[0][:1].isalpha() and not known and is_number(before[0])
 
 
 def _best_header(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
@@ -14,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
-from ..experiments.kinds import Expected, Fabric, FittableTest, Judgement, files_of, judged
+from ..experiments.kinds import (
+    DataFile,
+    Expected,
+    Fabric,
+    FittableTest,
+    Judgement,
+    files_of,
+    judged,
+)
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
 from ..inference.problem import FitProblem
@@ -401,6 +410,15 @@ def judge(setup: FitSetup, saw: Saw = lambda words: None) -> tuple[Judgement, ..
     return tuple(judgements)
 
 
+def _choices(files: Sequence[DataFile]) -> list[str]:
+    """Return the choices of the readers once each, then counts of rows that were left out."""
+    said, dropped = dict.fromkeys(n for f in files for n in f.source.notes), Counter[str]()
+    for file in files:
+        dropped.update(file.dropped)
+    gone = ", ".join(f"{count} {why}" for why, count in dropped.items() if count)
+    return [*said, f"rows of the files left out: {gone}"] if gone else [*said]
+
+
 NOTHING = "nothing doubtful"
 
 
@@ -432,11 +450,8 @@ class Check:
 
     @property
     def choices(self) -> dict[str, list[str]]:
-        """Return the choices that were made in reading the files of each test, in words."""
-        return {
-            one.test.name: list(dict.fromkeys(n for f in files_of(one) for n in f.source.notes))
-            for one in self.setup.tests
-        }
+        """Return choices in reading the files of each test, and rows left out, in words."""
+        return {one.test.name: _choices(files_of(one)) for one in self.setup.tests}
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Return (test, severity, doubt, text): a row a doubt, one for none; choices as notes."""

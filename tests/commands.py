@@ -10,7 +10,10 @@ import time
 
 import click
 from bubblefit.cli.main import main
+from bubblefit.cli.terminal import wrapped
 from click.testing import CliRunner
+
+from .golden_files import unbroken
 
 TIMEOUT_S = 300.0
 #: How long a command that is told to stop may take to end.
@@ -19,14 +22,22 @@ ENDING_S = 30.0
 NUMPY = re.compile(r"\bnp\.\w+\(|\barray\(|\[ ?-?\d+\.\d* +-?\d+\.\d*[\]\s]")
 
 
+#: Commands and options whose output is a document, JSON, or help as click lays it out.
+AS_WRITTEN = {"docs", "schema", "doctor", "--json", "--help", "--version"}
+
+
 def in_process(*arguments, cwd, code=0):
     """Run the command in this process; assert its exit code; return click's result.
 
-    That a new interpreter says the same: tests/cli/test_usage.py.
+    Its lines are whole again, once none was too wide. That a new interpreter says the same:
+    tests/cli/test_usage.py.
     """
     with contextlib.chdir(cwd):
         done = CliRunner().invoke(main, [str(a) for a in arguments])
     assert done.exit_code == code, (done.output, done.exception)
+    if arguments[0] not in AS_WRITTEN and not AS_WRITTEN & {*arguments}:
+        assert wrapped(done.stdout) == done.stdout
+        done.stdout_bytes = unbroken(done.stdout).encode()
     found = NUMPY.search(done.output)
     assert found is None, done.output[max(found.start() - 80, 0) :][:200] if found else ""
     return done

@@ -7,6 +7,8 @@ to place and from day to day is replaced.
 import re
 from pathlib import Path
 
+from bubblefit.cli.terminal import TABLE, WIDTH, wrapped
+
 from .places import ROOT
 
 FOLDER = Path(__file__).parent / "golden"
@@ -22,13 +24,28 @@ REPLACED = (
 )
 
 
+def unbroken(text):
+    """Return the text with wrapped lines whole: where they break depends on what is replaced."""
+    whole, before = [], ""
+    for line in text.splitlines():
+        # What was broken did not fit.
+        fits = len(before) + 1 + len(line.strip().partition(" ")[0]) <= WIDTH
+        if fits or not line.startswith("    ") or any(map(TABLE.search, (line, whole[-1]))):
+            whole.append(line)
+        else:
+            whole[-1] += f" {line.strip()}"
+        before = line
+    return "".join(f"{line}\n" for line in whole)
+
+
 def normalised(text, folder):
     """Return the text without paths, dates, times, versions and digits of rounding."""
     for place, name in ((folder, "FOLDER"), (folder.name, "NAME"), (ROOT, "ROOT")):
         text = text.replace(str(place), name)
+    text = unbroken(text)
     for pattern, words in REPLACED:
         text = re.sub(pattern, words, text)
-    return "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+    return "".join(f"{line.rstrip()}\n" for line in wrapped(text).splitlines())
 
 
 class Golden:

@@ -55,7 +55,7 @@ def nearest_ratio(loads: Sequence[float]) -> str:
     return f"{warp / larger:.2g}:{fill / larger:.2g}"
 
 
-LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "N", "kN"]
+LoadUnit = Literal["kN/m", "N/mm", "N/m", "N/cm", "N/50mm", "N/5cm", "lbf/in", "N", "kN", "lbf"]
 StrainUnit = Literal["%", "‰", "mm/mm"]
 #: What a table has to hold, and by which key of a project its column is named.
 QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}

@@ -411,6 +411,7 @@ def clamped_elsewhere(view: View, expected: Expected) -> Iterator[Doubt]:
         f"{edge.still} points of the clamp stand still, beyond an edge of {seen}; the project says "
         f"{said}: give that of the free disk inside the clamp"
     )
+    text += ', or radius = "clamp"' if outline.round else ""
     yield Doubt("radius", abs(edge.scale - 1.0) > FAR_EDGE, text)
 
 

@@ -18,7 +18,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
-from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface, read_fields
+from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import FrameSource
 from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precision, Weighting
@@ -29,7 +29,7 @@ from .point_files import PointFiles
 from .registration import Registration, register_fields
 from .section import Sheet
 from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
-from .test import PART, BubbleTest, KnownSolution
+from .test import PART, BubbleTest, KnownSolution, measured_fields
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
 OBJECTIVES = {"e": "sum of relative RMS errors", "mm": "sum of RMS errors, mm"}
@@ -353,15 +353,11 @@ def _measured(
     test: BubbleTest, data: PointFiles
 ) -> tuple[tuple[DisplacementField, ...], Registration | None]:
     """Read the fields, and register them where the section asks for it."""
-    frames = None if data.recorded is None else data.recorded.frames
-    try:
-        fields = read_fields(
-            data.files, test.pressures, options=data.options, format=data.format, frames=frames
-        )
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise test.place.error(f"data.points.{error.field}", error.problem) from None
+    fields = measured_fields(test.place, data, test.pressures)
+    if test.of_clamp:
+        words = f"the radius of {test.radius:.4g} mm is that of the clamp, whose points stand still"
+        source = replace(fields[0].source, notes=(*fields[0].source.notes, words))
+        fields = (replace(fields[0], source=source), *fields[1:])
     if data.registration is None:
         return fields, None
     try:

@@ -353,6 +353,40 @@ def clamp_of_motion(
     return ClampEdge(x, y, size, error, int(beyond.sum()))
 
 
+#: Rounds of the search for a circle, and the change of its size after which it ends.
+ROUNDS, ENDED = 5, 1e-4
+
+
+def clamp_radius(
+    fields: Sequence[DisplacementField], options: RegistrationOptions | None = None
+) -> tuple[float, ClampEdge]:
+    """Return the radius (mm) of the circle beyond which points stand still, and its edge.
+
+    fields : by rising pressure. options : of the registration, None for fields in the test's
+    coordinates. Raises InputError where too few points around the disk stand still.
+    """
+    points, moved = _whole(fields[-1].frame)
+    weight = np.linalg.norm(moved, axis=1)
+    off = points - weight @ points / weight.sum()
+    # Of a paraboloid on a disk: the mean square distance, weighted by the rise, is R^2 / 3.
+    radius = float(np.sqrt(3.0 * (weight @ off**2).sum() / weight.sum()))
+    for _ in range(ROUNDS):
+        seen = fields
+        if options is not None:
+            seen, _ = register_fields(fields, Outline.circle(radius), options)
+        rises = [(f.points, f.displacement[:, 2]) for f in seen]
+        top = max(float(rise.max()) for _, rise in rises)
+        high = [one for one in rises if one[1].max() > HIGH * top]
+        edge = clamp_of_motion(high, (radius, radius))
+        if edge is None:
+            problem = "no points of a clamp stand still around the disk; give the radius"
+            raise InputError(None, "radius", problem)
+        radius *= edge.scale
+        if abs(edge.scale - 1.0) < ENDED:
+            break
+    return radius, edge
+
+
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
     """Guess the turn of the first semi-axis, degrees: the rise spreads along the longer one."""
     weight = np.clip(rise, 0.0, None)
@@ -686,6 +720,10 @@ def _centred(
     for _ in range(2):
         rim = rim_of_motion(surfaces, semi_axes, (start[0], start[1]), angle)
         start = np.array([rim.x, rim.y])
+    # Points that stand still just beyond the rim pull at a rise that is negative there.
+    about = [(points - start, rise) for points, rise in surfaces]
+    if (edge := clamp_of_motion(about, semi_axes, rim.angle)) is not None:
+        rim = replace(rim, x=rim.x + edge.x, y=rim.y + edge.y, error=edge.error)
     return shifted(rim.x, rim.y).after(placement), rim
 
 

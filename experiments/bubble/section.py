@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -87,12 +87,17 @@ class EllipseSection(Section):
     angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
 
 
-def outline_of(section: BubbleSection, place: Place) -> Outline:
-    """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius."""
+def outline_of(section: BubbleSection, place: Place, of_clamp: Callable[[], float]) -> Outline:
+    """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius.
+
+    of_clamp : finds the radius of the clamp in the data, mm.
+    """
     length, ellipse = place.scales.length, section.ellipse
     if section.radius is not None and ellipse is not None:
         raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
-    if section.radius is not None:
+    if section.radius == "clamp":
+        outline = Outline.circle(of_clamp())
+    elif section.radius is not None:
         outline = Outline.circle(section.radius * length)
     elif ellipse is not None:
         outline = Outline(ellipse.major * length, ellipse.minor * length, ellipse.angle)
@@ -387,7 +392,7 @@ class BubbleSection(Section):
 
     name: Name_of_sections | None = None
     weight: Positive = 1.0
-    radius: Length | None = None
+    radius: Length | Literal["clamp"] | None = None
     ellipse: EllipseSection | None = None
     pressures: Annotated[list[Pressure], Field(min_length=1)] | None = None
     increments: list[Pressure] | None = None

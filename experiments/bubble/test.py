@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Literal
 
@@ -14,9 +15,11 @@ from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
+from ...readers.fields import DisplacementField, read_fields
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
+from .registration import clamp_radius
 from .section import BubbleSection, Sheet, Symmetry, facet_of, outline_of, sheet_of
 
 
@@ -114,6 +117,7 @@ class BubbleTest:
     sheet: Sheet
     noise: float | None = None
     facet: Facet | None = None
+    of_clamp: bool = False  # the radius is that of the clamp, found in the data
     kind: str = "bubble"
 
     @property
@@ -201,7 +205,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
-    outline = outline_of(section, place)
+    outline = outline_of(section, place, partial(radius_of_clamp, place, measured, pressures))
     source = data_source(section, place, pressures, increments, measured)
     camera = None if section.data.points is None else section.data.points.filter
     of_files, offset = isinstance(source, PointFiles), section.nuisance.displacement_offset
@@ -225,7 +229,36 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         noise=None if section.noise is None else section.noise * length,
         facet=facet_of(camera, place, length, section.symmetry, section.match.by),
         sheet=sheet,
+        of_clamp=section.radius == "clamp",
     )
+
+
+def measured_fields(
+    place: Place, data: PointFiles, pressures: Sequence[float]
+) -> tuple[DisplacementField, ...]:
+    """Read the fields at the pressures (MPa) as the files have them; raises InputError."""
+    frames = None if data.recorded is None else data.recorded.frames
+    try:
+        return read_fields(
+            data.files, pressures, options=data.options, format=data.format, frames=frames
+        )
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise place.error(f"data.points.{error.field}", error.problem) from None
+
+
+def radius_of_clamp(place: Place, data: PointFiles | None, pressures: Sequence[float]) -> float:
+    """Return the radius of the clamp by its points that stand still, mm; raises InputError."""
+    if data is None or not place.need_data:
+        raise place.error("radius", "'clamp' is found in measured data; give the radius here")
+    try:
+        radius, _ = clamp_radius(measured_fields(place, data, pressures), data.registration)
+    except InputError as error:
+        if error.path is not None:
+            raise
+        raise place.error("radius", f"'clamp': {error.problem}") from None
+    return radius
 
 
 def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None:

@@ -250,7 +250,7 @@ class PairedLoads:
     direction: str
     specimen: str
     load_column: str | None = None
-    load_unit: Literal["N", "kN"] | None = None
+    load_unit: Literal["N", "kN", "lbf"] | None = None
     decimal: Literal[".", ","] | None = None
     format: str | None = None
     frame_times: Path | None = None

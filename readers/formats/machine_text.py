@@ -27,12 +27,14 @@ from ..tables import (
     LENGTH_UNITS,
     LOAD_UNITS,
     MOST_NAMES,
+    OTHER_NAMES,
     TIME_UNITS,
     TextTable,
     check_row,
     check_width,
     columns_of,
     decimal_mark,
+    has_statistic,
     is_number,
     is_stamp,
     nearest_to_strip,
@@ -44,11 +46,9 @@ from ..tables import (
 #: Line number from 1 and cells.
 Rows = list[tuple[int, list[str]]]
 SEPARATORS = ("\t", ";", ",")
-#: Labels of rows that are no readings, in any column.
-STATISTICS = frozenset(
-    "mean average std sd median mittelwert standardabweichung variationskoeffizient".split()
-)
-UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS}
+UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS, *OTHER_NAMES}
+#: Rows between the names and the first numbers: units, and sometimes channels or types.
+BETWEEN = 2
 _LETTERS = re.compile(r"[^\W\d_]")
 _LETTER = re.compile(r"[^\W\d_eE]")
 
@@ -90,15 +90,22 @@ def _names_all(
 
 
 def _is_header(rows: Rows, index: int, named: Mapping[str, str], quantities: Sequence[str]) -> bool:
-    """Return whether a row has the names, and numbers one or two rows below."""
+    """Return whether a row has the names, and numbers in one of the rows below."""
     # Most rows are numbers, and quickly passed over.
     if not _LETTER.search("".join(rows[index][1])):
         return False
     columns = _names_all(rows[index][1], named, quantities)
-    below = [row for _, row in rows[index + 1 : index + 3]]
+    below = [row for _, row in rows[index + 1 : index + 2 + BETWEEN]]
+    if len(below) > BETWEEN and not all(map(_in_words, below[:BETWEEN])):
+        below.pop()
     return bool(columns) and any(
         all(any(_is_number(row, i) for i in each) for each in columns) for row in below
     )
+
+
+def _in_words(row: list[str]) -> bool:
+    """Return whether a row has words and no number."""
+    return bool(_LETTERS.search("".join(row))) and not any(map(is_reading, row))
 
 
 @dataclass(frozen=True)
@@ -125,14 +132,19 @@ def find_blocks(
         below = rows[body][1] if body < end else []
         letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
         if letters and not any(_is_number(below, i) for i in needed):
-            for name, cell in zip(names, below, strict=False):
-                unit = plain_unit(cell.strip("()[]<>{} "))
+            body += 1
+            if body + 1 < end and all(_in_words(rows[i][1]) for i in (body - 1, body)):
+                body += any(_is_number(rows[body + 1][1], i) for i in needed)
+            # Of the rows below the names, the one with most units has the units.
+            number, below = max(
+                rows[head + 1 : body], key=lambda one: len(UNITS & {*_units_in(one[1])})
+            )
+            for name, unit in zip(names, _units_in(below), strict=False):
                 if unit and units[name] not in ("", unit):
                     problem = f"unit {unit!r} here, but {units[name]!r} in the column's name"
-                    at = f"line {rows[body][0]}, column {name!r}"
+                    at = f"line {number}, column {name!r}"
                     raise InputError(path, at, f"{problem}; correct one")
                 units[name] = unit or units[name]
-            body += 1
         inside = [(n, row) for n, row in rows[body:end] if any(row)]
         # What stands between two tables begins with a word: the title of the second.
         while end < len(rows) and inside and not is_reading(next(filter(None, inside[-1][1]), "")):
@@ -141,6 +153,10 @@ def find_blocks(
         summary = tuple(number for number, _ in inside[last:])
         blocks.setdefault(tuple(names), []).append(Block(line, units, inside[:last], summary))
     return blocks
+
+
+def _units_in(row: list[str]) -> list[str]:
+    return [plain_unit(cell.strip("()[]<>{} ")) for cell in row]
 
 
 def _is_number(row: list[str], column: int) -> bool:
@@ -161,8 +177,7 @@ def _count_of_readings(rows: Rows) -> int:
 
 def _is_summary(row: list[str], first: list[str]) -> bool:
     """Return whether a row has a word where the `first` row of numbers has one of them."""
-    named, before = ({cell.casefold().strip(".: ") for cell in one} for one in (row, first))
-    if named & STATISTICS and not before & STATISTICS:
+    if has_statistic(row) and not has_statistic(first):
         return True
     at = next(i for i, cell in enumerate(row) if cell)
     cell = row[at]
@@ -189,7 +204,7 @@ def nothing_found(
             if sum(map(is_number, row)) >= 2:
                 higher = cells_of(lines[index - 1][1], separator) if index else []
                 # Names stand above their units.
-                if len(higher) == len(names) and any(c.strip("()[]<> ") in UNITS for c in names):
+                if len(higher) == len(names) and any(c in UNITS for c in _units_in(names)):
                     number, names = lines[index - 1][0], higher
                 heads = ", ".join(name for name in names if name)[:200]
                 return f"{problem}; line {number}, above the first numbers, has: {heads}"

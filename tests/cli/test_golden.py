@@ -1,5 +1,7 @@
 """Terminal output of the commands that no other file of this folder runs: tests/golden/."""
 
+import re
+
 import pytest
 from bubblefit.cli.main import main
 
@@ -52,3 +54,10 @@ def test_every_command_has_a_golden_file():
     names = {"-".join(path) for path, _ in every_command(main)}
     groups = {"simulate", "simulate-strips", "study", "dic"}  # strips: another name of uniaxial
     assert names - groups <= {path.stem for path in FOLDER.iterdir()}
+
+
+def test_no_line_but_of_tables_is_wider_than_a_terminal():
+    for path in FOLDER.iterdir():
+        lines = path.read_text().splitlines()
+        wide = [line for line in lines if len(line) > 80 and not re.search(r"\S  +\S", line)]
+        assert wide == [], path.name

@@ -37,6 +37,7 @@ def blanks(mark: str) -> list[str]:
 TIMED = ["Time (s),Extension (mm),Load (N)", *rows(np.arange(61), ELONGATION, LOAD)]
 LOST = [f"{load:.6f}" if i % 20 else "---" for i, load in enumerate(LOAD, 1)]
 QUOTED = [f'"{u:.6f}","{load:,.3f}"' for u, load in zip(ELONGATION, LOAD, strict=True)]
+WHOLE = [f"{load:,.0f}" for load in LOAD[::3]]
 STRIPS = {
     "Zwick": (
         [*ZWICK, "Standardweg;Feindehnung;Standardkraft", "mm;mm;N",
@@ -73,6 +74,41 @@ STRIPS = {
         ["Load(kgf)\tExtension(\u00b5m)", *rows(LOAD / 9.80665, 1e3 * ELONGATION, separator="\t")],
         "utf-16", 61, 0,
     ),
+    **{
+        f"label {word!r}": (
+            [f"{TIMED[0]},Note", *(f"{row}," for row in TIMED[1:]), f"60,9,20,{word}"],
+            "utf-8", 61, 1,
+        )
+        for word in ("min", "Max", "Std. dev.", "Standard deviation", "Spannweite")
+    },
+    "thousands of whole numbers": (
+        ["Extension (mm);Load (N)", *rows(ELONGATION[::3], WHOLE, separator=";")], "utf-8", 21, 0,
+    ),
+    "German thousands of whole numbers": (
+        ["Weg [mm];Kraft [N]", *rows([comma(u) for u in ELONGATION[::3]],
+                                     [load.replace(",", ".") for load in WHOLE], separator=";")],
+        "utf-8", 21, 0,
+    ),
+    "channels below the units": (
+        ["Weg\tKraft", "mm\tN", "Channel 1\tChannel 2", *rows(ELONGATION, LOAD, separator="\t")],
+        "utf-8", 61, 0,
+    ),
+    "types above the units": (
+        ["Weg\tKraft", "Laser\tFloat64", "mm\tN", *rows(ELONGATION, LOAD, separator="\t")],
+        "utf-8", 61, 0,
+    ),
+    **{
+        f"{length}, {load}": (
+            ["Extension,Load", f"{length},{load}",
+             *rows(ELONGATION / mm, LOAD / newton, form="{:.9f}")],
+            "utf-8", 61, 0,
+        )
+        for length, mm in {"in": 25.4, "inch": 25.4, "Inches": 25.4, "ft": 304.8}.items()
+        for load, newton in {"lb": 4.44822, "lbs": 4.44822, "g": 9.80665e-3, "kg": 9.80665}.items()
+    },
+    "inches at the end": (
+        ["Extension in,Load_lb", *rows(ELONGATION / 25.4, LOAD / 4.44822)], "utf-8", 61, 0,
+    ),
     "pounds per inch": (
         ["Extension (in),Load (lbf/in)", *rows(ELONGATION / 25.4, LOAD / 50 / 0.1751268352)],
         "utf-8", 61, 0,
@@ -101,6 +137,8 @@ def test_strips_are_read_as_written(tmp_path, name):
         # Integers with one mark may be decimals; a word in the midst is no summary.
         (["Weg [mm];Kraft [N]", "1,250;1.013", "2,500;2.026"], ["line 2", "'1,250'"]),
         (["Weg [mm];Kraft [N]", "0;0", "1;12.34,5"], ["line 3", "'12.34,5'"]),
+        (["Weg [mm];Kraft [N]", "0;1,013", "2;2,026"], ["line 2", "'1,013'"]),
+        (["Weg [mm];Kraft [N]", "0;101", "2.5;1,013.5", "3;2,13"], ["line 4", "'2,13'"]),
         ([*TIMED[:9], "", "pause,,", *TIMED[9:]], ["line 11", "found nothing"]),
         (["Weg [mm];Kraft [N]", "0;---", "1;---", "2;5"], ["line 2", "'---'; so in 1 more row"]),
         (["Weg [mm];Kraft [N];Weg [mm]", "0;0;1", "1;5;2"], ["'Weg [mm]' appears twice"]),
@@ -134,11 +172,15 @@ def test_logs_and_biaxial_tables_leave_lost_readings_out(tmp_path):
 def test_a_frame_keeps_to_its_points(tmp_path):
     """Rows of means are no points, and a column that comes twice with the same cells is one."""
     draw = np.random.default_rng(0).uniform(-9, 9, (20, 6)).round(4)
-    for unit, below in (("mm", ["mean,1,1,1,1,1,1,1", "std. dev.,2,2,2,2,2,2,2"]), ("in", [])):
+    means = ["mean,1,1,1,1,1,1,1", "std. dev.,2,2,2,2,2,2,2"]
+    behind = ["99,1,1,1,1,1,1,1,Mittelwert", ",2,2,2,2,2,2,2,max"]
+    for unit, below in (("mm", means), ("cm", behind), ("in", [])):
         names = ",".join(["no", *(f"{q} [{unit}]" for q in ("x", "y", "z", "dx", "dy", "dz", "x"))])
         path = tmp_path / f"{unit}.csv"
         body = rows(map(str, range(20)), *draw.T, draw[:, 0], form="{:.4f}")
-        path.write_text("\n".join(["# a lab's own", names, *body, *below]))
+        names, note = (f"{names},note", ",") if below == behind else (names, "")
+        lines = ["# a lab's own", names, *(row + note for row in body), *below]
+        path.write_text("\n".join(lines))
         (frame,) = read_frames([path], FrameOptions())
         found = np.column_stack([frame.points, frame.displacement])
         np.testing.assert_allclose(found, LENGTHS[unit] * draw, rtol=1e-12)

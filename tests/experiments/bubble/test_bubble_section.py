@@ -182,7 +182,7 @@ METRES = replace(PLACE, scales=Scales(pressure=0.1, length=1000.0))
 def edge(radius: float | None = None, symmetry: str = "full", place: Place = PLACE, **ellipse):
     own = SimpleNamespace(**({"angle": 0.0} | ellipse)) if ellipse else None
     section: Any = SimpleNamespace(radius=radius, ellipse=own, symmetry=symmetry)
-    return outline_of(section, place)
+    return outline_of(section, place, lambda: 98.9)
 
 
 @pytest.mark.parametrize(
