@@ -46,7 +46,7 @@ from ..runs.starts import timed
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .progress import NamedProgress
-from .terminal import FILE, command, group, show, wrapped, written_to
+from .terminal import FILE, command, group, show, written_to
 
 
 @command(
@@ -160,10 +160,10 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         table = GaugeTable(names, lower, upper, record, note=note)
         # Before the loads, whose error may have this cause.
         for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
-            click.echo(wrapped(f"note: {words}"), err=True)
+            click.echo(f"note: {words}", err=True)
         said = table.notes
         for one in said:
-            click.echo(wrapped(f"warning: {one.line}"), err=True)
+            click.echo(f"warning: {one.line}", err=True)
         if loads is not None:
             table = replace(table, curve=loads_at_frames(record, loads))
     table.write(out)
@@ -278,7 +278,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
     # Notes of the reader appear once, not for every frame.
     words = dict.fromkeys(str(one) for frame in read for one in frame.source.notes)
     for said in [*words, *([] if note is None else [str(note)])]:
-        click.echo(wrapped(f"note: {said}"), err=True)
+        click.echo(f"note: {said}", err=True)
     if out is not None:
         with replacing(out) as path:
             write_table(path, list(rows[0]), [list(row.values()) for row in rows])
