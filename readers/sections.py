@@ -153,7 +153,9 @@ def _times(value: Any, scale: float) -> Any:
     """Return every number of a value times a scale."""
     if isinstance(value, Mapping):
         return {key: _times(own, scale) for key, own in value.items()}
-    return [_times(own, scale) for own in value] if isinstance(value, list) else value * scale
+    if isinstance(value, list):
+        return [_times(own, scale) for own in value]
+    return value if isinstance(value, str) else value * scale
 
 
 def _marks(annotation: Any) -> Iterator[Any]:

@@ -354,7 +354,7 @@ def clamp_of_motion(
 
 
 #: Rounds of the search for a circle, and the change of its size after which it ends.
-ROUNDS, ENDED = 5, 1e-4
+ROUNDS, ENDED = 8, 1e-4
 
 
 def clamp_radius(
@@ -379,12 +379,12 @@ def clamp_radius(
         high = [one for one in rises if one[1].max() > HIGH * top]
         edge = clamp_of_motion(high, (radius, radius))
         if edge is None:
-            problem = "no points of a clamp stand still around the disk; give the radius"
-            raise InputError(None, "radius", problem)
+            break
         radius *= edge.scale
         if abs(edge.scale - 1.0) < ENDED:
-            break
-    return radius, edge
+            return radius, edge
+    problem = "no points of a clamp stand still around the disk; give the radius"
+    raise InputError(None, "radius", problem)
 
 
 def _long_axis(points: Array, rise: Array, semi_axes: tuple[float, float]) -> float:
