@@ -16,7 +16,7 @@ from bubblefit.reports import run_pages
 from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import registry
 
-from ..commands import in_process, interrupted, one_line, result_in
+from ..commands import in_process, one_line, result_in
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
 
 TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
@@ -29,18 +29,12 @@ class Counted(Formula):
         return super().run(*arguments, **named)
 
 
-class Dying(Formula):
-    def run(self, *arguments, **named):
-        os._exit(9)
-
-
 @pytest.fixture(autouse=True)
 def formula(monkeypatch, tmp_path_factory):
     """The solver of these tests, by name; and the file that counts its runs."""
     told = tmp_path_factory.mktemp("told") / "runs"
     monkeypatch.setenv(TOLD, str(told))
     monkeypatch.setitem(registry.SOLVERS, "formula", Counted)
-    monkeypatch.setitem(registry.SOLVERS, "dying", Dying)
     return told
 
 
@@ -116,9 +110,7 @@ def test_the_record_the_page_and_the_beams(study):
     assert file["rows_dropped"] == {"after the largest deflection": 2}
     assert file["units"]["load"] == "kg" and file["columns"]["load"] == "mass_kg"
     page = (out / "report.html").read_text()
-    assert "The record: data files" in page and file["sha256"][:12] in page
-    for word in ("Against measured loads", "150 mm, 90", "4 of 4 runs", "made up"):
-        assert word in page.replace("\u00a0", " "), word
+    assert file["sha256"][:12] in page and "made up" in page
     names = [f"{case}-{kind}.png" for case in ("150-mm-90-kPa", "high")
              for kind in ("load", "gas", "beam")]  # fmt: skip
     for name in (*names, "all-loads.png"):
@@ -205,9 +197,14 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     runs = result_in(tmp_path / "failed")["runs"]
     assert [r["ended"] for r in runs] == ["failed: made to fail", "finished"] * 2
     assert "load_N" not in runs[0]
+    # What was measured cannot be compared with a run that failed.
+    measured(tmp_path)
+    run = ("project.toml", "--test", "150 mm, 90 kPa", "--out", "m", "--overwrite", "--fail-above")
+    bend(*run, 10.0, cwd=tmp_path)
+    assert "above 0.01" in bend(*run, 0.01, cwd=tmp_path, code=1).stderr
+    write_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=FAILS)
+    assert "--fail-above" in bend(*run, 10.0, cwd=tmp_path, code=1).stderr
     assert done.stdout.count("soft   failed: made to fail") == 2
-    page = (tmp_path / "failed" / "report.html").read_text()
-    assert "high with soft: failed: made to fail" in page
     table = pd.read_csv(tmp_path / "failed" / "runs.csv")
     assert table["ended"].tolist() == ["failed: made to fail", "finished"] * 2
 
@@ -225,30 +222,6 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     run = result_in(tmp_path / "stopped")["runs"][0]
     assert run["ended"] == "stopped at 120 of 240 mm: the run stopped early: so asked"
     assert run["load_N"]["240 mm"] is None and "stopped at 120 of 240 mm" in done.stdout
-
-
-def test_a_process_that_dies_is_noticed(tmp_path):
-    project = write_project(tmp_path)
-    done = bend(project, "--out", "out", "--solver", "dying", cwd=tmp_path, code=4)
-    *before, last = done.stderr.splitlines()
-    # Two runs at most, each of which is tried again once.
-    assert 1 <= len(before) <= 2
-    for line in before:
-        assert line.endswith("a worker process died (exit code 9; out of memory?); what it did is "
-                             "done again")  # fmt: skip
-    assert last.startswith("bubblefit: a worker process died (exit code 9; out of memory?), as did")
-    assert "finished runs are kept: go on with --resume" in last
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_fail_above(tmp_path):
-    measured(tmp_path)
-    run = ("project.toml", "--out", "out", "--overwrite", "--jobs", 1, "--fail-above")
-    bend(*run, 10.0, cwd=tmp_path)
-    assert "above 0.01" in bend(*run, 0.01, cwd=tmp_path, code=1).stderr
-    # What was measured cannot be compared with a run that failed.
-    write_project(tmp_path, 'measured.files = ["made-up.csv"]', soft=FAILS)
-    assert "--fail-above" in bend(*run, 10.0, cwd=tmp_path, code=1).stderr
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -320,20 +293,3 @@ def test_mistakes_of_simulate_bend_name_the_option(tmp_path, card):
         done = bend(*usual, *arguments, cwd=tmp_path, command=("simulate", "bend"), code=2)
         one_line(done, *words)
         assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_an_interrupted_study_goes_on(tmp_path):
-    path = write_project(tmp_path)
-    text = path.read_text().replace('solver = "formula"', 'solver = "membrane"')
-    text = text.replace("element_size = 40.0", "element_size = 75.0")
-    path.write_text(text.replace("frames = 24", "deflection = 8\nframes = 2"))
-    arguments = ["bend", path, "--out", "out", "--jobs", "1"]
-    runs = tmp_path / "out" / "runs"
-    ended = interrupted(*arguments, cwd=tmp_path, when=lambda: list(runs.glob("[0-9a-f]*.npz")))
-    assert ended.returncode == 130 and "go on with --resume" in ended.stderr, ended.stderr
-    first = {p: p.stat().st_mtime_ns for p in runs.glob("[0-9a-f]*.npz")}
-    assert 1 <= len(first) < 8 and not (tmp_path / "out" / "result.json").exists()
-    in_process(*arguments, "--resume", cwd=tmp_path)
-    assert {p: p.stat().st_mtime_ns for p in first} == first
-    assert [r["ended"] for r in result_in(tmp_path / "out")["runs"]] == ["finished"] * 8

@@ -114,22 +114,3 @@ def test_the_options_choose_what_is_evaluated(folder, tmp_path):
     one_line(run("--ratio", "1:1", code=2), "two that differ")
     one_line(run("--test", "none", code=2), "none")
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_constants_that_hang_on_the_choice_are_remarked(tmp_path):
-    """Published with free ratios: reciprocal evaluations differ by more than a tenth."""
-    free = DesignersConstants(1188.0, 864.0, 0.73, 0.69)
-    rows = []
-    for ratio, share in zip(FIVE, [(1, 1), (1, 0.5), (0.5, 1), (1, 0), (0, 1)], strict=True):
-        loads = np.outer(cycle(), share)
-        rows += [
-            (ratio, *n, *e)
-            for n, e in zip(loads.tolist(), (100 * free.strain(loads)).tolist(), strict=True)
-        ]
-    write_rows(tmp_path / "test.csv", rows)
-    biaxial_project(tmp_path)
-    said = in_process("biaxial", "project.toml", "--free", cwd=tmp_path).stdout
-    assert "E warp 1188 kN/m, E fill 864 kN/m, nu_warp 0.73, nu_fill 0.69" in said
-    assert "E warp lies between" in said and "say which options are meant" in said
-    again = in_process("biaxial", "project.toml", cwd=tmp_path, code=2)
-    one_line(again, "already holds a result", "--overwrite")

@@ -164,13 +164,6 @@ def test_what_is_expected_comes_from_the_bounds(tmp_path):
     assert expected["E2"] == pytest.approx((20.0, 1000.0))
 
 
-def test_strips_are_looked_at_too(tmp_path):
-    path = EXAMPLES / "uniaxial-valmex7318" / "project.toml"
-    in_process("check", path, "--out", "c", cwd=tmp_path)
-    assert "Load curves as read" in (tmp_path / "c" / "report.html").read_text()
-    assert (tmp_path / "c" / "curves.png").is_file()
-
-
 def test_choices_and_the_travel_of_the_machine_are_listed(tmp_path):
     text = (EXAMPLES / "uniaxial-valmex7318" / "project.toml").read_text()
     files = '[strips.warp]\ngauge_length = 20.0\n\n[strips.data]\nfiles = { warp = ["w.csv"] }'

@@ -98,16 +98,6 @@ def test_more_starts_by_resuming_json_and_fail_above(study, tmp_path):
     assert (tmp_path / "out/history.csv").read_text() == (folder / "out/history.csv").read_text()
 
 
-@pytest.mark.parametrize("method", ["slsqp", "cobyla"])
-def test_nlopt_methods_by_command(tmp_path, method):
-    project = small(tmp_path, ("tolerance = 1e-7", "tolerance = 1e-7\nmax_analyses = 60"))
-    run = ("bubble", project, "--out", "out", "--starts", 1, "--method", method)
-    in_process(*run, cwd=tmp_path)
-    result = result_in(tmp_path / "out")
-    assert result["method"] == method
-    assert all(s["analyses"] <= 62 for s in result["starts"])
-
-
 def test_simulate_with_a_card(study, tmp_path, golden):
     folder, _ = study
     card = folder / "out" / "material.toml"
@@ -117,17 +107,6 @@ def test_simulate_with_a_card(study, tmp_path, golden):
     assert result["apex_mm"] == sorted(result["apex_mm"])
     table = pd.read_csv(tmp_path / "sim/displacement.csv")
     assert table["dz_mm"].max() == pytest.approx(max(result["apex_mm"]), rel=1e-6)
-
-
-def test_init_writes_a_project_that_runs(tmp_path):
-    in_process("init", "mine", cwd=tmp_path)
-    one_line(in_process("init", "mine", cwd=tmp_path, code=2), "already there")
-    in_process("init", "measured", "--example", "measured", cwd=tmp_path)
-    one_line(in_process("bubble", "measured/test1-linear.toml", cwd=tmp_path, code=2), "--data")
-    text = (tmp_path / "mine/project.toml").read_text()
-    (tmp_path / "mine/project.toml").write_text(text.replace("elements = 800", "elements = 48"))
-    in_process("bubble", "mine/project.toml", "--starts", 1, cwd=tmp_path)
-    assert (tmp_path / "out" / "mine" / "result.json").exists()
 
 
 BAD = [
@@ -157,18 +136,6 @@ def test_bad_projects_end_in_one_line(tmp_path, change, words):
     assert not (tmp_path / "out").exists()
 
 
-def test_bad_options_end_in_one_line(tmp_path):
-    run = ("bubble", small(tmp_path), "--out", "out")
-    for options, words in (
-        (("--fail-above", "nan"), "--fail-above"),
-        (("--data", "."), "known_solution"),
-        (("--solver", "nastran"), "--solver"),
-        (("--resume", "--overwrite"), "--overwrite"),
-    ):
-        one_line(in_process(*run, *options, cwd=tmp_path, code=2), words)
-        assert not (tmp_path / "out").exists()
-
-
 def test_bad_cards_end_in_one_line(study, tmp_path):
     folder, _ = study
     text = (folder / "out" / "material.toml").read_text()
@@ -194,6 +161,7 @@ def test_bad_cards_end_in_one_line(study, tmp_path):
 
 def test_bad_data_names_file_and_line(tmp_path):
     in_process("init", "m", "--example", "measured", cwd=tmp_path)
+    one_line(in_process("bubble", "m/test1-linear.toml", cwd=tmp_path, code=2), "--data")
     grid = tmp_path / "data" / "grid"
     grid.mkdir(parents=True)
     rows = "x,y,dx,dy,dz,flag\n" + "\n".join(
@@ -230,14 +198,6 @@ def test_no_feasible_start_is_exit_code_3(tmp_path):
         "0.0,   1.0,   0.0, 7.0e-2", "0.0, 1e-9, -0.29, 7.1e-3"))  # fmt: skip
     run = ("bubble", project, "--out", "out", "--starts", 1)
     one_line(in_process(*run, cwd=tmp_path, code=3), "feasible")
-
-
-def test_output_that_cannot_be_written(tmp_path):
-    (tmp_path / "file").write_text("kept")
-    run = ("bubble", small(tmp_path), "--starts", 1, "--out")
-    one_line(in_process(*run, "file/out", cwd=tmp_path, code=2), "file")
-    one_line(in_process(*run, "/proc/bubblefit", cwd=tmp_path, code=2))
-    assert (tmp_path / "file").read_text() == "kept"
 
 
 def test_a_disk_that_fills_up_leaves_no_half_result(tmp_path):
@@ -287,7 +247,7 @@ def test_a_read_only_file_system(study, mounted):
         one_line(in_process(*arguments, cwd=folder, code=2), str(place), "Read-only")
 
 
-@pytest.mark.parametrize("kilobytes", [4, 24, 64])
+@pytest.mark.parametrize("kilobytes", [4, 24])
 def test_a_full_disk_leaves_no_result_and_whole_files(study, mounted, kilobytes):
     folder, _ = study
     project, card = folder / "project.toml", folder / "out" / "material.toml"
@@ -295,18 +255,13 @@ def test_a_full_disk_leaves_no_result_and_whole_files(study, mounted, kilobytes)
     for arguments in (
         ("bubble", project, "--starts", 1, "--jobs", 1, "--out", place / "out"),
         ("simulate", "bubble", project, "--card", card, "--out", place / "out"),
+        *[("init", place / "out")] * (kilobytes == 4),
     ):
         one_line(in_process(*arguments, cwd=folder, code=2), "No space left")
         left = list((place / "out").glob("*"))
         assert "result.json" not in [f.name for f in left], left
         assert not list((place / "out").glob(".*")) and not list((place / "out").glob("*.part"))
         shutil.rmtree(place / "out")
-
-
-def test_init_on_a_full_disk_leaves_nothing(mounted):
-    place = mounted("size=4k")
-    one_line(in_process("init", place / "mine", cwd=place, code=2), "No space left")
-    assert not list((place / "mine").glob("*"))
 
 
 @pytest.mark.slow

@@ -10,8 +10,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fits import lines_of, misfit_lines, modulus_lines, warning_lines
-from bubblefit.cli.terminal import written_to
+from bubblefit.cli.fits import misfit_lines, modulus_lines
 from bubblefit.errors import SOLVER, Note, foremost
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
 from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
@@ -246,24 +245,3 @@ def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
     assert foremost([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == "it"
     assert foremost([Note(MESH, "first"), Note(MESH, "second")]) == "first"
     assert foremost([]) is None
-
-
-def test_one_warning_and_how_many_more(tmp_path):
-    notes = [Note(STARTS, "some failed"), Note(BOUND, "E1 touches", "two"), Note(UNKNOWN, "m")]
-    warning, more = warning_lines(notes, tmp_path)
-    assert warning == "warning: two: E1 touches"
-    assert more.startswith("2 further notes: ") and str(tmp_path / "notes.csv") in more
-    assert warning_lines(notes[:2], tmp_path)[1].startswith("1 further note: ")
-    assert warning_lines(notes[:1], tmp_path) == ["warning: some failed"]
-    assert warning_lines([], tmp_path) == []
-
-
-def test_the_answer_comes_first_and_the_page_last(fitted, tmp_path):
-    assert written_to(tmp_path) == f"written to {tmp_path}"
-    page = fitted.report(tmp_path)
-    lines = lines_of(fitted, tmp_path)
-    assert lines[: len(modulus_lines(fitted))] == modulus_lines(fitted)
-    assert lines[-1] == written_to(tmp_path) and str(page) in lines[-1]
-    (found,) = [line for line in lines if line.startswith("1 of 1 starts ended with a fit")]
-    best, count = f"{fitted.objective:.3g}", fitted.result["analyses"]
-    assert f"{fitted.setup.objective_is}: best {best}, median {best}; {count} " in found

@@ -306,16 +306,6 @@ def test_the_table_on_the_terminal(folder, golden):
     assert "off" not in alone and len(alone.splitlines()) == 2
 
 
-def test_metres_and_columns_of_other_names(folder):
-    table = pd.read_csv(folder / "ball2.csv") / 1e3
-    path = folder / "metres.csv"
-    table.rename(columns={"x": "a", "y": "b", "z": "c"}).to_csv(path, index=False)
-    options = "--columns", "x=a,y=b,z=c", "--length-unit", "m", "--json"
-    said = json.loads(in_process("dic", "sphere", path, *options, cwd=folder).stdout)
-    assert said["frames"][0]["radius_mm"] == pytest.approx(39.78, abs=1e-5)
-    assert "deviation_percent" not in said["frames"][0]
-
-
 def test_bad_balls_are_one_line(folder):
     (folder / "flat.csv").write_text("x,y,z\n" + "".join(f"{k},{k * k},1\n" for k in range(20)))
     for arguments, words in (

@@ -86,16 +86,6 @@ def test_the_files_of_a_study_agree(study, golden):
     assert (out / "bias.vtu").exists() and not list(out.glob("*.part"))
 
 
-def test_json_fail_above_and_overwrite(study, tmp_path):
-    shutil.copytree(study[0] / "out", tmp_path / "out")
-    arguments = ("uniaxial", small(tmp_path), "--out", "out", "--starts", 3, "--quiet")
-    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
-    again = (*arguments, "--resume", "--json", "--fail-above", 1)
-    done = quick(*again, cwd=tmp_path, code=1)
-    assert "--fail-above" in done.stderr
-    assert json.loads(done.stdout) == result_in(tmp_path / "out")
-
-
 WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
 RANGE = ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.153, 0.232, 0.883]")
 
@@ -194,20 +184,6 @@ def test_bad_projects_end_in_one_line(tmp_path, change, words):
     assert not (tmp_path / "out").exists()
 
 
-def test_no_feasible_start_is_exit_code_3(tmp_path):
-    bounds = (
-        "lower = [-9e9, 1e-3, -9e9, 1e-3, -9e9, 1e-3]\nupper = [-9e8, 2e-3, -9e8, 2e-3, -9e8, 2e-3]"
-    )
-    project = small(
-        tmp_path,
-        ('form = "cubic"', 'form = "linear"'),
-        ("E1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]", bounds),
-    )
-    run = ("uniaxial", project, "--out", "out", "--starts", 1, "--trust", "load-unit")
-    done = quick(*run, cwd=tmp_path, code=3)
-    assert "feasible" in done.stderr and "Traceback" not in done.stderr
-
-
 def test_a_solver_that_is_not_one(tmp_path):
     """A program of another name is a failure of the solver, a wrong path bad input."""
     run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
@@ -288,13 +264,6 @@ def test_simulate_two_cards(study, tmp_path, golden):
         "loads.png", "bias-1.png", "bias-2.png"
     }  # fmt: skip
     one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
-
-
-def test_simulate_a_card_that_fails_or_is_not_there(tmp_path):
-    run = ("simulate", "uniaxial", small(tmp_path), "--out", "sim", "--card")
-    hopeless = card(tmp_path, "hopeless", HypoelasticLaw.linear(300.0, 220.0, -5.0))
-    one_line(quick(*run, hopeless, cwd=tmp_path, code=4), "no equilibrium")
-    one_line(quick(*run, "none.toml", cwd=tmp_path, code=2), "none.toml")
 
 
 def test_strips_fitted_by_calculix(ccx, tmp_path):

@@ -508,29 +508,6 @@ def blocks(*texts: str):
     }
 
 
-def test_tables_one_after_the_other():
-    """What stands between or below tables is a title or summary; blank rows are none."""
-    found = blocks(
-        "Load (N),Extension", ",mm", "0,0", ",", "1,2", "Specimen 2,x", "Width,25",
-        "Load (N),Extension", "3,4", "5,6", "end,",
-    )  # fmt: skip
-    assert found[("Load (N)", "Extension")] == [
-        (11, {"Load (N)": "N", "Extension": "mm"}, [13, 15]),
-        (18, {"Load (N)": "N", "Extension": ""}, [19, 20]),
-    ]
-    other = blocks("Load,Extension", "1,2", "Extension,Load", "(mm),[N]", "3,4")
-    assert other == {
-        ("Load", "Extension"): [(11, {"Load": "", "Extension": ""}, [12])],
-        ("Extension", "Load"): [(13, {"Extension": "mm", "Load": "N"}, [15])],
-    }
-    # A row with a number in a column that is needed is none of units; signs alone are none.
-    assert blocks("Load,Extension", "N,3", "1,2")[("Load", "Extension")][0][1]["Load"] == ""
-    assert blocks("Load,Extension", "-,-", "1,2")[("Load", "Extension")][0][2] == [12, 13]
-    named = {"load": "F", "elongation": "u"}
-    assert find_header(rows("Load,Extension", "1,2", "F,u", "3,4"), named, NEEDED) == 2
-    assert cells_of('"a,b", c', ",") == ["a,b", "c"] and cells_of(" a ;b", ";") == ["a", "b"]
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -1,7 +1,6 @@
 """Virtual strain gauges: strains, tables, loads."""
 
 import logging
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -319,19 +318,3 @@ def test_the_table_of_a_gauge_reads_back_as_a_load_curve(record, tmp_path):
     for how in ({"frame_interval": 0.5, "time_offset": 0.5}, {"frame_times": times}):
         paired = PairedLoads(path, "warp", "1", **how)
         np.testing.assert_allclose(loads_at_frames(record, paired).load, [5, 20])
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"direction": "90"}, "direction: unknown direction '90'"),
-        ({"specimen": " "}, "specimen: expected a name on one line"),
-        ({"time_offset": 1.0}, "time_offset: means nothing without frame_times or frame_interval"),
-        ({"frame_time_column": "t"}, "frame_time_column: means nothing without frame_times"),
-        ({"frame_times": Path("t"), "frame_interval": 1.0}, "frame_times, frame_interval: give"),
-        ({"frame_interval": np.inf}, "frame_interval: expected a finite number"),
-    ],
-)
-def test_what_contradicts_itself(options, words):
-    asked = {"path": Path("m.csv"), "direction": "warp", "specimen": "1"} | options
-    assert words in complaint(PairedLoads, **asked)

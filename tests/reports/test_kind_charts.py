@@ -1,6 +1,5 @@
 """Charts of kinds: cuts and maps of bubbles, loads of strips and beams, the deformed bodies."""
 
-import csv
 from dataclasses import replace
 from itertools import product
 
@@ -14,7 +13,6 @@ from bubblefit.reports.cylinders import BendLine, BendPanel, beam_charts, bendin
 from bubblefit.reports.strips import OrderErrors, StripCurves, load_charts, order_charts
 
 from ..drawings import check_charts, data, legend, lines, named, shown
-from ..places import PUBLISHED
 
 
 def cap(xy, height):
@@ -444,25 +442,6 @@ def test_without_a_polynomial_the_points_are_the_target():
         pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
         low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
         assert (low == 0.0 if least > 0 else low < least) and high > 200.0
-
-
-def test_measured_loads(shared_data):
-    """The published polynomials lie on the published points, to their scatter."""
-
-    def rows(path):
-        with path.open() as text:
-            return list(csv.DictReader(line for line in text if not line.startswith("#")))
-
-    points = rows(shared_data / "uniaxial/valmex7318_load_gauge.csv")
-    for row in rows(PUBLISHED / "published_uniaxial_polynomials.csv"):
-        own = [p for p in points if p["series"] == row["direction"]]
-        x, y = (np.array([float(p[k]) for p in own]) for k in ("gauge_disp_mm", "load_N"))
-        u = np.linspace(0.0, x.max(), 2001)  # to the last point, as they were fitted
-        load = np.polyval([*(float(row[f"c{k}"]) for k in (4, 3, 2, 1)), 0.0], u)
-        scatter = float(row["data_scatter_N"])
-        curve = StripCurves(row["direction"], [("p", u, load)], (x, y), (u, load), scatter)
-        off = lines(load_charts("l", [curve]).charts[1], "measured")[0][1]
-        assert np.sqrt(np.mean(off**2)) == pytest.approx(scatter, rel=0.03)
 
 
 def draw_strip(shear, grips=True):

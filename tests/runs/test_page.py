@@ -1,6 +1,5 @@
 """The whole page of a fit: facts, tables, figures, warnings, files, each as reckoned here."""
 
-import html
 import importlib.util
 import pickle
 from dataclasses import replace
@@ -10,7 +9,6 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fits import lines_of
 from bubblefit.errors import Note, NoteKind, foremost, marks, rows
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import UNSTABLE
@@ -32,7 +30,7 @@ from bubblefit.reports.fit_page import (
     sigma_words,
     two_digits,
 )
-from bubblefit.reports.html import number, percent
+from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import versions, write_table
@@ -332,6 +330,9 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
     assert [name for name, _ in found.figures] == ["failure.png", "orders.png"]
     assert list(captions(found)) == ["moduli", "two loads", "optima"]
     assert f"objective {alone.objective:.4g}, RMS errors in N" in alone.card.source
+    assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
+    assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
+    assert "weights" not in alone.result and "mean_relative_error" not in alone.result
     # A modulus known no better than before the tests (1000 %, less a thousandth) is unknown.
     said = [sigma_words(value) for value in (0.012, 1.0, 9.98, 9.99, 10.0)]
     assert said == ["1.2 %", "100 %", "998 %", "unknown", "unknown"]
@@ -417,13 +418,8 @@ def test_marks_and_notes_stand_wherever_a_run_does(tmp_path, monkeypatch):
     lines = [line for line in done.lines() if "kPa  " in line or line.startswith("high")]
     for row, some in zip(lines, expected, strict=True):
         assert row.endswith(f"[{', '.join(some)}]") if some else "[" not in row
-    page = html.unescape((tmp_path / "out" / "report.html").read_text()).replace("\u00a0", " ")
-    for run, said, row in zip(done.each, done.result["runs"], table["notes"], strict=True):
-        assert said["warnings"] == list(run.notes) and row == "; ".join(run.notes)
-        assert all(note in page for note in run.notes)
-    notes = pd.read_csv(tmp_path / "out" / "notes.csv", keep_default_na=False)
-    assert notes.to_dict("records") == done.result["notes"]
-    assert (notes["kind"] == "snap").sum() == 2 == (notes["kind"] == "beyond card range").sum()
+    kinds = [note["kind"] for note in done.result["notes"]]
+    assert kinds.count("snap") == 2 == kinds.count("beyond card range")
 
 
 @pytest.fixture(autouse=True)
@@ -552,25 +548,6 @@ def test_everything_of_two_tests(together):
     }  # fmt: skip
 
 
-def test_every_note_of_two_tests_and_of_one(together, alone):
-    left = ("points left out", "unmatched direction", "undetermined alone", "uncertain")
-    told = [(note.kind, note.of) for note in together.notes]
-    assert told == [
-        (left[3], ""), ("beyond law.strain_range", "one: warp"), (left[1], "one"),
-        (left[0], "one, warp"), (left[0], "one, fill"), (left[1], "two"), (left[1], "two"),
-        (left[0], "two, warp"), *[(left[2], "")] * 3,
-    ]  # fmt: skip
-    counts = [int(str(note).split()[0]) for note in together.notes if note.kind == left[0]]
-    assert counts == [2, 2, 4]
-    assert "13.5 %" in str(together.notes[1]) and "12 %" in str(together.notes[1])
-    told = [(note.kind, note.of) for note in alone.notes]
-    assert told == [*[(left[3], "")] * 2, *[(left[1], "")] * 2, (left[0], "warp")]
-    assert all("1000 %" in str(note) for note in alone.notes[:2])
-    assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
-    assert alone.result["e_uniaxial_N"] == pytest.approx(alone.objective)
-    assert "weights" not in alone.result and "mean_relative_error" not in alone.result
-
-
 def test_remarks_and_unstable_equilibria_with_the_name_of_the_part(together):
     def said(counts, leads):
         histories = together.best.point.histories
@@ -654,16 +631,6 @@ def test_expected_moduli_of_bounds():
     assert none == {name: (least, least) for name, least in LEAST.items()}
 
 
-def test_the_error_of_the_moduli_names_its_strains(bubble):
-    fit = bubble.fit
-    (line,) = (line for line in lines_of(fit, bubble.out) if "largest error of the moduli" in line)
-    for name, component in COMPONENTS.items():
-        end = float(fit.best.reached[component])
-        assert fit.result["moduli_error_range"][name] == [0.0, end]
-        assert f"(up to {100 * end:.3g} %)" in line.split(name)[1].split(",")[0]
-        assert f"<td>0</td><td>{number(100 * end)}</td></tr>" in bubble.page
-
-
 def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
     fit, sigmas = bubble.fit, []
     for noise in (0.02, 0.2):
@@ -676,17 +643,6 @@ def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
         assert problem.comparisons[0].objective.noise_is == "given"
         sigmas.append(sure.sigma["E1"])
     np.testing.assert_allclose(sigmas[1], 10 * sigmas[0], rtol=1e-6)
-
-
-def test_the_residual_stands_beside_the_noise(bubble):
-    (left,) = bubble.fit.result["misfit"].values()
-    misfit = bubble.fit.residuals()["difference"]
-    assert left["rms"] == pytest.approx(np.sqrt(np.mean(misfit**2)), rel=1e-6)
-    assert (left["noise"], left["noise_is"], left["unit"]) == (0.05, "assumed", "mm")
-    times = f"{left['rms'] / 0.05:.2g} times the noise (0.05 mm, assumed)"
-    lines = lines_of(bubble.fit, bubble.out)
-    assert f"misfit of bubble: {left['rms']:.3g} mm RMS, {times}" in lines
-    assert f"<td>{number(left['rms'])}</td>" in bubble.page
 
 
 def test_kinds_of_notes_are_no_closed_list():

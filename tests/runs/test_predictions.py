@@ -9,7 +9,6 @@ import pytest
 from bubblefit.errors import InputError, Note, SolverFailure, rows
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.kinds import RunRecord, notes_of_record
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project import project as project_module
@@ -27,8 +26,7 @@ from bubblefit.solvers.base import SNAP, History
 
 from ..bars import BarTest, project_of
 from ..complaints import complaint
-from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
-from ..drawings import data, lines
+from ..cylinder_cases import FAILS, Formula, write_project, write_readings
 
 CARDS = ("soft", "stiff")
 TESTS = ("150 mm, 90 kPa", "high")
@@ -68,22 +66,6 @@ def test_every_test_with_every_card(project, tmp_path):
     assert done.worst is None and done.silent() == []
 
 
-def test_figures_show_the_curves_of_the_table(project, tmp_path, drawn):
-    done = predict(project, ["high"], jobs=1)
-    done.report(tmp_path / "out")
-    curves = done.curves()
-    panels = {c.y_label: c for charts in drawn for c in charts.charts}
-    (volumes,) = (charts.charts[0] for charts in drawn if charts.name == "gas")
-    for rank, card in enumerate(CARDS):
-        own = curves[curves["card"] == card]
-        load = lines(panels["load, N"], card)[0]
-        assert load == pytest.approx(own[["deflection_mm", "load_N"]].to_numpy().T, rel=1e-5)
-        gas = data(volumes)[rank]
-        assert gas[1] == pytest.approx(own["gauge_pressure_kPa"].to_numpy(), rel=1e-5)
-        volume = own["volume_mm3"].to_numpy()
-        assert gas[0] == pytest.approx((volume - volume[0]) / 1e6, rel=1e-5)
-
-
 def test_tests_and_cards_by_name(project):
     done = predict(project, ["high"], ["stiff"], jobs=1)
     assert [(run.test.name, run.card) for run in done.each] == [("high", "stiff")]
@@ -120,34 +102,6 @@ def test_a_card_runs_with_its_own_thickness(project):
         assert set(np.unique(run.model.thickness)) == {thickness, 3 * thickness}
     thin, thick = done.curves()["load_N"].to_numpy().reshape(2, -1)[:, 1]
     assert thick > 1.05 * thin
-
-
-def test_every_kind_of_note():
-    beta = [0] * 3 + [20] + [0] * 3 + [150] + [0] * 3 + [500]
-    card = MaterialCard(HypoelasticLaw(beta, 0.24, [0.1, 0.2, 0.3]), 0.81)
-    strain = np.array([0.1, 0.21, 0.31])
-    record = RunRecord(1.0, strain=strain, unstable=("132 kPa",), remarks=("a remark",))
-    notes = notes_of_record(record, card)
-    assert notes[0] == "a remark" and len(notes) == 4
-    assert notes[1].startswith("fill strain 21 %") and notes[2].startswith("shear strain 31 %")
-    assert notes[3] == "unstable equilibrium at 132 kPa: the model would not stay there"
-    assert notes_of_record(RunRecord(1.0, "failed"), card) == []
-
-
-def test_an_early_end_is_a_result_with_its_reason(tmp_path, seen):
-    done = predict(read_project(write_project(tmp_path, soft=STOPS)), jobs=1, out=tmp_path / "out")
-    reason = done.ended(0)
-    assert "120 of 240 mm" in reason and "so asked" in reason
-    assert len(list((tmp_path / "out" / "runs").glob("*.npz"))) == 4
-    assert reason in "\n".join(done.lines())
-    quiet = Predictions(done.project, tuple(replace(run, notes=()) for run in done.each), 30.0)
-    quiet.report(tmp_path / "out")
-    assert pd.read_csv(tmp_path / "out" / "runs.csv")["ended"][0] == reason
-    (found,) = seen
-    assert len(found.warnings) == 2 and all(reason in line for line in found.warnings)
-    assert [table.title for table in found.tables] == ["Stiffness and knee", "Runs"]
-    assert found.summary.replace("\u00a0", " ").startswith("150 mm, 90 kPa, soft: stiffness ")
-    assert quiet.worst is None and not quiet.failed() and not quiet.silent()
 
 
 @pytest.fixture

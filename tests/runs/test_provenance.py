@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 
@@ -16,7 +15,6 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.inference.unknowns import ProposedStarts, SobolStarts
 from bubblefit.materials.forms.spline import TriLinear
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import Project, project_text, read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
 from bubblefit.runs.fit import facts_of
@@ -367,8 +365,6 @@ def test_files_that_differ():
     assert differences(before, facts()) == ["3 data files of 'a', now 0"]
 
 
-Change = Callable[[HypoelasticLaw], HypoelasticLaw]
-RANGE = [0.13, 0.13, 0.13]
 BREAKS = [[0.03, 0.08]] * 3
 
 
@@ -411,32 +407,6 @@ def test_breaks_count(regions):
         breaks = np.array(BREAKS)
         breaks[component, 1] = 0.09
         assert changed(regions, law=replace(regions.law, form=TriLinear.at(breaks))) == ["law"]
-
-
-def test_bounds_settings_tests_and_solver_count(cubic):
-    project, limits = cubic.project, cubic.bounds
-    assert limits.upper is not None
-    wider = replace(limits, upper=1.01 * limits.upper)
-    assert changed(cubic) == []
-    assert changed(cubic, bounds=wider) == ["law"]
-    thicker = replace(project, fabric=replace(project.fabric, thickness=0.9))
-    assert changed(cubic, project=thicker) == ["law"]
-    assert changed(cubic, project=project.with_fit(seed=77)) == ["fit settings"]
-    assert changed(cubic, project=project.with_fit(solver="calculix")) == ["solver"]
-    # More starts, or other processes, leave those that ended as they are.
-    assert changed(cubic, project=project.with_fit(starts=3, jobs=1)) == []
-    (test,) = cubic.tests
-    finer = replace(test, test=replace(test.test, elements=108))
-    assert changed(cubic, tests=(finer,)) == ["tests"]
-
-
-def test_measured_values_count(cubic):
-    one, two = cubic.problem(), cubic.problem()
-    target = two.comparisons[0].objective.targets[0]
-    before = target.displacement[3, 2]
-    target.displacement[3, 2] += 1e-9
-    assert fingerprints(cubic, one)["data"] != fingerprints(cubic, two)["data"]
-    target.displacement[3, 2] = before
 
 
 @pytest.fixture(scope="module")

@@ -17,10 +17,9 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.solvers.bars import BARS, strip_stresses
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.registry import checked, solver_named, solver_names
+from bubblefit.solvers.registry import checked, solver_named
 from click.testing import CliRunner
 
-from ..complaints import complaint
 from ..fortran_build import BETA, LAWS
 from ..places import EXAMPLES, ROOT
 from ..plug_ins import install
@@ -63,26 +62,6 @@ def bubblefit(site, *arguments, cwd, code=0):
     )  # fmt: skip
     assert done.returncode == code, done.stderr + done.stdout
     return done
-
-
-# --- the example, as its README says ---
-@pytest.mark.slow
-def test_the_example_pulls_strips_from_the_command_line(site, strips):
-    simulate = ("simulate", "uniaxial", "project.toml", "--card", "material.toml")
-    done = bubblefit(site, *simulate, "--solver", "homogeneous", "--out", "theirs", cwd=strips)
-    # What the example cannot do is named and left out, the rest is there.
-    assert "takes strips along warp or fill only" in done.stdout
-    bubblefit(site, *simulate, "--out", "ours", cwd=strips)
-    theirs, ours = (
-        json.loads((strips / f / "result.json").read_text()) for f in ("theirs", "ours")
-    )
-    assert theirs["solver"] == "homogeneous" and ours["solver"] == "membrane"
-    curves = [pd.read_csv(next((strips / f).glob("*.csv"))) for f in ("theirs", "ours")]
-    for direction in ("warp", "fill"):
-        one, other = (c[c.direction == direction] for c in curves)
-        assert len(one) > 5
-        for column in one.select_dtypes("number"):
-            np.testing.assert_allclose(one[column], other[column], rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.slow
@@ -191,11 +170,8 @@ def test_the_code_in_the_documentation_is_that_of_the_example():
 
 # --- broken ones ---
 BROKEN = {
-    "missing": ("", "cannot be imported (ModuleNotFoundError: No module named 'acme_missing')"),
     "failing": ("raise RuntimeError('no licence file\\nand more')",
                 "cannot be imported (RuntimeError: no licence file)"),
-    "leaving": ("import sys\nsys.exit(1)", "cannot be imported (SystemExit: 1)"),
-    "nothing": ("x = 1", "cannot be imported (AttributeError"),
     "number": ("THING = 3", "is no factory: acme_number:THING cannot be called"),
     "empty": ("class THING: name = 'empty'",
               "gives no solver: THING has no external, progress, identity, run, check"),
@@ -241,25 +217,6 @@ def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, nam
         done = run.invoke(main, [*SIMULATE, "--solver", solver])
         assert done.exit_code == code and said in done.output, done.output
         assert code != 4 or done.output.count("\n") == 1
-
-
-def test_one_name_is_one_plug_in(packages, tmp_path, monkeypatch):
-    install(packages, "acme", WORKING.format(run="...", check=FINE), "own-things", group=GROUP)
-    again = tmp_path / "again"
-    shutil.copytree(packages, again)
-    monkeypatch.syspath_prepend(str(again))
-    assert solver_named("acme").name == "acme"  # listed twice
-    install(packages, "twice", "THING = 1", group=GROUP)
-    install(packages, "twice", "THING = 1", "other-things", "acme_other", GROUP)
-    words = r"twice: is offered by (acme|other)-things 2\.5 and (acme|other)-things 2\.5"
-    with pytest.raises(SolverFailure, match=words):
-        solver_named("twice")
-    assert solver_names().count("twice") == 1
-    assert "is not one of" in complaint(solver_named, "nothere")
-    # dict tells no signature on some Pythons; whatever it is, it is no solver.
-    install(packages, "plain", "THING = dict", "plain-things", group=GROUP)
-    with pytest.raises(SolverFailure, match="gives no solver: dict has no name"):
-        solver_named("plain")
 
 
 def test_our_own_names_stay_ours(packages, monkeypatch):

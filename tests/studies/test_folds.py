@@ -200,27 +200,6 @@ def without_pages(monkeypatch):
     monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
 
 
-def test_a_specimen_is_foretold_by_the_other(tmp_path):
-    """Of two specimens a direction (E1 300 and 360, E2 200 and 180 MPa) one knows only itself."""
-    constant_strips(tmp_path)
-    command = ("validate", "project.toml", "--test", "one", "--leave", "specimens")
-    done = in_process(*command, "--starts", "1", "--out", "out", cwd=tmp_path)
-    table = pd.read_csv(tmp_path / "out" / "validation.csv").set_index("test")
-    assert len(table) == 4
-    mean = 0.0
-    for direction, both in MODULI["one"].items():
-        for specimen, own, other in zip("ab", both, both[::-1], strict=True):
-            row = table.loc[f"one: {direction}, specimen {specimen}"]
-            for way, modulus in (("foretold", other), ("fitted", np.mean(both))):
-                found = row[f"{way}_rms"], row[f"{way}_relative"]
-                assert found == pytest.approx(off_by(modulus, own), rel=1e-3)
-            mean += off_by(other, own)[1] / 4
-    assert f"constant: predicted {100 * mean:.3g} % on average" in done.output
-    said = json.loads((tmp_path / "out" / "result.json").read_text())
-    assert said["left_out"] == "specimens"
-    assert said["mean_foretold"]["constant"] == pytest.approx(mean, rel=1e-3)
-
-
 def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
     """The warp of "one" by that of "two", 330 and 410 MPa; the fit goes on where it was."""
 

@@ -7,12 +7,10 @@ from types import SimpleNamespace
 
 import bubblefit as bf
 import numpy as np
-import pandas as pd
 import pytest
 from bubblefit.errors import Note, OutputError, rows
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.reports import study_pages
-from bubblefit.reports.charts import Charts
 from bubblefit.runs import compare
 from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare_laws
 from bubblefit.runs.simulation import StudyRecord, mark_of
@@ -90,44 +88,6 @@ def test_every_number(compared):
     assert second["coefficients"] == 6 and second["form"] == "linear"
     # A modulus that is linear in strain can be the constant one, and differs like it.
     assert second["cross_validated"] == pytest.approx(total, rel=0.05)
-
-
-def test_table_and_page(compared, run):
-    compared.write(run.out)
-    result = json.loads((run.out / "result.json").read_text())
-    assert result == compared.result
-    forms = result["forms"]
-    found, ((path, charts),) = run.pages[-1], run.drawn
-    (chart,) = charts.charts
-    assert path == run.out / "laws.png" and chart.y_label == result["objective_is"]
-    assert chart.level == pytest.approx(result["noise"])
-    folds = [s.y for s in chart.series if s.name == "single folds"]
-    for own, form in zip(folds, forms, strict=True):
-        assert own == pytest.approx(form["folds"], rel=1e-5)
-    for series, key in zip(chart.series, ("fitted", "cross_validated"), strict=False):
-        assert series.y == pytest.approx([form[key] for form in forms], rel=1e-5)
-    assert chart.x_names == tuple(f"{f['form']} ({f['coefficients']})" for f in forms)
-    assert result["least_cross_validated"] in found.summary
-    assert found.figures == [("loads.png", "loads")]
-    assert next(part for part in found.parts if isinstance(part, Charts)) is charts
-    names = [name for name, _ in found.files]
-    assert names == ["comparison.csv", "laws.png", "notes.csv", "result.json"]
-    assert found.warnings == [note.line for note in compared.notes]
-    of = {note.of.split(",")[0] for note in compared.notes}
-    assert of == {"constant", "linear"} and len(found.warnings) >= 4
-    cells = [
-        [form["form"], form["coefficients"], form["fitted"], form["cross_validated"],
-         *form["rms"].values(), *form["cross_validated_by_part"].values()]
-        for form in forms
-    ]  # fmt: skip
-    assert [table.rows for table in found.tables] == [cells]
-    table = pd.read_csv(run.out / "comparison.csv")
-    assert list(table.columns) == [
-        "moduli", "coefficients", "fitted", "cross_validated", "rms one: warp, N",
-        "rms one: fill, N", "left out one: warp, N", "left out one: fill, N",
-    ]  # fmt: skip
-    for row, own in zip(table.to_numpy(dtype=object).tolist(), cells, strict=True):
-        assert row[:2] == own[:2] and row[2:] == pytest.approx(own[2:])
 
 
 def test_going_on_validates_nothing_twice(compared, run):

@@ -10,13 +10,11 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
-from bubblefit.errors import InputError, Note
+from bubblefit.errors import InputError
 from bubblefit.experiments.kinds import BEYOND_CARD, THICKNESS
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import study_pages
-from bubblefit.reports.charts import Charts
-from bubblefit.reports.content import read_page_data
 from bubblefit.runs import simulation as analyses
 from bubblefit.runs import simulation as module
 from bubblefit.runs.folder import FOLDER
@@ -27,7 +25,6 @@ from bubblefit.runs.simulation import (
     studied_tests,
     thickness_notes,
 )
-from bubblefit.solvers.base import SNAP
 
 from ..bars import BarKind, BarTest, project_of
 from ..commands import in_process, result_in
@@ -93,25 +90,6 @@ def test_analyses_are_told_one_after_the_other(bars):
     short = SimpleNamespace(law=SimpleNamespace(strain_range=[0.09, 1.0, 1.0]))
     series.card = short
     assert [note.kind for note in series.notes(history)] == [BEYOND_CARD]
-
-
-def test_what_a_study_writes(tmp_path, monkeypatch):
-    drawn, out = [], tmp_path / "new"
-    monkeypatch.setattr(study_pages, "save", lambda path, _: drawn.append(path))
-    study = SimpleNamespace(
-        notes=(Note(SNAP, "snaps", "one"),), result={"a": [1]},
-        table=lambda: pd.DataFrame({"a": [1, 2], "b": ["x", "y"]}), lines=lambda: ["it settles"],
-    )  # fmt: skip
-    study_pages.write_plain(out, study, "Finer", "mesh", [], Charts("x", [], ""))
-    page = read_page_data(out)
-    assert page.title == "Finer" and page.warnings == [note.line for note in study.notes]
-    assert page.tables[0].header == ["a", "b"]
-    assert page.sections[0].parts[0].text == "it settles"
-    assert [name for name, _ in page.files][:2] == ["mesh.csv", "mesh.png"]
-    assert "it settles" in (out / "report.html").read_text()
-    assert (out / "mesh.csv").read_bytes() == b"a,b\n1,x\n2,y\n" and drawn == [out / "mesh.png"]
-    assert (out / "result.json").read_text() == '{\n "a": [\n  1\n ]\n}\n'
-    assert (out / "notes.csv").read_text() == "of,kind,note\none,snap,snaps\n"
 
 
 COMMANDS = {

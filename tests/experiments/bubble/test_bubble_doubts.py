@@ -243,43 +243,94 @@ def apex(*strain, force=20.0):
     return Apex(0.2, 30.0, 0.01, force, 0.1, strain)
 
 
-@pytest.mark.parametrize(
-    ("far", "rise", "words"),
-    [
-        (10.0, 30.0, ["0.1 radii", "x and y"]), (10.1, 30.0, None), (1999.0, 30.0, None),
-        (2000.0, 30.0, ["20 radii"]), (50.0, 0.4, ["0.004 radii at 200 kPa", "displacements"]),
-        (50.0, 0.41, None), (50.0, -0.41, None), (50.0, 149.0, None), (50.0, 150.0, ["1.5 radii"]),
-        (50.0, -150.0, ["1.5 radii"]),
-    ],
-)  # fmt: skip
-def test_how_far_points_reach_and_rise(far, rise, words):
-    seen = {"fields": (field(0.2, [0, 0, 30.0], [[0.0, 0.0], [far, 0.0]]),)}
-    rises, count = np.array([0.0, rise]), int(words is not None)
-    finds(doubts.length_unit, count, "length-unit", True, *(words or ()), rises=rises, **seen)
+def rim(**other):
+    usual = {"x": 0.0, "y": 0.0, "error": 0.1, "angle": 0.0, "turn_error": 0.1}
+    return SimpleNamespace(**(usual | other))
 
 
-@pytest.mark.parametrize(
-    ("modulus", "doubt"), [(12.4, 1), (12.6, 0), (5990.0, 0), (6010.0, 1)]
-)  # of bounds 50 to 1500 MPa, four times less and more
-def test_the_modulus_of_the_apex(modulus, doubt):
-    """Force over strain and thickness, times 1 - 0.25."""
-    force = modulus / 0.75 * 0.8 * 0.04
-    words = [f"{force:.3g} N/mm", "0.04", f"{modulus:.3g} MPa", "E1 and E2 are 50 to 1.5e+03"]
-    apexes = (apex(9, 9), apex(0.03, 0.05, force=force))
-    finds(doubts.pressure_unit, doubt, "pressure-unit", True, *words, apexes=apexes)
+def zero_points(zeros, origin):
+    points, moved = np.vstack([POINTS, [[91.0, 0.0], [89.0, 0.0]]]), np.ones((7, 3))
+    moved[zeros] = 0.0
+    points[6] *= not origin
+    return (field(0.2, moved, points),)
 
 
-@pytest.mark.parametrize(
-    ("apexes", "expected", "count"),
-    [
-        ((apex(0.002, 0.002, force=1e9),), FABRIC, 1), ((), FABRIC, 0),
-        ((apex(0.001, 0.0029, force=1e9),), FABRIC, 0),
-        ((apex(0.1, 0.1, force=np.inf),), FABRIC, 0),
-        ((apex(0.1, 0.1, force=1e9),), Expected({}), 0),
-    ],
-)  # fmt: skip
-def test_an_apex_that_says_nothing_of_the_pressure(apexes, expected, count):
-    assert len(said(doubts.pressure_unit, expected, apexes=apexes)) == count
+def heights(height):
+    return (field(0.2, [0, 0, 30.0], z=height + np.array([0, 0, 0, -50.0, 50.0])),)
+
+
+def force(modulus):
+    """Of a strain of 0.04: force over strain and thickness, times 1 - 0.25."""
+    return modulus / 0.75 * 0.8 * 0.04
+
+
+AXES = partial(SimpleNamespace, error=0.1, clear=0.7)
+ELLIPSE = Outline(120.0, 80.0, 30.0)
+#: Where a check begins to speak: how often, whether sure, its words, and what it sees.
+LIMITS = [
+    *((doubts.length_unit, "length-unit", int(bool(words)), True, words,
+       {"fields": (field(0.2, [0, 0, 30.0], [[0.0, 0.0], [far, 0.0]]),),
+        "rises": np.array([0.0, rise])})
+      for far, rise, words in (
+          (10.0, 30.0, ["0.1 radii", "x and y"]), (10.1, 30.0, []), (1999.0, 30.0, []),
+          (2000.0, 30.0, ["20 radii"]), (50.0, 0.4, ["0.004 radii at 200 kPa", "displacements"]),
+          (50.0, 0.41, []), (50.0, -0.41, []), (50.0, 149.0, []), (50.0, 150.0, ["1.5 radii"]),
+          (50.0, -150.0, ["1.5 radii"]))),
+    # Of bounds 50 to 1500 MPa, four times less and more.
+    *((doubts.pressure_unit, "pressure-unit", count, True,
+       [f"{force(e):.3g} N/mm", "0.04", f"{e:.3g} MPa", "E1 and E2 are 50 to 1.5e+03"],
+       {"apexes": (apex(9, 9), apex(0.03, 0.05, force=force(e)))})
+      for e, count in ((12.4, 1), (12.6, 0), (5990.0, 0), (6010.0, 1))),
+    *((doubts.pressure_unit, "pressure-unit", count, True, [], {"apexes": apexes} | other)
+      for apexes, count, other in (
+          ((apex(0.002, 0.002, force=1e9),), 1, {}), ((), 0, {}),
+          ((apex(0.001, 0.0029, force=1e9),), 0, {}), ((apex(0.1, 0.1, force=np.inf),), 0, {}),
+          ((apex(0.1, 0.1, force=1e9),), 0, {"expected": Expected({})}))),
+    *((doubts.rejected_at_zero, "zero-points", int(bool(words)), True, words,
+       {"fields": zero_points(zeros, origin)})
+      for zeros, origin, words in (
+          ([5], False, []), ([5, 6], False, ["1 of 6 points"]), ([], True, ["2 points lie"]),
+          ([5, 6], True, ["1 of 6 points", "2 points lie at exactly x = y = 0", "200 kPa"]))),
+    *((doubts.mirrored, "axis-flipped", int(bool(words)), True, words, {"apexes": apexes})
+      for apexes, words in (
+          ((), []), ((apex(0.04, -0.0099),), []), ((apex(-0.04, 0.1),), ["x and dx"]),
+          ((apex(0.1, 0.1), apex(0.04, -0.0101)),
+           ["0.04 along x and -0.0101 along y", "y and dy"]),
+          ((apex(-0.01, -0.02),), ["-0.01, -0.02", "shrinks"]),
+          ((apex(-0.01, 0.0),), ["-0.01, 0", "shrinks"]))),
+    *((doubts.camera_height, "camera-frame", count, False, [f"z = {z:.4g} mm"],
+       {"fields": heights(z)}) for z, count in ((9.99, 0), (10.0, 1), (-10.0, 1), (-9.99, 0))),
+    (doubts.camera_height, "camera-frame", 0, False, [], {}),
+    # 3.5 mm off is much, where it is four standard errors; 1.5, where 20; 15 mm is sure.
+    *((doubts.off_centre, "off-centre", int(level > 0), level == 2,
+       [f"x = {x:.3g}, y = {y:.3g} mm (+- {error:.2g})"], {"rim": rim(x=x, y=y, error=error)})
+      for x, y, error, level in (
+          (2.0, 2.8, 0.2, 0), (2.11, 2.8, 0.2, 1), (2.11, 2.8, 0.9, 0), (9.0, 12.0, 0.1, 1),
+          (9.1, 12.0, 0.1, 2), (9.1, -12.0, 4.0, 0), (0.9, 1.19, 0.01, 0), (0.9, 1.21, 0.01, 1),
+          (1.6, 1.2, 0.099, 1), (1.6, 1.2, 0.101, 0))),
+    (doubts.off_centre, "off-centre", 0, False, [], {"rim": None}),
+    *((doubts.turned, "turned", count, False, [f"{off:.3g} degrees from x and y (+- {error:.2g})"],
+       {"axes": AXES(off=off, error=error, clear=clear), "rim": rim()})
+      for off, error, clear, count in (
+          (4.99, 0.1, 0.7, 0), (5.0, 0.1, 0.7, 1), (-5.0, 0.1, 0.6, 1), (5.0, 0.1, 0.59, 0),
+          (12.0, 3.0, 0.7, 1), (11.9, 3.0, 0.7, 0))),
+    *((doubts.turned, "turned", 0, False, [], seen)
+      for seen in ({"axes": AXES(off=12.0), "rim": None}, {"axes": None, "rim": rim()})),
+    *((doubts.turned, "turned", count, False,
+       [f"{angle:.3g} degrees from x (+- {error:.2g})", "not 30"],
+       {"outline": ELLIPSE, "rim": rim(angle=angle, turn_error=error)})
+      for angle, error, count in (
+          (34.9, 0.1, 0), (35.0, 0.1, 1), (25.0, 0.1, 1), (42.0, 3.0, 1), (41.9, 3.0, 0))),
+    *((doubts.swapped, "swapped", count, False, [f"{warp:.3g} along the warp"], {"apexes": apexes})
+      for warp, count in ((0.0549, 0), (0.0551, 1))
+      for apexes in ((apex(0.01, 0.02), apex(0.9, 0.9), apex(warp + 0.01, 0.07)),
+                     (apex(warp, 0.05),))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("check", "name", "count", "sure", "words", "seen"), LIMITS)
+def test_where_a_check_begins_to_speak(check, name, count, sure, words, seen):
+    finds(check, count, name, sure, *words, **seen)
 
 
 def test_a_centre_that_goes_down_or_sinks_between_two_frames():
@@ -308,22 +359,6 @@ def test_a_frame_given_twice():
         finds(doubts.repeated, count, "repeated-frame", True, *words, fields=(moved[0], high))
 
 
-@pytest.mark.parametrize(
-    ("zeros", "origin", "words"),
-    [
-        ([5], False, None), ([5, 6], False, ["1 of 6 points"]), ([], True, ["2 points lie"]),
-        ([5, 6], True, ["1 of 6 points", "2 points lie at exactly x = y = 0", "200 kPa"]),
-    ],
-)  # fmt: skip
-def test_points_that_are_zero(zeros, origin, words):
-    points, moved = np.vstack([POINTS, [[91.0, 0.0], [89.0, 0.0]]]), np.ones((7, 3))
-    moved[zeros] = 0.0
-    if origin:
-        points[6] = 0.0
-    seen, count = (field(0.2, moved, points),), int(words is not None)
-    finds(doubts.rejected_at_zero, count, "zero-points", True, *(words or ()), fields=seen)
-
-
 UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])
 
 
@@ -347,46 +382,6 @@ def test_places_that_are_only_a_little_like_the_motion():
     assert doubts._follows(moved, 0 * moved) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("apexes", "words"),
-    [
-        ((), None), ((apex(0.04, -0.0099),), None), ((apex(-0.04, 0.1),), ["x and dx"]),
-        ((apex(0.1, 0.1), apex(0.04, -0.0101)), ["0.04 along x and -0.0101 along y", "y and dy"]),
-        ((apex(-0.01, -0.02),), ["-0.01, -0.02", "shrinks"]),
-        ((apex(-0.01, 0.0),), ["-0.01, 0", "shrinks"]),
-    ],
-)  # fmt: skip
-def test_axes_that_do_not_go_together(apexes, words):
-    count = int(words is not None)
-    finds(doubts.mirrored, count, "axis-flipped", True, *(words or ()), apexes=apexes)
-
-
-@pytest.mark.parametrize(("height", "doubt"), [(9.99, 0), (10.0, 1), (-10.0, 1), (-9.99, 0)])
-def test_heights_about_the_rim(height, doubt):
-    one = field(0.2, [0, 0, 30.0], z=height + np.array([0, 0, 0, -50.0, 50.0]))
-    words = f"z = {height:.4g} mm"
-    finds(doubts.camera_height, doubt, "camera-frame", False, words, fields=(one,))
-    assert said(doubts.camera_height) == []
-
-
-def rim(**other):
-    usual = {"x": 0.0, "y": 0.0, "error": 0.1, "angle": 0.0, "turn_error": 0.1}
-    return SimpleNamespace(**(usual | other))
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "error", "doubt"),
-    [(2.0, 2.8, 0.2, 0), (2.11, 2.8, 0.2, 1), (2.11, 2.8, 0.9, 0), (9.0, 12.0, 0.1, 1),
-     (9.1, 12.0, 0.1, 2), (9.1, -12.0, 4.0, 0), (0.9, 1.19, 0.01, 0), (0.9, 1.21, 0.01, 1),
-     (1.6, 1.2, 0.099, 1), (1.6, 1.2, 0.101, 0)],
-)  # fmt: skip
-def test_a_rim_about_another_centre(x, y, error, doubt):
-    """3.5 mm off is much, where it is four standard errors; 1.5, where 20; 15 mm is sure."""
-    words, seen = f"x = {x:.3g}, y = {y:.3g} mm (+- {error:.2g})", rim(x=x, y=y, error=error)
-    finds(doubts.off_centre, bool(doubt), "off-centre", doubt == 2, words, rim=seen)
-    assert said(doubts.off_centre, rim=None) == []
-
-
 @pytest.mark.parametrize(("tilt", "doubt"), [(1.19, 0), (1.21, 1), (7.99, 1), (8.01, 2)])
 def test_a_rise_that_is_not_along_z(tilt, doubt):
     turn = np.radians(tilt)
@@ -401,36 +396,6 @@ def test_a_rise_that_is_not_along_z(tilt, doubt):
         finds(doubts.tilted, bool(doubt), "tilted", doubt == 2, words, fields=frames)
     for unknown in (field(0.2, [9.0, 0, 0]), field(0.2, [9.0, 0, 1], POINTS[:1] + 95.0)):
         assert said(doubts.tilted, fields=(unknown,)) == []
-
-
-@pytest.mark.parametrize(
-    ("off", "error", "clear", "doubt"),
-    [(4.99, 0.1, 0.7, 0), (5.0, 0.1, 0.7, 1), (-5.0, 0.1, 0.6, 1), (5.0, 0.1, 0.59, 0),
-     (12.0, 3.0, 0.7, 1), (11.9, 3.0, 0.7, 0)],
-)  # fmt: skip
-def test_axes_of_symmetry_beside_the_yarns(off, error, clear, doubt):
-    axes = SimpleNamespace(off=off, error=error, clear=clear)
-    words = f"{off:.3g} degrees from x and y (+- {error:.2g})"
-    finds(doubts.turned, doubt, "turned", False, words, axes=axes, rim=rim())
-    assert said(doubts.turned, axes=axes, rim=None) == []
-    assert said(doubts.turned, axes=None, rim=rim()) == []
-
-
-@pytest.mark.parametrize(
-    ("angle", "error", "doubt"),
-    [(34.9, 0.1, 0), (35.0, 0.1, 1), (25.0, 0.1, 1), (42.0, 3.0, 1), (41.9, 3.0, 0)],
-)
-def test_an_ellipse_that_lies_otherwise(angle, error, doubt):
-    seen = {"outline": Outline(120.0, 80.0, 30.0), "rim": rim(angle=angle, turn_error=error)}
-    words = [f"{angle:.3g} degrees from x (+- {error:.2g})", "not 30"]
-    finds(doubts.turned, doubt, "turned", False, *words, **seen)
-
-
-@pytest.mark.parametrize(("warp", "doubt"), [(0.0549, 0), (0.0551, 1)])
-def test_a_warp_that_is_strained_more(warp, doubt):
-    both = (apex(0.01, 0.02), apex(0.9, 0.9), apex(warp + 0.01, 0.07))
-    for apexes in (both, (apex(warp, 0.05),)):
-        finds(doubts.swapped, doubt, "swapped", False, f"{warp:.3g} along the warp", apexes=apexes)
 
 
 def test_strains_that_say_nothing_of_warp_and_fill():

@@ -12,7 +12,6 @@ from bubblefit.experiments.bubble.findings import registration_line, registratio
 from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.report import ASKED, correlation_table, registration_table
 from bubblefit.experiments.bubble.section import CorrelationSection
-from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.meshes.mesh import Facet
 from bubblefit.runs.setup import law_of
@@ -48,25 +47,6 @@ def project_of(bubble, folder, case: str):
     path = folder / "project.toml"
     path.write_text(DATA.sub(f"[bubble.data.points]\nfiles = {files}\n\n", text))
     return path
-
-
-def targets(path) -> list[np.ndarray]:
-    project = bf.read_project(path)
-    test = project.tests["bubble"]
-    prepared = KIND.prepare(test, law_of(project, [test.reach]), MembraneSolver)
-    (comparison,) = prepared.comparisons(MembraneSolver, Weighting(False, 1.0))
-    return [target.displacement for target in comparison.objective.targets]
-
-
-@pytest.fixture(scope="module")
-def plain(bubble, tmp_path_factory):
-    return targets(project_of(bubble, tmp_path_factory.mktemp("plain"), "plain"))
-
-
-@pytest.mark.parametrize("case", [case for case in EXPORTS if case != "plain"])
-def test_a_fit_gets_the_same_data_from_every_export(bubble, plain, tmp_path, case):
-    for one, other in zip(targets(project_of(bubble, tmp_path, case)), plain, strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
 
 
 def test_a_fit_says_what_was_read(bubble, tmp_path):

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.point_files import RecordedFrames
 from bubblefit.experiments.bubble.prepared import prepare
@@ -17,7 +16,6 @@ from bubblefit.readers.pressure_log import ClockOffset, picture_numbers
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
-from ...drawings import caught
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])
@@ -330,13 +328,3 @@ def test_numbers_and_tables_of_frames():
     plain = recorded_numbers(PLAIN)
     assert plain["taken"][1] == pytest.approx({"frame": "b.csv", "pressure_kPa": 60.0})
     assert "clock" not in plain and len(recorded_lines(PLAIN)) == 1
-
-
-def test_pressures_and_heights_are_drawn_by_the_clock_of_the_log(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, report, "bubbles.clock_charts")
-    assert clock_pictures(PLAIN, Output(tmp_path)) == [] == drawn
-    clock_pictures(TAKEN, Output(tmp_path))
-    ((path, times, pressure, heights, taken),) = drawn
-    assert path == tmp_path / "clock.png"
-    assert times == pytest.approx([41.254, 42.254, 43.254, 44.254, 45.254])
-    assert pressure is CLOCK.pressure and heights is CLOCK.heights and taken is TAKEN.pressure

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import findings as sheet_report
 from bubblefit.experiments.bubble import report
-from bubblefit.experiments.bubble.findings import NOT_BELIEVED, match_warnings
+from bubblefit.experiments.bubble.findings import NOT_BELIEVED
 from bubblefit.experiments.bubble.objective import (
     FieldObjective,
     FieldTarget,
@@ -34,7 +34,6 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...drawings import caught
 from ...projects import small
 from ...scripts import script
 
@@ -250,23 +249,6 @@ def test_a_sheet_as_it_was_gives_the_moduli_back(tmp_path):
     np.testing.assert_allclose(table["z0_mm"], z, atol=0.03)
 
 
-@pytest.mark.parametrize(
-    ("sheet", "believed", "words"),
-    [
-        ("", False, "sheet: flat and taut, its rim fixed"),
-        ('constant_field = ["dz"]', True, "sheet: constant field taken out: dz 2."),
-        ("from_pressure = 90.0", True, "sheet: displacements counted from 90 kPa"),
-    ],
-)
-def test_a_result_says_what_it_knew_of_the_sheet(tmp_path, sheet, believed, words):
-    path = project(tmp_path, sheet)
-    path.write_text(path.read_text().replace("max_analyses = 60", "max_analyses = 2"))
-    result = fit(read_project(path))
-    (line,) = [one for one in result.findings["uneven"].lines if one.startswith("sheet: ")]
-    assert line.startswith(words), line
-    assert (NOT_BELIEVED in result.result["warnings"]) is not believed
-
-
 TWO = (0.02, 0.2)
 MESH = disk_mesh(100.0, 16)
 #: mm, the surface in the reference picture; that of the two modes is 1 and x in radii.
@@ -345,28 +327,6 @@ def test_a_sheet_of_which_nothing_is_known(sheet, known, warned):
     assert [n.kind for n in sheet_report.sheet_warnings(test)] == [sheet_report.FLAT_SHEET] * warned
 
 
-def test_pictures_and_files(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, report, "bubbles.disk_charts")
-    assert report.sheet_exhibit(*fitted(Sheet(slack=True)), Output(tmp_path)) == ([], [])
-    assert not drawn and not list(tmp_path.iterdir())
-    figures, files = report.sheet_exhibit(*fitted(ALL), Output(tmp_path, "b-"))
-    names = ["b-reference_surface", "b-constant_field"]
-    assert [name for name, _ in figures] == [f"{name}.png" for name in names]
-    assert [name for name, _ in files] == [f"{name}.csv" for name in names]
-    z0 = Z0 + 2.0 + 0.03 * MESH.points[:, 0]
-    table = pd.read_csv(tmp_path / "b-reference_surface.csv")
-    expected = np.column_stack([MESH.points[:, :2], z0])
-    np.testing.assert_allclose(table.to_numpy(), expected, atol=1e-4)
-    table = pd.read_csv(tmp_path / "b-constant_field.csv")
-    assert list(table.columns) == ["x_mm", "y_mm", "dx_mm", "dz_mm"]
-    assert len(table) == len(MESH.points)
-    np.testing.assert_allclose(table[["dx_mm", "dz_mm"]], np.tile([0.3, -0.4], (len(Z0), 1)))
-    (_, ((name, _, heights),), _), (_, constant, _) = drawn
-    assert [name, *(own[0] for own in constant)] == ["z0, mm", "dx, mm", "dz, mm"]
-    np.testing.assert_allclose(heights, z0)
-    np.testing.assert_allclose([values[0] for _, _, values in constant], [0.3, -0.4])
-
-
 @pytest.mark.parametrize(("objective", "scales"), [("mm", (1, 1, 1)), ("e", (2, 4, 5))])
 def test_misfit_by_pressure(objective, scales):
     read = np.array([[[2.0, 4.0, 5.0]], [[2.0, 4.0, -5.0]]])
@@ -443,14 +403,3 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path):
     # At the known moduli every difference is the offsets': mean |dx| + |dy| + |dz|.
     off = moved.displacement + SHIFT - np.array([f.displacement for f in prepared.fields])
     assert findings.numbers["mean_abs_mm"] == pytest.approx(np.abs(off).sum(axis=2).mean())
-
-
-def test_what_is_warned_of_before_the_numbers_are_used():
-    surfaces, crime = sheet_report.SURFACES, sheet_report.INVERSE_CRIME
-    for by, degree, own, kinds in (
-        ("points", 4, False, []), ("surfaces", 6, False, []), ("surfaces", 5, False, [surfaces]),
-        ("points", 6, True, [crime]), ("surfaces", 5, True, [crime, surfaces]),
-    ):  # fmt: skip
-        test = SimpleNamespace(match_by=by, match_degree=degree)
-        prepared: Any = SimpleNamespace(test=test, by_this_model=own)
-        assert [note.kind for note in match_warnings(prepared)] == kinds

@@ -165,22 +165,3 @@ def test_the_colours_are_strains_along_the_axis_at_the_end(quarter, picture):
         assert same(corners, np.concatenate([at, at * [-1.0, 1.0]]))
     assert picture.charts[0].scale == "log strain along the axis"
     assert picture.charts[0].title == "150 mm, 140 kPa"
-
-
-def test_supports_and_collar_stand_where_the_test_has_them(quarter, picture):
-    model, run = quarter
-    inflated = model.mesh.points + run.inflated
-    whole, _, cut = picture.charts
-    half = 0.5 * model.supports.span
-    # Below the inflated tube, within what a chord of its quads leaves open.
-    lowest = inflated[model.mesh.node_sets["bottom_line"], 1].min()
-    for ring, place in zip(lines(whole, "support"), (-half, half), strict=True):
-        assert middle(ring)[0] == pytest.approx(place)
-        assert np.ptp(ring[0]) == pytest.approx(model.supports.diameter)
-        assert ring[1].max() == pytest.approx(lowest, abs=1.0)
-    assert np.ptp(lines(whole, "collar")[0][0]) == pytest.approx(model.collar.length)
-    (ring,) = lines(cut, "collar")
-    inner = 0.5 * model.collar.inner_diameter
-    # It touched the crown and then went down by the deflection of the last frame.
-    crown = inflated[model.mesh.node_sets["top_line"], 1].max()
-    assert middle(ring)[1] + inner == pytest.approx(crown - run.deflection[-1], abs=1.0)

@@ -263,7 +263,7 @@ def test_names_of_files_differ_whatever_the_tests_are_called():
 
 @pytest.fixture
 def drawn(monkeypatch) -> dict[str, list[Any]]:
-    calls: dict[str, list[Any]] = {"draw_beam": [], "write_beam": []}
+    calls: dict[str, list[Any]] = {"draw_beam": []}
     for name, found in calls.items():
         monkeypatch.setattr(report, name, lambda *what, own=found: own.append(what))
     return {**calls, "saved": caught(monkeypatch, report, "bending_charts", "gas_charts")}
@@ -341,16 +341,6 @@ def test_rows_of_a_figure_of_all(diameters, rows):
     found = report._rows(tests)
     assert [len(row) for row in found] == rows
     assert sorted(test.name for row in found for test in row) == [t.name for t in tests]
-
-
-def test_beams_for_paraview(tmp_path, drawn):
-    first = case("a b")
-    soft, x, c = run(first, "soft card"), run(first, "x"), run(case("c"), "soft card")
-    files = report.write_beams(ended(soft, c, x, bent=(0, 2)), Output(tmp_path, "o-"))
-    assert [name for name, _ in files] == ["o-beams/a-b-soft-card.vtu", "o-beams/a-b-x.vtu"]
-    assert all("80 mm" in words for _, words in files)
-    assert [path.name for *_, path in drawn["write_beam"]] == ["a-b-soft-card.vtu", "a-b-x.vtu"]
-    assert [bent.load[0] for _, bent, _ in drawn["write_beam"]] == [LOAD[0], LOAD[0] + 2]
 
 
 # A band: both ends with one card, the prediction alone with another, whose other end failed

@@ -229,19 +229,6 @@ def test_a_forward_analysis_does_without_data(example, small, tmp_path):
     assert "there is no file" in complaint(small, *ends(4))
 
 
-def test_real_points(shared_data, tmp_path):
-    lengths = "".join(
-        f"[{d}]\ngauge_length = {a}\nfinal_length = {b}\n" for d, (a, b) in LENGTHS.items()
-    )
-    text = f'match = "points"\n{lengths}[data]\nfiles = ["valmex7318_load_gauge.csv"]\n'
-    p = read(project_file(tmp_path, text), data_folder=shared_data / "uniaxial")
-    assert p.match_by == "points"
-    assert [len(s.curves) for s in p.strips.values()] == [5, 5, 5]
-    scatter = [s.scatter for s in p.strips.values()]
-    assert scatter == pytest.approx([21.7, 64.1, 40.3], abs=0.05)
-    assert p.reach.strain == pytest.approx((ENDS["warp"], ENDS["fill"], 2 * ENDS["bias"]))
-
-
 def test_loads_per_width_are_multiplied_by_the_strips_own(small, tmp_path):
     per_width = (tmp_path / "w1.csv").read_text().replace("mm,kN,sec", "mm,kN/m,sec")
     (tmp_path / "w1.csv").write_text(per_width)

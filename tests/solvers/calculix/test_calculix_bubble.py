@@ -10,7 +10,6 @@ import pytest
 from bubblefit.cli.options import with_solver
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.files import TEMPLATES
-from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, disk_modes, elliptic_disk_mesh
@@ -286,25 +285,6 @@ WIDER = ("lower = [0.03, 0.3, 0.3]", "lower = [0.01, 0.1, 0.1]")
 PROJECT = changed(BUBBLE, FINER, WIDER) + FIT
 
 
-def test_commands(ccx, tmp_path):
-    (tmp_path / "project.toml").write_text(PROJECT)
-    law = replace(LINEAR, strain_range=np.ones(3))
-    write_card(MaterialCard(law, 0.81, "test", "linear"), tmp_path / "card.toml")
-    arguments = ("project.toml", "--solver", "calculix")
-    bubblefit("simulate", "bubble", *arguments, "--card", "card.toml", "--out", "s", cwd=tmp_path)
-    result = json.loads((tmp_path / "s/result.json").read_text())
-    assert result["solver"] == "calculix"
-    bubblefit("bubble", *arguments, "--out", "f", "--quiet", cwd=tmp_path)
-    result = json.loads((tmp_path / "f/result.json").read_text())
-    assert result["solver"] == "calculix" and result["objective"] < 1e-4
-    # Finite differences on CalculiX itself, as the thesis has it.
-    project = PROJECT.replace("starts = 1", 'starts = 1\nmethod = "slsqp"\nmax_analyses = 6')
-    (tmp_path / "slsqp.toml").write_text(project)
-    bubblefit("bubble", "slsqp.toml", *arguments[1:], "--out", "g", "--quiet", cwd=tmp_path)
-    result = json.loads((tmp_path / "g/result.json").read_text())
-    assert result["method"] == "slsqp" and 5 <= result["external_runs"] <= 7
-
-
 def test_a_pressure_offset_reaches_calculix_and_a_disk_is_four_quarters(ccx):
     model = bubble(64, "quarter", (0.022, 0.059))
     moved = model.with_parameters({"pressure_offset": 0.003})
@@ -399,16 +379,3 @@ def test_it_can_be_turned_off(tmp_path, monkeypatch):
     assert read_project(path).run_cache.folder == tmp_path / "kept"
     path.write_text(PROJECT.replace("[fit]", "[fit]\ncache = false"))
     assert read_project(path).run_cache is None
-
-
-def test_no_cache_runs_every_analysis(counted, tmp_path, monkeypatch):
-    ccx, told = counted
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "runs"))
-    (tmp_path / "project.toml").write_text(PROJECT.replace("elements = 64", "elements = 32"))
-    law = replace(LINEAR, strain_range=np.ones(3))
-    write_card(MaterialCard(law, 0.81, "test", "linear"), tmp_path / "card.toml")
-    arguments = ("simulate", "bubble", "project.toml", "--solver", "calculix", "--ccx", ccx,
-                 "--card", "card.toml", "--overwrite", "--out", "out")  # fmt: skip
-    for given, runs in (((), 1), ((), 1), (("--no-cache",), 2), ((), 2)):
-        bubblefit(*arguments, *given, cwd=tmp_path)
-        assert len(told.read_text().splitlines()) == runs

@@ -1,6 +1,5 @@
 """Runs of Marc, each with a small program in its place: what ends well, and all that does not."""
 
-import json
 import pickle
 import re
 import time
@@ -23,7 +22,6 @@ from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import diagnose, solver_named
 
-from ...commands import in_process
 from ...complaints import complaint
 from ...marc_files import sts_text, t19_text
 from ...places import KNOWN, ROOT
@@ -428,19 +426,6 @@ def ready(tmp_path):
     program.write_text(f"#!/bin/sh\ncp {folder}/job.* .\n")
     program.chmod(0o755)
     return path, card, program, history
-
-
-def test_simulate_bubble_with_marc(ready, tmp_path, monkeypatch):
-    path, card, program, history = ready
-    simulate = ("simulate", "bubble", path, "--card", card, "--solver", "marc", "--overwrite")
-    done = in_process(*simulate, "--marc", program, "--json", cwd=path.parent)
-    result = json.loads(done.stdout)
-    assert result["solver"] == "marc"
-    apex = history.displacement[:, 0, 2]
-    assert np.isclose(np.max(result["apex_mm"]), apex.max(), rtol=1e-5)
-    monkeypatch.setenv("PATH", "/usr/bin:/bin")
-    done = in_process(*simulate, cwd=tmp_path, code=4)
-    assert len(done.stderr.strip().splitlines()) == 1 and "run_marc" in done.stderr
 
 
 def test_doctor_tells_of_a_marc_that_was_named(ready, tmp_path, monkeypatch):

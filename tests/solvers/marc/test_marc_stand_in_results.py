@@ -1,7 +1,6 @@
 """Through deck, stand-in and .t19 come the membrane's results, to six digits; and its faults."""
 
 import json
-import shutil
 from itertools import pairwise
 
 import numpy as np
@@ -14,21 +13,12 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.solvers.marc.deck import TOLERANCE
-from bubblefit.solvers.marc.settings import MarcSettings
-from bubblefit.solvers.marc.sheets import bubble_deck
-from bubblefit.solvers.membrane.newton import CHORD_BELOW, Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...commands import in_process as bubblefit
 from ...commands import result_in
 from ...fortran_build import BETA, LAWS
-from ...marc_stand_in.deck import Control, DeckError, read_deck
-from ...marc_stand_in.models import control_of, converging
-from ...marc_stand_in_runs import marc
 from ...places import EXAMPLES
-
-__all__ = ["marc"]
 
 #: Half a unit in the last of six digits.
 ROUNDING = 5.1e-6
@@ -134,59 +124,6 @@ def test_ends_of_a_cylinder(marc):
         assert len(marc.runs) == run and failed.value.scratch.is_dir()
 
 
-#: Errors at a tolerance of 0.3 are half as large again: 9e-2 and 1.5e-5. At 0.9 what is found, if
-#: anything, is left to rounding.
-LOOSE = {"bubble": 5e-2, "cylinder": 1e-5}
-MODELS = {
-    "bubble": bubble(),
-    "cylinder": inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(2.0,)),
-}
-
-
-def error(found, expected):
-    """Largest difference of displacements over the largest displacement of the frame."""
-    size = np.abs(expected.displacement).max(axis=(1, 2), keepdims=True)
-    return float((np.abs(found.displacement - expected.displacement) / size).max())
-
-
-@pytest.fixture(scope="module")
-def exact():
-    return {name: MembraneSolver().run(model, LAW) for name, model in MODELS.items()}
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_a_loose_tolerance_is_worse_and_a_tight_one_better(name, exact):
-    before = Membrane.unbalance, Membrane.accept, Membrane.equilibrium
-    errors = []
-    for tolerance in (0.3, TOLERANCE, 1e-7):
-        with converging(Control(tolerance, tolerance, 30)):
-            errors.append(error(MembraneSolver().run(MODELS[name], LAW), exact[name]))
-    loose, ours, tight = errors
-    assert loose > LOOSE[name]
-    assert ours < 5e-6  # six digits: Newton's method doubles them in the last iteration
-    assert tight < 0.01 * ours
-    # The membrane solver is left as it was.
-    assert (Membrane.unbalance, Membrane.accept, Membrane.equilibrium) == before
-    assert CHORD_BELOW > 0
-    left = MembraneSolver().run(MODELS[name], LAW)
-    np.testing.assert_array_equal(left.displacement, exact[name].displacement)
-
-
-def test_a_deck_with_a_loose_tolerance_is_solved_loosely(marc, tmp_path, exact):
-    path = tmp_path / "job.dat"
-    path.write_text(bubble_deck(bubble(), LAW, MarcSettings()))
-    content = read_deck(path)
-    assert control_of(content) == Control(TOLERANCE, TOLERANCE, 30)
-    content.cases.append(content.cases[0]._replace(control=Control(1e-3, 1e-4, 30)))
-    with pytest.raises(DeckError, match="one control for all"):
-        control_of(content)
-    text = "".join(f"{n:10d}" for n in [99999, 30, 0, 5, 0, 1, 0, 0, 1, *[0] * 7])
-    text += 2 * ("\n" + "".join(f"{v:20.12E}" for v in [0.1, *[0.0] * 7]))
-    (tmp_path / "control.dat").write_text(f"control\n{text}\n")
-    loose = marc.solver(include={"control": str(tmp_path / "control.dat")}).run(bubble(), LAW)
-    assert error(loose, exact["bubble"]) > 1e-3
-
-
 BUBBLE = """
 [fabric]
 thickness = 0.81
@@ -269,72 +206,6 @@ def test_a_fit_whose_last_run_fails_is_resumed(marc, finer, tmp_path):
     bubblefit(*fit, "--resume", cwd=tmp_path)
     assert marc.runs[5:] == ["job none", "job 3015", "job none"]
     assert result_in(tmp_path / "out")["objective"] < 1e-5
-
-
-def told_alike(folder, name, command, site, *stiff, atol):
-    bubblefit(*command, "--solver", "marc", "--marc", site, "--out", "marc-out", cwd=folder)
-    bubblefit(*command, *stiff, "--out", "membrane-out", cwd=folder)
-    found, expected = (
-        pd.read_csv(next((folder / out).glob(name)), comment="#")
-        for out in ("marc-out", "membrane-out")
-    )
-    assert list(found.columns) == list(expected.columns) and len(found) == len(expected)
-    for column in found.select_dtypes("number"):
-        if "wrinkle" not in column and expected[column].notna().all():
-            np.testing.assert_allclose(found[column], expected[column], 1e-4, atol, err_msg=column)
-    return found
-
-
-def test_simulated_bubble_and_strips_are_the_membranes(site, card, tmp_path):
-    (tmp_path / "project.toml").write_text(BUBBLE)
-    command = ("simulate", "bubble", "project.toml", "--card", card)
-    told_alike(tmp_path, "*.csv", command, site, atol=1e-6)
-    assert result_in(tmp_path / "marc-out")["solver"] == "marc"
-    strips(tmp_path)
-    command = ("simulate", "uniaxial", "project.toml", "--card", card, "--overwrite")
-    told_alike(tmp_path, "loads.csv", command, site, atol=1e-4)
-
-
-def strips(folder):
-    shutil.copy(EXAMPLES / "uniaxial-valmex7318/curves.csv", folder)
-    text = (EXAMPLES / "uniaxial-valmex7318/project.toml").read_text()
-    assert "increments = 100" in text
-    (folder / "project.toml").write_text(text.replace("increments = 100", "increments = 10"))
-
-
-def test_simulated_bending_is_the_membranes(marc, site, card, tmp_path):
-    command = ("simulate", "bend", "--diameter", 150, "--pressure", 140, "--card", card,
-               "--element-size", 60, "--deflection", 6, "--frames", 3, "--jobs", 1,
-               "--quiet")  # fmt: skip
-    # The stand-in's wall carries compression, as Marc's elements do.
-    stiff = ("--solver-option", "wall=stiff")
-    found = told_alike(tmp_path, "load_deflection.csv", command, site, *stiff, atol=2e-3)
-    assert len(marc.runs) == 2 and len(found) == 4
-
-
-@pytest.mark.slow
-def test_a_bending_project(marc, site, tmp_path):
-    text = (EXAMPLES / "bend-valmex7318/project.toml").read_text()
-    head, *cards = text[: text.index("[[cylinder]]")], *text.split("[[card]]")[1:2]
-    for old, new in (
-        ("element_size = 25.0", "element_size = 60.0"),
-        ("deflection = 240.0", "deflection = 4.0"),
-        ("places = [40.0, 100.0, 240.0]", "places = [4.0]"),
-        ("slope_over = 20.0", "slope_over = 2.0"),
-        ("frames = 60", "frames = 2"),
-    ):
-        assert old in head
-        head = head.replace(old, new, 1)
-    cases = "".join(f"[[cylinder]]\ndiameter = 150.0\npressure = {p}\n" for p in (110.0, 140.0))
-    (tmp_path / "project.toml").write_text(f"{head}{cases}[[card]]{cards[0]}")
-    marc.told("licence@1")
-    bubblefit("bend", "project.toml", "--solver", "marc", "--marc", site, "--jobs", 1, "--quiet",
-              "--out", "out", cwd=tmp_path, code=4)  # fmt: skip
-    table = pd.read_csv(tmp_path / "out" / "load_deflection.csv", comment="#")
-    # The first case had no licence, the second has its three frames.
-    assert len(marc.runs) == 3 and len(table) == 3
-    runs = pd.read_csv(tmp_path / "out" / "runs.csv", comment="#")
-    assert len(runs) == 2 and "no licence" in (tmp_path / "out" / "runs.csv").read_text()
 
 
 def test_doctor_proves_the_stand_in(marc, site, tmp_path):
