@@ -222,20 +222,6 @@ def test_pages_stand_in_the_order_of_the_index(tmp_path):
     ]  # fmt: skip
 
 
-def test_a_notebook_is_words_code_and_what_it_gave():
-    cells = [
-        {"cell_type": "markdown", "source": ["# A\n", "b"]},
-        {"cell_type": "code", "source": ["1 + 1"], "outputs": [
-            {"text": ["out\n"]}, {"data": {"text/plain": ["2"], "text/html": ["<b>2</b>"]}},
-            {"data": {"image/png": "QUJD\n", "text/plain": ["<Figure>"]}},
-        ]},
-    ]  # fmt: skip
-    assert [line.strip() for line in SITE.notebook({"cells": cells})] == [
-        "# A\nb", "```python\n1 + 1\n```", "```text\nout\n```", "```text\n2\n```",
-        "![drawn](data:image/png;base64,QUJD)",
-    ]  # fmt: skip
-
-
 def test_pages_on_the_terminal(tmp_path):
     said = in_process("docs", cwd=tmp_path).stdout.splitlines()
     assert len(said) == len(pages()) == len({line.split()[0] for line in said})
@@ -292,26 +278,3 @@ def test_the_interface_is_on_the_pages_that_the_index_names():
     text = "".join(MAKER.pages().values())
     for name in bubblefit.__all__:
         assert f"### {name}\n" in text or f"### class {name}\n" in text
-
-
-def test_signatures_and_entries():
-
-    def fit(a: int, *rest: str, b: str = "x", **more: float) -> list[int]:
-        """Fit.
-
-        Parameters
-        ----------
-        a : first. b : in "x" or
-            "y". more : of it.
-
-        Returns
-        -------
-        Something.
-        """
-        return [a]
-
-    expected = "fit(a: int, *rest: str, b: str = 'x', **more: float) -> list[int]"
-    assert expected in MAKER.signature("fit", fit)
-    text = MAKER.text_of(fit)
-    assert '- `a`: first.\n- `b`: in "x" or "y".\n- `more`: of it.' in text
-    assert "**Returns**\n\nSomething." in text

@@ -118,14 +118,6 @@ def test_start_up_loads_only_what_it_needs(code, absent):
         assert len([name for name in loaded if name.split(".")[0] == "bubblefit"]) < 15
 
 
-def test_make_and_ci_agree():
-    run, makefile = (ROOT / ".ci" / "run").read_text(), (ROOT / "Makefile").read_text()
-    assert "make lint" in run and "make test" in run
-    for target in ("demo", "test", "lint", "bench", "calculix", "clean"):
-        assert re.search(rf"^{target}:", makefile, re.MULTILINE)
-    assert ".ci/licences.py" in makefile.split("\nlint:")[1].split("\n\n")[0]
-
-
 def test_documents_that_speak_of_the_thesis_link_to_it():
     for document in (ROOT / "docs").glob("*/*.md"):
         text = re.sub(r"```.*?```|^    .*?$", "", document.read_text(), flags=re.DOTALL | re.M)
@@ -238,30 +230,6 @@ def test_ci_ends_with_the_first_failure_but_of_mutants(tmp_path):
         )  # fmt: skip
         assert bool(done.returncode) == (fault in ("lint", "test"))
         assert done.stdout.splitlines() == made
-
-
-def test_gfortran_is_there_or_is_installed_or_named(tmp_path):
-    def gfortran():
-        return subprocess.run(
-            ["/bin/sh", ROOT / ".ci" / "gfortran"],
-            env={"PATH": str(tmp_path)},
-            capture_output=True,
-            text=True,
-        )
-
-    for name in ("dirname", "id", "env"):
-        (tmp_path / name).symlink_to(shutil.which(name) or name)
-    without = gfortran()
-    assert without.returncode == 1 and "apt-get install gfortran" in without.stderr
-    program(tmp_path / "apt-get", f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\n')
-    if os.geteuid() == 0:
-        assert gfortran().returncode == 0
-        assert " gfortran " in (tmp_path / "asked").read_text()
-        (tmp_path / "asked").unlink()
-    (tmp_path / "gfortran").symlink_to(shutil.which("true") or "true")
-    with_it = gfortran()
-    assert with_it.returncode == 0 and not with_it.stderr
-    assert not (tmp_path / "asked").exists()
 
 
 #: What leaves a test out, or lets it fail.

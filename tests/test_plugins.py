@@ -109,45 +109,6 @@ def plain(text):
     return "\n".join(line.strip() for line in text.splitlines() if line.strip())
 
 
-#: Where a module of the example goes, and what it then ends with.
-PLACES = {
-    "materials/forms/saturating.py": "from bubblefit.materials.forms.base import register_form\n"
-    "register_form(SATURATING)\n",
-    "readers/formats/riglog.py": "from bubblefit.readers.registry import register_format\n"
-    "register_format(RIGLOG)\n",
-    "experiments/datasheet/__init__.py": "",
-}
-
-
-@pytest.mark.slow
-def test_a_form_a_kind_and_a_format_are_one_file_each_inside(tmp_path):
-    house = tmp_path / "bubblefit"
-    skip = shutil.ignore_patterns(".*", "tests", "docs", "examples", "benchmarks", "__pycache__")
-    shutil.copytree(ROOT, house, ignore=skip, symlinks=True)
-    for place, last in PLACES.items():
-        path = house / place
-        path.parent.mkdir(exist_ok=True)
-        assert not path.exists()
-        name = "datasheet.py" if path.name == "__init__.py" else path.name
-        path.write_text(f"{(EXTRAS / name).read_text()}\n{last}")
-    code = f"""if True:
-        import bubblefit as bf
-        from bubblefit.readers.registry import format_of
-        from bubblefit.runs.setup import law_of
-        assert bf.__file__.startswith({str(house)!r})
-        project = bf.read_project({str(PLUG_IN / "project.toml")!r})
-        assert list(project.tests) == ["supplier", "strips"], list(project.tests)
-        print(law_of(project, list(project.tests.values())).form.name)
-        print(format_of("machine table", {str(PLUG_IN / "warp.rig")!r}).name)
-        """
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path,
-        env={"PYTHONPATH": str(tmp_path)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["saturating", "riglog"]
-
-
 #: What the example's files were computed from: G12, E2 and E1, at rest and far away, MPa.
 BETA = np.array([20.0, 5.0, 300.0, 150.0, 900.0, 400.0])
 SCALE = {"warp": 0.03, "fill": 0.06, "shear": 0.15}

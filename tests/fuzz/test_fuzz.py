@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.readers.registry import format_of, formats
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ..places import ROOT
 from .judging import Endless, fault, limits
-from .mutations import CHANGES, KINDS, Change, mutated
+from .mutations import CHANGES, mutated
 from .targets import targets
 
 HOSTILE = sorted((ROOT / "tests" / "corpus").glob("*/*"))
@@ -87,12 +87,3 @@ def test_faults_are_seen(tmp_path):
     assert bytearray(2**29 + 2**20)  # the limit is of the reading only
     with pytest.raises(Endless), limits(seconds=1):
         endless(path)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=20, deadline=None)
-@given(st.binary(max_size=200), st.floats(0, 1), st.integers(0, 60), st.integers(0, 1000))
-@example(b"", 0.0, 0, 0)
-def test_every_change_takes_any_content(kind, content, where, length, choice):
-    change = Change(kind, where, length, choice)
-    assert mutated(content, [change]) == mutated(content, [change])

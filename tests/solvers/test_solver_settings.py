@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from bubblefit.errors import SolverFailure
 from bubblefit.solvers.base import Solver
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import file_mark, templates_mark
@@ -16,13 +15,10 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import (
     SOLVERS,
     command_line,
-    diagnose,
     overridden,
     solver_named,
-    solver_names,
     solver_sections,
     solver_settings,
-    usable_solver,
 )
 
 from ..complaints import complaint
@@ -149,27 +145,6 @@ def acme(tmp_path, monkeypatch):
     yield
     for name in [name for name in sys.modules if name.startswith("acme_in_the_tree")]:
         del sys.modules[name]
-
-
-def test_a_folder_and_a_line_make_a_solver_of_ours(acme, monkeypatch):
-    options = solver_settings(PROJECT, {"acme": {"deck": "d.inp", "acme": "bin/acme"}})["acme"]
-    assert options["deck"] == Path("/somewhere/d.inp")
-    options = overridden("acme", options, {"element": "A2", "ccx": None}, ("acme=other",))
-    words = complaint(usable_solver, "nothing", {}, PROJECT, "run.solver")
-    assert words.startswith(f"{PROJECT}: run.solver (or --solver): 'nothing' is not one of: acme")
-    with pytest.raises(SolverFailure, match="no-such-marc"):
-        usable_solver("marc", {"executable": "no-such-marc"})
-    solver = usable_solver("acme", options, PROJECT)
-    assert solver.given == ("other", Path("/somewhere/d.inp"), "A2")
-    said = {one.name: one.what for one in command_line()}
-    assert said["acme"] == "The ACME to run."
-    assert said["element"].endswith("139, 75 or 18 (marc), A1 or A2 (acme).")
-    assert "acme" in solver_names() and "acme" in solver_sections()
-    for ours in ("calculix", "marc"):
-        monkeypatch.setattr(f"bubblefit.solvers.{ours}.solver.diagnose", lambda named: [])
-    assert [one.name for one in diagnose()] == ["membrane", "acme"]
-    (found,) = [one for one in diagnose(acme="/opt/acme") if one.name == "acme"]
-    assert found.expected and found.path == "/opt/acme"
 
 
 # --- identity ---

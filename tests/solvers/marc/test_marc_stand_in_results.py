@@ -18,7 +18,10 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from ...commands import in_process as bubblefit
 from ...commands import result_in
 from ...fortran_build import BETA, LAWS
+from ...marc_stand_in_runs import marc
 from ...places import EXAMPLES
+
+__all__ = ["marc"]
 
 #: Half a unit in the last of six digits.
 ROUNDING = 5.1e-6
