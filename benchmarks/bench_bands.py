@@ -70,7 +70,6 @@ def held(band, true):
 
 
 def correlated(points):
-    """Return the factor (points, points) that makes white noise alike over a facet, times mm."""
     distance = np.hypot(*(points[:, None] - points).T)
     whole = np.exp(-((distance / FACET) ** 2)) + 1e-9 * np.eye(len(points))
     return NOISE * np.linalg.cholesky(whole)

@@ -34,7 +34,6 @@ DESIGNS = (
 
 
 def case(scale, noise):
-    """Return the bubble with moduli times `scale` (G12, E2, E1), and what could be added."""
     project = known_project(QUADS)
     project = replace(project, law=project.law.model_copy(update={"strain_range": list(RANGE)}))
     (test,) = project.tests.values()
@@ -110,7 +109,6 @@ def scatter(tests, present, asked, sets, seed):
 
 
 def designs(scale, noise, sets, seed):
-    """Return name, predicted and simulated figure of G12, sets without a fit, of every design."""
     present, make, offered = case(scale, noise)
     ends = np.minimum(present.reached, RANGE)
     asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns, ends)

@@ -1,7 +1,6 @@
-"""Measure time, memory and size: analyses, growth with the mesh, reading, pages."""
+"""Measure time, memory and size: analyses, growth with the mesh, reading."""
 
 import resource
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -14,22 +13,18 @@ from bubblefit.experiments.kinds import Expected
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.readers.fields import DisplacementField, read_fields
-from bubblefit.reports.html import PAGE, find_browser
 from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from common import ROOT, known_model_and_law, seconds, start_on
+from common import known_model_and_law, seconds, start_on
+from dic_exports import EXPORTS
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_info, threadpool_limits
-
-sys.path.insert(0, str(ROOT / "tests"))  # no installed package has the tests
-from dic_exports import EXPORTS
 
 QUADS = (192, 450, 800, 1800, 3200, 7200, 20_000)
 #: Doubles of band storage beyond which the banded LU is not tried (half a gigabyte).
 MOST_BAND, AS_SHIPPED = 64_000_000, factorisation.LARGEST_BAND
 RADIUS = 100.0
-FIGURES = "figure img, svg.chart, svg.map, svg.solid"
 
 
 def analysis(repeats=40):
@@ -88,7 +83,6 @@ def growth(largest=QUADS[-1]):
 
 
 def timed(model, law, limit):
-    """Return s of one cold analysis, its highest apex (mm) and the factorisation it used."""
     factorisation.LARGEST_BAND = limit
     try:
         solver, done = MembraneSolver(), []
@@ -165,24 +159,5 @@ def readers(points=37_000, frames=49, *formats):
               f"{peak:7.0f} MB")  # fmt: skip
 
 
-def pages(*folders):
-    """Print sizes of the pages in FOLDERS, figures that are seen and complaints of a browser."""
-    print("| page | report.html, kB | figures | complaints |\n|---|---|---|---|")
-    sys.path.insert(0, str(ROOT))
-    for name in folders:
-        page, found = Path(name) / PAGE, ("-", "-")
-        if find_browser() is not None:
-            from tests.browser import browser
-
-            with tempfile.TemporaryDirectory() as home, browser(Path(home)) as one:
-                one.open(page)
-                shown = one.run(
-                    f"[...document.querySelectorAll({FIGURES!r})]"
-                    ".filter(own => own.getBoundingClientRect().height > 0).length"
-                )
-                found = str(shown), str(len(one.complaints))
-        print(f"| {name} | {page.stat().st_size / 1024:.0f} | {found[0]} | {found[1]} |")
-
-
 if __name__ == "__main__":
-    start_on(analysis, growth, registration, readers, pages)
+    start_on(analysis, growth, registration, readers)

@@ -153,7 +153,6 @@ class Trial:
         return found
 
     def left(self):
-        """Return scratch folders, half-written files and shared memory that are there."""
         places = [*(self.folder / "tmp").iterdir(), *self.folder.rglob(".*.part")]
         places += [path for path in self.out.rglob(".*") if path.is_file()]
         places += SHARED.iterdir() if OWN in os.environ else ()  # others may use it, too
@@ -179,7 +178,6 @@ def finish(process):
 
 
 def killed(trial, process, draw):
-    """Kill one of the trial's processes; return which, "" where it had ended."""
     alive = trial.all_alive(process)
     solvers = [number for number, name in alive if name.startswith("ccx")]
     others = {process, *solvers, *(number for number, name in alive if name == "sh")}

@@ -67,7 +67,6 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu_warp", "nu_fill": "n
 
 
 def in_parts(parts, more=()):
-    """Return the seven pressures, each rise in so many increments, and more of them, MPa."""
     levels = np.interp(np.arange(1, 7 * parts + 1) / parts, range(8), [0.0, *PRESSURES])
     return np.unique([*levels, *more])
 

@@ -1,7 +1,6 @@
 """Compare with Marc: published profiles, decks through the stand-in, bars of a misread law."""
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,6 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import ROOT, known_model_and_law, known_project, known_setup, objectives_of, start_on
 from scipy.integrate import quad
 
-Modulus = Callable[[float], float]
 PROFILES = ROOT / "runs" / "verification" / "published" / "marc_bubble_profiles.csv"
 STAND_IN = ROOT / "tests" / "marc_stand_in" / "run_marc"
 MODELS = {

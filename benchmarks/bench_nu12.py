@@ -85,7 +85,6 @@ def noisy(test, noise, random):
 
 
 def fitted(setups, known, nu12, moduli):
-    """Fit each from a law on, nu12 (its own unless given) free; return what comes out."""
     found, sigma, rho, of_moduli = [], [], [], []
     for setup in setups:
         problem = setup.problem()

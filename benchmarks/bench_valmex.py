@@ -66,7 +66,6 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
 
 
 def project(law, tests, data, frames, elements, modes, starts, strip_increments):
-    """Return a project of measured tests by name and, unless 0, of the published strips."""
     table = pd.read_csv(data / "grid_pressures.csv")
     said = {"pressures": [float(table["p_bar"][k]) for k in frames], "frames": list(frames)}
     said |= {"elements": elements, "modes": modes}
@@ -171,7 +170,6 @@ def sheets(
 
 
 def moduli(law):
-    """Return E1, E2 in GPa and G12 in MPa at one strain, as words."""
     if law is None:
         return "no fit"
     e1, e2, g12 = (float(law.modulus(name, STRAIN)) for name in ("E1", "E2", "G12"))

@@ -51,7 +51,6 @@ def walk():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "project.toml"
         path.write_text(KNOWN.read_text().replace("elements = 800", "elements = 48"))
-
         with entered(steps, "read the project"):
             project = bf.read_project(path)
         with entered(steps, "prepare the tests"):

@@ -1,6 +1,5 @@
 """Run on several processes and a Dask cluster: licences that are counted, cost of a run."""
 
-import heapq
 import multiprocessing
 import os
 import signal
@@ -28,18 +27,13 @@ LICENCES, PROCESSES, OF_EACH, WORKERS, SECONDS, LONG = 4, 3, 2, 3, 0.05, 1.0
 FORK = multiprocessing.get_context("fork")
 #: s, of one run; and for how many s there are runs for a worker.
 LENGTHS, BUSY_S = (0.01, 0.1, 1.0), 3.0
-#: s: a run of CalculiX on the example's bubble, docs/how-to/calculix.md; runs of it in a start.
-CALCULIX_S, CALCULIX_RUNS = 4.0, 4
-STUDY, ON_PAPER = 1000, 100
-#: Of each of two workers, and short runs for them: more than the client can hand out.
-THREADS, MANY = 16, 1000
 
 
 @contextmanager
-def local_cluster(workers, threads=1):
+def local_cluster(workers):
     from distributed import LocalCluster
 
-    options = {"threads_per_worker": threads, "dashboard_address": ":0", "silence_logs": 50}
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
     with LocalCluster(n_workers=workers, **options) as local:
         yield local.scheduler_address
 
@@ -133,8 +127,8 @@ def here(workers):
 
 
 @contextmanager
-def cluster(workers, threads=1):
-    with local_cluster(workers, threads) as address, hearing(lambda said: None):
+def cluster(workers):
+    with local_cluster(workers) as address, hearing(lambda said: None):
         yield Executor(scheduler=address)
 
 
@@ -153,7 +147,6 @@ def cost(starts=8):
                     efficiency, lost = timed(executor, workers, count, length)
                 row += f" {100 * efficiency:.0f} % | {1000 * lost:.1f} |"
             print(row, flush=True)
-    spent = []
     setup = known_setup(known_project())
     for workers in (1, 2):
         row = []
@@ -163,26 +156,9 @@ def cost(starts=8):
                 heard = executor.run_starts(setup.problem, setup.options, 1, range(starts))
                 own = [record.wall_s for record in heard if isinstance(record, StartRecord)]
                 wall = time.perf_counter() - begun
-            spent += own
             row.append(f"{100 * sum(own) / workers / wall:.0f} % ({wall:.1f} s)")
         what = f"starts of {np.mean(own):.2f} s"
         print(f"| {what} | {workers} | {row[0]} | | {row[1]} | |", flush=True)
-    with cluster(2, THREADS) as executor:
-        begun = time.perf_counter()
-        timed(executor, 2 * THREADS, MANY, LENGTHS[0])
-        handing = (time.perf_counter() - begun) / MANY
-    print(f"\nmore workers than it can serve: {1 / handing:.0f} runs a second, "
-          f"{1000 * handing:.1f} ms of the client for each\n\n"
-          f"{STUDY} starts on {ON_PAPER} workers, on paper (s):\n"
-          f"| starts | seconds each | one worker | {ON_PAPER} workers | efficiency |\n"
-          + "|---" * 5 + "|")  # fmt: skip
-    random, spread = np.random.default_rng(1), np.array(spent) / np.mean(spent)
-    external = f"CalculiX, {CALCULIX_RUNS} runs of {CALCULIX_S:g} s"
-    for name, mean in {"membrane": np.mean(spent), external: CALCULIX_S * CALCULIX_RUNS}.items():
-        lengths = mean * random.choice(spread, STUDY)
-        wall = scheduled(lengths, handing)
-        print(f"| {name} | {mean:.2f} | {np.sum(lengths + handing):.0f} | {wall:.1f} | "
-              f"{100 * np.sum(lengths) / (ON_PAPER * wall):.0f} % |")  # fmt: skip
 
 
 def timed(executor, workers, count, length):
@@ -200,16 +176,6 @@ def timed(executor, workers, count, length):
     first, last = min(begun for begun, _ in done), max(end for _, end in done)
     own = sum(end - begun for begun, end in done)
     return own / (workers * (last - first)), (workers * (last - first) - own) / count
-
-
-def scheduled(lengths, handing):
-    """Return when the last ends, each given to the first free worker, one after the other."""
-    free, client, end = [0.0] * ON_PAPER, 0.0, 0.0
-    for length in lengths.tolist():
-        client = max(client, free[0]) + handing  # one client hands out, one at a time
-        heapq.heapreplace(free, client + length)
-        end = max(end, client + length)
-    return end
 
 
 if __name__ == "__main__":

@@ -85,7 +85,6 @@ class Study:
         return list(groups.values())
 
     def by_diameter(self):
-        """Return the cylinders of Table 6.1 at lowest, middle and highest pressure."""
         rows = ([self.case(d, PRESSURES[d][rank]) for d in sorted(PRESSURES)] for rank in range(3))
         return [[case for case in row if case is not None] for row in rows]
 
@@ -234,7 +233,6 @@ def _against(text, study, test, good):
 
 
 def _order(text, study, groups, need):
-    """Check that the stiffness rises along each group, with each card."""
     checks, changes = [], []
     for group, card in product(groups, study.cards):
         for (one, low), (other, high) in pairwise(study.of(group, card)):

@@ -20,10 +20,8 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.project.project import read_project
 from bubblefit.solvers.membrane import kernel, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
 PROFILES = ROOT / "runs" / "verification" / "published" / "marc_bubble_profiles.csv"

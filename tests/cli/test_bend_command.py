@@ -216,7 +216,6 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     for test in ("150 mm, 90 kPa", "high"):
         assert f"{test} with soft: failed: made to fail" in page
 
-    # tests/runs/test_predictions.py draws those that stop.
     monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]
