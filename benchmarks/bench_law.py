@@ -1,11 +1,10 @@
-"""Measure what increments, the disk's rim, the load ratio, exports and constants lose."""
+"""Measure what increments, the load ratio, exports and constants lose."""
 
 import contextlib
 import multiprocessing
 import resource
 import sys
 import tempfile
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -125,43 +124,6 @@ def work_of_starts(starts):
     return {name: value.value for name, value in count.items()}, spent
 
 
-def rim():
-    """Compare apex heights on coarse disks whose rim is on the circle, or of the circle's area."""
-    finest = disk_mesh(100.0, 12_800, "quarter")
-    exact = heights(finest)
-    apart = 100 * np.abs(heights(moved_out(finest)) / exact - 1).max()
-    print(f"{len(finest.quads)} quads: the two rims differ by {apart:.3f} %\n\n| quads of the "
-          "quarter | area missing, % | rim on the circle: first, last pressure, % | of equal area, "
-          "% |\n|---|---|---|---|")  # fmt: skip
-    sizes, errors = [], []
-    for quads in (12, 25, 50, 100, 200):
-        mesh = disk_mesh(100.0, 4 * quads, "quarter")
-        off = [100 * (heights(m) / exact - 1)[[0, -1]] for m in (mesh, moved_out(mesh))]
-        missing = 100 * (1 - factor(mesh) ** -2)
-        on, out = ("{:+.3f}, {:+.3f}".format(*one) for one in off)
-        print(f"| {len(mesh.quads)} | {missing:.2f} | {on} | {out} |")
-        sizes.append(len(mesh.quads) ** -0.5)
-        errors.append(np.abs(off).ravel())
-    orders = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
-    print("| order | | {:.2f}, {:.2f} | {:.2f}, {:.2f} |".format(*orders))
-
-
-def heights(mesh):
-    history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, PRESSURES.tolist()), LAW_4_2)
-    return history.displacement[:, mesh.node_sets["apex"][0], 2]
-
-
-def factor(mesh):
-    """Return by how much the rim's polygon has to grow to have the area of the circle."""
-    x, y = mesh.points[mesh.node_sets["rim"], :2].T
-    turns = np.diff(np.sort(np.arctan2(y, x)))
-    return float(np.sqrt(turns.sum() / np.sin(turns).sum()))
-
-
-def moved_out(mesh):
-    return replace(mesh, points=factor(mesh) * mesh.points)
-
-
 def ratio_law(beta):
     return HypoelasticLaw(beta, NU, form=LoadRatio())
 
@@ -254,4 +216,4 @@ def constants(lowest=0.0, highest=5.0):
 
 
 if __name__ == "__main__":
-    start_on(increments, rim, ratio, exports, constants)
+    start_on(increments, ratio, exports, constants)
