@@ -263,7 +263,7 @@ def test_names_of_files_differ_whatever_the_tests_are_called():
 
 @pytest.fixture
 def drawn(monkeypatch) -> dict[str, list[Any]]:
-    calls: dict[str, list[Any]] = {"draw_beam": []}
+    calls: dict[str, list[Any]] = {"draw_beam": [], "write_beam": []}
     for name, found in calls.items():
         monkeypatch.setattr(report, name, lambda *what, own=found: own.append(what))
     return {**calls, "saved": caught(monkeypatch, report, "bending_charts", "gas_charts")}
