@@ -21,8 +21,6 @@ LENGTH, WIDTH, STRETCH = 40.0, 20.0, 0.1
 
 @dataclass(frozen=True, eq=False)
 class BarModel:
-    """A bar pulled by a tenth of its length."""
-
     mesh: Mesh
     thickness: float
     increments: int
@@ -30,8 +28,6 @@ class BarModel:
 
 @dataclass(frozen=True)
 class BarTest:
-    """One or two bars, warp and fill."""
-
     name: str
     parts: tuple[str, ...] = ("warp",)
     elements: int = 4
@@ -114,7 +110,6 @@ def _said(run: CardRun) -> object:
 
 
 def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
-    """As much of a project as studies and simulations look at."""
     from bubblefit.project.project import Project
 
     return Project(

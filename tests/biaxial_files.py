@@ -36,7 +36,6 @@ def rows_of(law, ratios=FIVE, cycles=1, kept=0.0, **options):
 
 
 def write_rows(path: Path, rows: Sequence[Sequence[object]], head: str = HEAD) -> Path:
-    """The rows as a file with a head."""
     lines = [",".join(x if isinstance(x, str) else repr(float(x)) for x in row) for row in rows]
     path.write_text("\n".join([head, *lines]) + "\n")
     return path

@@ -17,7 +17,6 @@ LOG, ALIVE = "log", "alive"
 
 
 def work(folder: Path, number: str, seconds: float) -> None:
-    """One run of it."""
     import fcntl
     import os
     import time
@@ -82,7 +81,6 @@ class Seen:
 
 
 def seen(folder: Path) -> Seen:
-    """What all copies so far have written."""
     most, begun, ended = 0, dict[str, int](), dict[str, int]()
     for line in (folder / LOG).read_text().splitlines():
         what, number, alive = line.split()

@@ -80,7 +80,6 @@ def tecplot_plain(folder: Path, frames: Frames) -> list[Path]:
 
 
 def long_table(folder: Path, frames: Frames) -> list[Path]:
-    """One table of all frames."""
     path, rows = folder / "all.csv", ["Frame,x,y,z,dx,dy,dz"]
     for k, (x, u) in enumerate(frames):
         rows += [f"{k + 1},{_row(row)}" for row in np.hstack([x, u])]

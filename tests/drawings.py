@@ -46,7 +46,6 @@ def caught(patch, module, *names):
 
 
 def check_convergence(charts, table, what, rms=None):
-    """Charts of a model show convergence.csv, and "rms_N" where it has a load curve."""
     (model,) = set(table.model)
     changes, cost = charts.charts
     size = {"elements": "mean edge, mm", "increments": "step, share of the load"}[what]

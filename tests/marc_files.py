@@ -22,7 +22,6 @@ def e13(value: float) -> str:
 
 
 def records(values: Iterable, kind=e13) -> list[str]:
-    """Lines of six fields."""
     fields = [kind(value) for value in values]
     return ["".join(fields[i : i + 6]) for i in range(0, len(fields), 6)]
 
@@ -50,7 +49,6 @@ def t19_head(points: np.ndarray, quads: np.ndarray, element: int = 139, title: s
 
 
 def t19_frame(number: int, time: float, vectors: Vectors) -> str:
-    """One increment, with its nodal vectors by name."""
     lines = ["****", *block(51600, "Loadcase Title", ["inflation"])]
     lines += block(51701, "Integer Increment Verification Data",
                    integers(0, number, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0))  # fmt: skip

@@ -27,12 +27,10 @@ class StandIn:
 
     @property
     def runs(self) -> list[str]:
-        """Job and fault of every run so far."""
         path = self.folder / "runs"
         return path.read_text().splitlines() if path.exists() else []
 
     def told(self, fault: str) -> None:
-        """From now on it fails as `fault` says."""
         (self.folder / "fault").write_text(fault)
 
     def solver(self, **settings) -> Any:
@@ -47,7 +45,6 @@ class StandIn:
 
 
 def stand_in(folder: Path) -> StandIn:
-    """A program `run_marc` in `folder`, which is the stand-in run by this Python."""
     folder.mkdir(parents=True, exist_ok=True)
     found = StandIn(folder)
     found.program.write_text(
@@ -60,7 +57,6 @@ def stand_in(folder: Path) -> StandIn:
 
 @pytest.fixture
 def marc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StandIn:
-    """A stand-in, and a machine without any other Marc."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     monkeypatch.delenv("MARC_STAND_IN_FAULT", raising=False)
     return stand_in(tmp_path / "marc")

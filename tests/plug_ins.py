@@ -2,7 +2,6 @@
 
 
 def install(folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"):
-    """One distribution with one entry point into `folder`, which `packages` has on sys.path."""
     module = module or f"acme_{name}"
     if text:
         (folder / f"{module}.py").write_text(text)

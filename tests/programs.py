@@ -4,7 +4,6 @@ import stat
 
 
 def program(path, text):
-    """The text as a file that can be run, in a folder that is made for it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
     path.chmod(path.stat().st_mode | stat.S_IXUSR)

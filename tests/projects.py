@@ -10,7 +10,6 @@ EASY = "[law.bounds]\nE1 = [0.02, 2.0]\nE2 = [0.02, 1.0]\nG12 = [0.001, 0.2]\n\n
 
 
 def changed(text, *changes):
-    """The text after each replacement of an old text, which has to be there, by a new one."""
     for old, new in changes:
         assert old in text, old
         text = text.replace(old, new, 1)
@@ -25,7 +24,6 @@ def project_file(folder, text, *changes):
 
 
 def edited(folder, old, new, source=KNOWN, **options):
-    """The known-solution example, or another, read from `folder` after one replacement."""
     return read_project(project_file(folder, source.read_text(), (old, new)), **options)
 
 

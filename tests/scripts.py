@@ -7,7 +7,6 @@ from .places import ROOT
 
 
 def script(place):
-    """The module of a file below the root, such as "benchmarks/bench_kills.py"."""
     path = ROOT / place
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import ast
-import os
 import re
 import runpy
-import subprocess
-import sys
 import time
 from functools import cache
 from pathlib import Path
@@ -16,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 import bubblefit
 import pytest
-from bubblefit.cli.start import find_document, laid_out, pages, title_of
+from bubblefit.cli.start import find_document, pages, title_of
 
 from .browser import browser
 from .commands import in_process, one_line
@@ -64,7 +61,6 @@ def parsed(path):
 
 
 def definition(path, name):
-    """The function or constant `name` of a module of tests, also where it is imported from."""
     for node in parsed(path).body:
         if isinstance(node, ast.FunctionDef) and node.name == name:
             return node, path
@@ -132,7 +128,6 @@ OUTSIDE = {"tests", "benchmarks", "docs", "examples", ".venv", "build", "out"}
 
 
 def messages():
-    """Every string of the product that is no docstring, and every line of its templates."""
     for path in sorted(ROOT.rglob("*.py")):
         if path.relative_to(ROOT).parts[0] in OUTSIDE:
             continue
@@ -240,20 +235,6 @@ def test_pages_on_the_terminal(tmp_path):
     done = in_process("docs", "projet-file", cwd=tmp_path, code=2)
     one_line(done, "projet-file", "did you mean 'project-file'")
     assert "did you mean" not in complaint(find_document, "zzzzzz", pages())
-
-
-def test_pages_are_laid_out_without_codes_that_a_pager_would_show(tmp_path):
-    for page in pages().values():
-        text = laid_out(page.read_text(), 80)
-        assert "\x1b" not in text and max(map(len, text.splitlines())) <= 80, page
-    command = [sys.executable, "-m", "bubblefit", "docs", "terminal"]
-    for pager in ("cat", "no-such-pager -x"):
-        outer, inner = os.openpty()
-        told = {**os.environ, "PAGER": pager, "TERM": "xterm-256color"}
-        subprocess.run(command, stdin=inner, stdout=inner, env=told, check=True, timeout=60)
-        shown = os.read(outer, 1 << 16).decode()
-        assert "On the terminal" in shown and "\x1b" not in shown
-        os.close(outer), os.close(inner)
 
 
 def test_messages_point_to_pages_that_come_with_it():

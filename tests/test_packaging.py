@@ -1,16 +1,13 @@
 """The wheel: everything the commands need, nothing else, and it works outside the repository."""
 
 import ast
-import os
 import re
 import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
-from email.message import Message
 from pathlib import Path
-from types import SimpleNamespace
 
 import bubblefit
 import pytest
@@ -19,7 +16,6 @@ from bubblefit.solvers.registry import solver_sections
 
 from . import needs
 from .places import PUBLISHED, ROOT
-from .programs import program
 from .projects import project_file
 from .scripts import script
 
@@ -46,7 +42,6 @@ def site_packages(python):
 
 
 def shipped():
-    """What a wheel of this working tree has to hold, found without setuptools."""
     wanted = {"bubblefit/py.typed", "bubblefit/solvers/calculix/law.c"}
     for package in PACKAGES:
         folder = ROOT.joinpath(*package.split(".")[1:])
@@ -66,7 +61,6 @@ def shipped():
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Built from a copy of the working tree, so that nothing is left in the repository."""
     place = tmp_path_factory.mktemp("wheel")
     source = place / "source"
     unwanted = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "out", "build", "dist")
@@ -169,67 +163,6 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     project_file(project.parent, project.read_text(), ("elements = 800", "elements = 48"))
     output_of(command, "bubble", project, "--starts", "1", "--jobs", "1")
     assert (tmp_path / "out" / "mine" / "report.html").exists()
-
-
-def installed(name, licence, *requires):
-    about = Message()
-    about["License-Expression"] = licence
-    return SimpleNamespace(version="1", metadata=about, requires=requires, name=name)
-
-
-def test_licences_are_looked_at(monkeypatch, tmp_path):
-    licences = script(".ci/licences.py")
-    assert licences.problems(PROJECT["project"], ROOT) == []
-    there = {"a": installed("a", "MIT", "b>=1", 'c>=1; extra == "x"'), "b": installed("b", "AGPL")}
-
-    def distribution(name):
-        if name not in there:
-            raise licences.PackageNotFoundError(name)
-        return there[name]
-
-    def found(*direct):
-        project = {"dependencies": direct, "optional-dependencies": {"dev": ["absent>=1"]}}
-        return licences.problems(project, tmp_path)
-
-    monkeypatch.setattr(licences, "distribution", distribution)
-    (line,) = found("a>=1")
-    assert line.startswith("b 1: licence 'AGPL' is none of those in ")
-    there["b"] = installed("b", "BSD-3-Clause")
-    assert found("a>=1") == []
-    for text in ("a", "a<2", "a; python_version > '3'"):
-        (line,) = found(text)
-        assert "has no lower bound" in line
-    there["a"] = installed("a", "")
-    (line,) = found("a>=1")
-    assert "'nothing'" in line
-    path = tmp_path / "templates" / "plot.js"
-    path.parent.mkdir()
-    path.write_text("/*! plot.js v1 Copyright (c) Somebody */")
-    (line,) = found()
-    assert line.startswith("templates/plot.js: is somebody else's file")
-    monkeypatch.setitem(licences.VENDORED, "templates/plot.js", "MIT")
-    assert found() == []
-
-
-def test_ci_ends_with_the_first_failure_but_of_mutants(tmp_path):
-    """A copy of the script, with a `make` that writes down what it is asked for."""
-    shutil.copytree(ROOT / ".ci", tmp_path / ".ci")
-    program(tmp_path / "bin" / "make", '#!/bin/sh\necho "CI=$CI $*"\n[ "$1" != "$FAULT" ]\n')
-    whole = ["CI=1 lint", "CI=1 test", "CI=1 mutants CHANGED=1 MINUTES=3"]
-    environment = {name: value for name, value in os.environ.items() if name != "CI"}
-    environment["PATH"] = f"{tmp_path / 'bin'}:{os.environ['PATH']}"
-    for fault, made in (
-        ("", whole),
-        ("lint", whole[:1]),
-        ("test", whole[:2]),
-        ("mutants", [*whole, "mutants: not tried to the end"]),
-    ):
-        done = subprocess.run(
-            [tmp_path / ".ci" / "run"], env={**environment, "FAULT": fault},
-            capture_output=True, text=True,
-        )  # fmt: skip
-        assert bool(done.returncode) == (fault in ("lint", "test"))
-        assert done.stdout.splitlines() == made
 
 
 #: What leaves a test out, or lets it fail.

@@ -117,7 +117,6 @@ ENDS = (0.25, 0.25, 0.8)
 
 @pytest.fixture(scope="session")
 def plug_in(tmp_path_factory):
-    """A folder for PYTHONPATH with the example installed from a copy of it, by pip."""
     place = tmp_path_factory.mktemp("plug-in")
     shutil.copytree(PLUG_IN, place / "source", ignore=shutil.ignore_patterns("__pycache__"))
     subprocess.run(
@@ -130,7 +129,6 @@ def plug_in(tmp_path_factory):
 
 @pytest.fixture
 def here(plug_in, monkeypatch):
-    """The plug-in in this process."""
     monkeypatch.syspath_prepend(str(plug_in))
     yield
     for name in [name for name in sys.modules if name.startswith("bubblefit_extras")]:
@@ -138,7 +136,6 @@ def here(plug_in, monkeypatch):
 
 
 def run(plug_in, *command):
-    """Run Python beside a copy of the example's project, where only the installed plug-in is."""
     cwd = plug_in.parent / "source"
     path = os.pathsep.join([str(plug_in), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(

@@ -63,7 +63,6 @@ assert not place.exists()
 
 
 def without(program, folder, *arguments):
-    """Return what a program prints in an interpreter that lacks the names of `WITHOUT`."""
     site = folder / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(WITHOUT)

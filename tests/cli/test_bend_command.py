@@ -1,10 +1,8 @@
 """`bubblefit bend` and `simulate bend` as a user runs them."""
 
-import json
 import os
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pandas as pd
 import pytest
@@ -40,7 +38,6 @@ def formula(monkeypatch, tmp_path_factory):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Without figures and page, which take the longest and are looked at elsewhere."""
     monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: folder)
 
@@ -98,47 +95,6 @@ def test_the_files_of_a_study_agree(study, golden):
         assert row["rms_relative"] == pytest.approx(row["rms_N"] / load.max())
     assert table.loc["high", "rms_N"].isna().all()
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
-
-
-def test_the_record_the_page_and_the_beams(study):
-    out, _ = study
-    record = json.loads((out / "provenance.json").read_text())
-    (run,), (file,) = record["runs"], record["data"]
-    project = out.parent / "project.toml"
-    assert run["command_line"] == ["bubblefit", "bend", str(project), "--out", "out"]
-    assert file["rows_used"] == 14
-    assert file["rows_dropped"] == {"after the largest deflection": 2}
-    assert file["units"]["load"] == "kg" and file["columns"]["load"] == "mass_kg"
-    page = (out / "report.html").read_text()
-    assert file["sha256"][:12] in page and "made up" in page
-    names = [f"{case}-{kind}.png" for case in ("150-mm-90-kPa", "high")
-             for kind in ("load", "gas", "beam")]  # fmt: skip
-    for name in (*names, "all-loads.png"):
-        # Loads are charts on the page, and pictures beside it.
-        assert (f'title="figures/{name}"' in page) == ("load" not in name)
-        assert (out / "figures" / name).read_bytes().startswith(b"\x89PNG")
-    beam = meshio.read(out / "beams" / "high-stiff.vtu")
-    assert beam.points[:, 0].min() == pytest.approx(-beam.points[:, 0].max())
-    assert beam.points[:, 2].min() == pytest.approx(-beam.points[:, 2].max())
-    u = beam.point_data["displacement"] - beam.point_data["inflated_displacement"]
-    middle = np.abs((beam.points - beam.point_data["displacement"])[:, 2]) < 1e-9
-    np.testing.assert_allclose(u[middle], np.tile([0, -240, 0], (middle.sum(), 1)), atol=1e-9)
-    strain = beam.cell_data["inflated_log_strain_1_2_12"][0]
-    assert strain[:, 1].max() == pytest.approx(np.log1p(0.14 * 75 / 0.81 / 150), rel=1e-3)
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_tests_and_cards_are_picked(tmp_path, formula):
-    project = write_project(tmp_path)
-    write_card(MaterialCard(HypoelasticLaw.linear(700.0, 150.0, 20.0), 0.9), tmp_path / "mine.toml")
-    done = bend(project, "--out", "out", "--test", "high", "--card", "stiff", "--card", "mine.toml",
-                "--json", cwd=tmp_path)  # fmt: skip
-    assert json.loads(done.stdout) == result_in(tmp_path / "out") and done.stderr == ""
-    runs = result_in(tmp_path / "out")["runs"]
-    assert [(r["test"], r["card"]) for r in runs] == [("high", "stiff"), ("high", "mine")]
-    assert formula.read_text() == ".."
-    other = "fitted for a thickness of 0.9 mm, this is 0.81 mm"
-    assert [any(other in note for note in r["warnings"]) for r in runs] == [False, True]
 
 
 BAD = [

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.materials.designers import DesignersConstants
-from bubblefit.reports.content import read_page_data
 
 from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows
 from ..commands import in_process, one_line, result_in
@@ -62,36 +61,6 @@ def test_the_usual_constants_are_those_of_the_last_cycles(folder, golden):
     wanted = 100 * LAST.strain([[28.0, 14.0]])[0]
     assert row.fill_strain_change_percent == pytest.approx(wanted[1])
     assert (out / "constants.png").is_file()
-
-
-def test_the_page_begins_with_the_constants_and_is_made_again(folder, tmp_path):
-    out = tmp_path / "out"
-    said = in_process("biaxial", "project.toml", "--out", out, cwd=folder).stdout
-    assert f"page: {out / 'report.html'}" in said
-    page = read_page_data(out)
-    assert "E warp 800 kN/m" in page.summary and "nu_fill 0.5" in page.summary
-    constants, standard = page.sections[0].parts
-    by_name = {row[0]: row[1:] for row in constants.rows}
-    assert by_name["E fill"][:2] == ["kN/m", pytest.approx(640)]
-    assert by_name["E fill"][4:] == [pytest.approx(400, rel=0.2), pytest.approx(640)]
-    assert by_name["A warp fill"][1] == pytest.approx(400)
-    table = pd.read_csv(out / "en-17117.csv")
-    assert len(table) == len(standard.rows) == 6 and len(table.columns) == len(standard.header)
-    both = table[table.ratio == "1:1"].iloc[0]
-    assert (both.load_cycles, both.cycle_evaluated, both.warp_from_kN_per_m) == (3, 3, 2.0)
-    wanted = 28.0 / LAST.strain([[28.0, 28.0]])[0]
-    assert both.warp_stiffness_kN_per_m == pytest.approx(wanted[0])
-    assert both.fill_stiffness_kN_per_m == pytest.approx(wanted[1])
-    assert (both.warp_strain_kept_percent, both.fill_strain_kept_percent) == (
-        pytest.approx(0.09), pytest.approx(0.15)
-    )  # fmt: skip
-    pulled = table[table.ratio == "1:0"].iloc[0]
-    assert pulled.fill_poisson == pytest.approx(0.5) and np.isnan(pulled.fill_stiffness_kN_per_m)
-    every = table.iloc[-1]
-    assert (every.ratio, every.load_cycles, every.warp_poisson) == ("all", 15, pytest.approx(0.4))
-    first = (out / "report.html").read_text(encoding="utf-8")
-    in_process("report", out, cwd=tmp_path)
-    assert (out / "report.html").read_text(encoding="utf-8") == first
 
 
 def test_the_options_choose_what_is_evaluated(folder, tmp_path):

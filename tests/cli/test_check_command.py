@@ -12,8 +12,7 @@ from bubblefit.experiments.registry import kinds
 from bubblefit.files import THREADS
 from bubblefit.reports.content import read_page_data
 from bubblefit.runs import fit as fits
-from bubblefit.runs.fit import check, expected_of
-from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.fit import check
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..camera import camera_project
@@ -23,8 +22,7 @@ from ..experiments.biaxial.test_biaxial_fit import TRAPS as BIAXIAL_TRAPS
 from ..experiments.bubble.test_bubble_doubts import OF_OWN_TESTS as BUBBLE_TESTS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
-from ..places import EXAMPLES, ROOT
-from ..projects import small
+from ..places import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -151,34 +149,6 @@ def test_what_is_trusted_passes_and_is_kept(folder):
     text = (folder / "flipped.toml").read_text()
     (folder / "t.toml").write_text(text.replace("[fit]", '[fit]\ntrust = ["axis-flipped"]'))
     in_process("bubble", "t.toml", "--starts", 1, "--resume", "--out", "t", cwd=folder)
-
-
-def test_what_is_expected_comes_from_the_bounds(tmp_path):
-    project = bf.read_project(small(tmp_path))
-    expected = expected_of(prepare_fit(project, [project.tests["bubble"]])).moduli
-    assert expected["E1"] == pytest.approx((250.0, 1500.0))
-    assert expected["E2"] == pytest.approx((50.0, 500.0))
-    assert expected["G12"] == pytest.approx((7.0, 70.0))
-    strips = bf.read_project(EXAMPLES / "uniaxial-valmex7318" / "project.toml")
-    expected = expected_of(prepare_fit(strips, [strips.tests["strips"]])).moduli
-    assert expected["E2"] == pytest.approx((20.0, 1000.0))
-
-
-def test_choices_and_the_travel_of_the_machine_are_listed(tmp_path):
-    text = (EXAMPLES / "uniaxial-valmex7318" / "project.toml").read_text()
-    files = '[strips.warp]\ngauge_length = 20.0\n\n[strips.data]\nfiles = { warp = ["w.csv"] }'
-    text = text.replace('[strips.data]\npolynomials = "curves.csv"', files)
-    (tmp_path / "p.toml").write_text(text.replace("# strain_range", "strain_range"))
-    rows = "".join(f"{3 * k},{0.3 * k},{100 * k}\n" for k in range(9))
-    for head in ("Axial Displacement,Extensometer", "Axial Displacement,Temperature"):
-        (tmp_path / "w.csv").write_text(f"{head},Axial Force\nmm,mm,N\n{rows}")
-        out = in_process("check", "p.toml", "--json", "--out", "c", cwd=tmp_path)
-        told, page = json.loads(out.stdout), (tmp_path / "c" / "report.html").read_text()
-        names = [doubt["name"] for doubt in told["tests"]["strips"]]
-        (choice,) = told["choices"]["strips"] or [""]
-        assert ("not 'Axial Displacement'" in choice) == ("Extensometer" in head)
-        assert ("grip-travel" in names) == ("Extensometer" not in head)
-        assert "Axial Displacement" in page
 
 
 def test_the_document_lists_every_doubt_and_its_limits():

@@ -61,8 +61,6 @@ def test_the_table_is_whole():
 
 
 class Stage:
-    """A folder with a project whose solver fails."""
-
     def __init__(self, folder, fault, solver, command, real):
         self.folder, self.command, self.solver = folder, command, solver
         text = {"bubble": BUBBLE, "uniaxial": strips(), "bend": HEAD + BEND}[command]
@@ -96,7 +94,6 @@ class Stage:
         return len(path.read_text().splitlines()) if path.exists() else 0
 
     def monotonic(self):
-        """A clock that has gone far beyond every time limit when the program is at rest."""
         return time.monotonic() + (1e6 if (self.place / "pids").exists() else 0.0)
 
     def run(self, *more, code):
@@ -107,14 +104,12 @@ class Stage:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    """One run that fails ends a start, and nothing is drawn."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     monkeypatch.setattr(correction, "MOST_SHORTER", 0)
     monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
 
 
 def of(text):
-    """A reason of the table, in which N is any number and ... anything."""
     found = re.escape(text).replace(r"\.\.\.", ".*?")
     return re.compile(re.sub(r"\bN\b", r"[0-9.]+", found))
 

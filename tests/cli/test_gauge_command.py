@@ -108,27 +108,6 @@ def test_from_pictures_to_a_project(tmp_path, golden):
     assert read["warp"].final_length == pytest.approx(LENGTH * STRETCHES[10])
 
 
-LOADS_OF_FRAMES = [
-    ("Load (kN)\n{}\n", ""),
-    ("picture;Kraft in kN\n{}\n", "7;"),
-    ("Load cell,30,kN\nTime,Extension,Load\n(s),(mm),(kN)\n{}\n", "0.1,0.2,"),
-]
-
-
-@pytest.mark.parametrize(("text", "before"), LOADS_OF_FRAMES)
-def test_one_load_a_frame(strip, tmp_path, text, before):
-    loads = np.linspace(0, 1.5, 12)
-    rows = "\n".join(f"{before}{load!r}" for load in loads.tolist())
-    machine, out = tmp_path / "loads.csv", tmp_path / "F-3.csv"
-    machine.write_text(text.format(rows.replace(".", ",") if ";" in text else rows))
-    run = ("--loads", machine, "--direction", "weft", "--out", out)
-    gauge(strip / "frames" / "f*.csv", *GAUGE, *run)
-    table = read_curve(out)
-    np.testing.assert_allclose(table["load_N"], 1e3 * loads)
-    assert set(table["specimen"]) == {"F-3"} and set(table["direction"]) == {"fill"}
-    np.testing.assert_allclose(table["strain"], STRETCHES - 1, atol=1e-9)
-
-
 def test_times_from_a_file_on_another_clock(strip, tmp_path):
     """The camera starts 0.25 s after the machine and counts milliseconds."""
     times = tmp_path / "pictures.csv"
@@ -139,37 +118,6 @@ def test_times_from_a_file_on_another_clock(strip, tmp_path):
           "--direction", "warp", "--out", out)  # fmt: skip
     expected = load_at(0.4 * np.arange(12) + 0.25)
     np.testing.assert_allclose(read_curve(out)["load_N"], expected, rtol=1e-12)
-
-
-def test_named_columns_flags_and_metres(strip, tmp_path):
-    names = "X,Y,Z,U,V,W"
-    files = write_frames(tmp_path / "m", header=names, scale=1e3)
-    for file in files:
-        first, *rest = file.read_text().splitlines()
-        # The flagged row would put a point of no meaning beside the gauge.
-        flagged = "0.0123,0.0401,9,9,9,9,1"
-        file.write_text("\n".join([f"{first},mask", *(f"{line},0" for line in rest), flagged]))
-    columns = "x=X, y=Y,z=Z,dx=U,dy=V,dz=W"
-    gauge(*files, *GAUGE, "--columns", columns, "--flag-column", "mask", "--length-unit", "m",
-          "--out", tmp_path / "a.csv")  # fmt: skip
-    gauge(strip / "frames/f*.csv", *GAUGE, "--out", tmp_path / "b.csv")
-    a, b = read_curve(tmp_path / "a.csv"), read_curve(tmp_path / "b.csv")
-    np.testing.assert_allclose(a["length_mm"], b["length_mm"], rtol=1e-12)
-
-
-def test_several_specimens_by_direction(strip, tmp_path):
-    for name, direction in (("w1", "warp"), ("w2", "warp"), ("b1", "bias")):
-        gauge(strip / "frames/f*.csv", *GAUGE, "--loads", strip / "machine.csv",
-              "--frame-interval", 0.5, "--direction", direction,
-              "--out", tmp_path / f"{name}.csv")  # fmt: skip
-    (tmp_path / "fill.csv").write_bytes((strip / "machine.csv").read_bytes())
-    data = 'files = { warp = ["w1.csv", "w2.csv"], fill = ["fill.csv"], bias = ["b1.csv"] }'
-    ends = "\n".join(f"[strips.{d}]\ngauge_length = 20.0" for d in ("warp", "fill", "bias"))
-    project = tmp_path / "project.toml"
-    project.write_text(PROJECT.format(sections=ends, data=data))
-    strips = read_project(project).tests["strips"].strips
-    found = {d: [c.specimen for c in s.curves] for d, s in strips.items()}
-    assert found == {"warp": ["w1", "w2"], "fill": ["fill"], "bias": ["b1"]}
 
 
 def test_nothing_is_written_over_least_of_all_data(strip, tmp_path):
@@ -297,13 +245,6 @@ def test_errors_of_the_radius_are_those_of_the_thesis(folder):
     assert out.with_suffix(".png").stat().st_size > 20_000
     # Nothing is written over.
     one_line(in_process(*run, "--out", out, cwd=folder, code=2), str(out), "--overwrite")
-
-
-def test_the_table_on_the_terminal(folder, golden):
-    run = ("dic", "sphere", "ball1.csv", "ball3.csv", "--radius", 40)
-    golden("dic-sphere", in_process(*run, cwd=folder).stdout, folder)
-    alone = in_process("dic", "sphere", "ball1.csv", cwd=folder).stdout
-    assert "off" not in alone and len(alone.splitlines()) == 2
 
 
 def test_bad_balls_are_one_line(folder):

@@ -34,7 +34,6 @@ COMMANDS = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A project of strips with constant moduli, and the folder of its fit."""
     folder = tmp_path_factory.mktemp("golden")
     constant_strips(folder)
     in_process("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1, cwd=folder)

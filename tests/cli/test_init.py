@@ -8,17 +8,13 @@ import jsonschema
 import pytest
 from bubblefit.cli import start
 from bubblefit.cli.start import KINDS
-from bubblefit.experiments.bubble.registration import RegistrationOptions
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import SHIPPED, parse, project_schema
 from click.testing import CliRunner
 
 from ..commands import in_process, one_line
-from ..places import EXAMPLES, KNOWN, ROOT
+from ..places import KNOWN, ROOT
 from ..projects import changed
-
-FIRST = "#:schema ../../templates/project/project.schema.json\n"
-PROJECTS = [path for path in sorted(EXAMPLES.glob("*/*.toml")) if "[fabric]" in path.read_text()]
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +32,6 @@ def test_the_command_writes_it(tmp_path):
     assert (tmp_path / "s.json").read_text() == printed
 
 
-def test_examples_are_valid_and_name_it(schema):
-    for path in PROJECTS:
-        if path.parent.name != "plug-in":
-            text = path.read_text()
-            assert text.startswith(FIRST) and (path.parent / FIRST.split()[1]).resolve() == SHIPPED
-            schema.validate(tomllib.loads(text))
-
-
 def test_it_finds_what_bubblefit_finds(schema):
     text = KNOWN.read_text()
     for old, new in (
@@ -57,17 +45,6 @@ def test_it_finds_what_bubblefit_finds(schema):
         ("[fit]\n", "[defaults.balloon]\nradius = 1.0\n[fit]\n"),
     ):
         assert not schema.is_valid(tomllib.loads(changed(text, (old, new)))), new
-
-
-def test_what_a_kind_has_in_common_may_stand_once(schema):
-    schema.validate(
-        {
-            "fabric": {"thickness": 1},
-            "defaults": {"cylinder": {"diameter": 150}},
-            "cylinder": [{"pressure": 90}, {"pressure": 110, "gas": {"ambient": 100}}],
-            "solver": {"membrane": {"wrinkle_stiffness": 0.001}, "of a plug-in": {"any": 1}},
-        }
-    )
 
 
 def test_every_example_brings_the_schema(tmp_path):
@@ -137,27 +114,6 @@ def test_what_is_commented_may_be_wanted(tmp_path, schema):
         path.write_text(uncommented(lines, wanted))
         parse(path)
         schema.validate(tomllib.loads(path.read_text()))
-
-
-def test_registration_and_pressures_of_own_tests(tmp_path):
-    own("--bubble", 1, cwd=tmp_path)
-    path = tmp_path / "mine" / "project.toml"
-    lines = path.read_text().splitlines()
-    first = lines.index("# [bubble.data.points.registration]")
-    last = lines.index("", first)
-    marks = next(n for n in range(first, last) if "warp_points" in lines[n])
-    path.write_text(uncommented(lines, {*range(first, last)} - {marks}))
-    found = read_project(path, need_data=False).tests["bubble"].data.registration
-    assert found == RegistrationOptions(centre=(0.0, 0.0, 0.0), warp=0.0)
-
-
-def test_numbers_of_own_tests(tmp_path):
-    own("--bubble", 1, "--radius", 90, "--pressures", "10,25.5,60", "--cylinder", 1,
-        "--diameter", 200, "--pressure", 80, cwd=tmp_path)  # fmt: skip
-    tests = read_project(tmp_path / "mine" / "project.toml", need_data=False).tests
-    assert tests["bubble"].radius == 90.0
-    assert tests["bubble"].pressures == pytest.approx((0.010, 0.0255, 0.060))
-    assert tests["cylinder"].models()["cylinder"].pressure == pytest.approx(0.08)
 
 
 def test_own_mistakes_end_in_one_line(tmp_path):

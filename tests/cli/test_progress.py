@@ -9,14 +9,12 @@ import pytest
 from bubblefit import files
 from bubblefit.cli import terminal
 from bubblefit.cli.main import main
-from bubblefit.cli.progress import COMPILING, SeriesProgress, StudyProgress
+from bubblefit.cli.progress import COMPILING, StudyProgress
 from bubblefit.cli.terminal import EVENTS, Events
-from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group
 
 from ..commands import every_command, in_process, one_line
-from ..projects import BUBBLE
 
 ENDED = StartRecord(1, (1, 1), 0.25, "done", 1, (), (), 0.1)
 
@@ -27,7 +25,6 @@ def analysis(start, objective):
 
 @pytest.fixture
 def clock(monkeypatch):
-    """Lets so many seconds pass."""
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
 
@@ -70,17 +67,6 @@ def test_elsewhere_than_on_a_terminal_a_plain_line_a_minute(clock, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_a_series_says_where_it_is_too(clock, capsys):
-    for quiet in (False, True):
-        shown = SeriesProgress(quiet)
-        shown.saw(Step("bubble", 1, 3, 2, 7))
-        clock(61.0)
-        shown.saw(Step("bubble", 2, 3, 3, 7))
-        shown.saw(Step("bubble", 2, 3, 4, 7))
-        said = "" if quiet else "analysis 2 of 3, bubble: increment 3 of 7\n"
-        assert capsys.readouterr() == ("", said)
-
-
 def test_compilation_is_announced_until_kernels_are_kept(tmp_path, monkeypatch, capsys):
     def said(quiet):
         with StudyProgress(1, quiet):
@@ -99,23 +85,6 @@ def told(path):
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert [line["seconds"] for line in lines] == sorted(line["seconds"] for line in lines)
     return lines
-
-
-def test_a_fit_tells_its_starts_and_its_end(tmp_path):
-    (tmp_path / "p.toml").write_text(BUBBLE)
-    run = ("fit", "p.toml", "--out", "out", "--starts", 2, "--jobs", 1, "--json", "--events", "e")
-    done = in_process(*run, "--fail-above", 1, cwd=tmp_path)
-    begin, *progress, end = told(tmp_path / "e")
-    assert end == {**end, "event": "end", "exit_code": 0, "error": None}
-    assert begin["event"] == "begin" and begin["command"].endswith(" fit")
-    assert {one["event"] for one in progress} == {"progress"}
-    assert {one["what"] for one in progress} == {"tests to read", "starts"}
-    assert [one["done"] for one in progress][-1] == progress[-1]["total"] == 2
-    assert json.loads(done.stdout)["objective"] < 1
-    # It is there already: a line for people and one for machines.
-    done = in_process(*run, cwd=tmp_path, code=2)
-    begin, *_, end = told(tmp_path / "e")
-    assert end["exit_code"] == 2 and "already holds" in end["error"] and not done.stdout
 
 
 def test_every_end_is_told(tmp_path):

@@ -25,7 +25,6 @@ def report(*arguments, code=0):
 
 @pytest.fixture
 def folder(tmp_path):
-    """An output folder with a page."""
     path = tmp_path / "one"
     path.mkdir()
     drawn(path)

@@ -1,6 +1,5 @@
 """`bubblefit study` as a user runs it: files, lines, levels that fail, bad input."""
 
-import json
 import re
 import shutil
 
@@ -10,9 +9,8 @@ import pytest
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 
-from ..commands import in_process, one_line, result_in
-from ..cylinder_cases import STUDIED_PROJECT
-from ..drawings import check_convergence, data, shown
+from ..commands import in_process, result_in
+from ..drawings import check_convergence
 from ..places import EXAMPLES, KNOWN
 from ..projects import project_file
 from ..published_laws import TABLE_4_2
@@ -76,49 +74,12 @@ def test_mesh_of_a_bubble(bubble, drawn, golden):
     assert "--overwrite" in study(*run, cwd=bubble, code=2)
 
 
-def test_increments_of_strips(strips):
-    done = study("mesh", "--what", "increments", "--levels", 3, "--json", cwd=strips)
-    result = json.loads(done)
-    assert result == result_in(strips / "out" / f"{strips.name}-increments")
-    for name in ("warp", "fill"):
-        model = result["models"][name]
-        assert [level["increments"] for level in model["levels"]] == [10, 20, 40]
-        # The mean of a modulus over an increment is exact where strain follows the elongation.
-        assert "accuracy" in model["quantities"]["load at the end, N"]["remark"]
-        assert model["rms_N"]["order"] is None
-        assert max(model["rms_N"]["to_next_finer"]) < 1e-6 * model["rms_N"]["largest_load"]
-
-
 def test_nothing_that_ends_well_is_exit_code_4(bubble):
     card = MaterialCard(HypoelasticLaw(1000 * np.array([*TABLE_4_2[:11], -0.1])), 0.81)
     write_card(card, bubble / "bad.toml")
     for command in ("mesh", "nu12"):
         done = study(command, cwd=bubble, code=4, card="bad.toml")
         assert len(done.splitlines()) == 1 and not (bubble / "out").exists()
-
-
-def test_nu12_of_a_bubble(bubble, golden):
-    done = study("nu12", "--out", "out", cwd=bubble)
-    result = result_in(bubble / "out")
-    last = result["models"]["bubble"]["responses"]["300 kPa"]
-    assert result["base_nu12"] == 0.24 and last["nu12"] == [0.05, 0.15, 0.25, 0.35, 0.45]
-    assert last["to_base"] == sorted(last["to_base"], reverse=True)
-    assert np.mean(last["to_mean"]) == pytest.approx(1.0)
-    assert len(pd.read_csv(bubble / "out/nu12.csv")) == 7 * 5
-    assert (bubble / "out/nu12.png").stat().st_size > 10_000
-    golden("study-nu12", done, bubble)
-    assert result["models"]["bubble"]["failed"] == {}
-
-
-def test_chosen_values_of_nu12(strips):
-    study("nu12", "--nu12", 0.3, "--nu12", 0, "--out", "out", cwd=strips)
-    models = result_in(strips / "out")["models"]
-    assert set(models) == {"warp", "fill", "bias"}
-    for model in models.values():
-        (response,) = model["responses"].values()
-        assert response["nu12"] == [0.0, 0.3]
-    done = study("mesh", "--levels", 8, "--coarser", 6, cwd=strips, code=2)
-    assert "come out the same" in done
 
 
 BAD = [
@@ -144,50 +105,3 @@ def test_bad_input_ends_in_one_line(bubble):
         done = study("mesh", cwd=bubble, code=2)
         assert words in done and "project.toml" in done and len(done.splitlines()) == 1
     assert not (bubble / "out").exists()
-
-
-@pytest.fixture
-def cylinders(tmp_path):
-    path = tmp_path / "project.toml"
-    path.write_text(STUDIED_PROJECT)
-    return path
-
-
-def of_cylinders(name, *arguments, cwd, code=0):
-    return in_process("study", name, "project.toml", *arguments, cwd=cwd, code=code)
-
-
-def test_increments_of_a_cylinder_converge(cylinders, drawn):
-    run = ("mesh", "--card", "known", "--test", "narrow", "--what", "increments", "--levels", 3)
-    done = of_cylinders(*run, "--out", "out", cwd=cylinders.parent)
-    result = result_in(cylinders.parent / "out")
-    assert list(result["models"]) == ["narrow"] and result["card"] == "known"
-    found = result["models"]["narrow"]["quantities"]
-    # The mean of a modulus over an increment leaves next to nothing to the increments.
-    for quantity in found.values():
-        assert abs(quantity["own_error"]) < 2e-6
-    coarse, fine = result["models"]["narrow"]["rms_N"]["to_next_finer"]
-    assert coarse / fine == pytest.approx(4.0, abs=0.2)  # second order
-    # Sideways radius, volume, stiffness, load at 40 mm and RMS: each has its line.
-    table = pd.read_csv(cylinders.parent / "out/convergence.csv")
-    rms = result["models"]["narrow"]["rms_N"]
-    check_convergence(drawn[-1], table, "increments", rms)
-    names = {*found, "RMS along the load curve"}
-    assert {s.name for s in drawn[-1].charts[0].series[:-2]} == names
-    assert "load at 40 mm" in done.stdout
-    run = ("mesh", "--card", "known", "--coarser", 3, "--out", "no")
-    one_line(of_cylinders(*run, cwd=cylinders.parent, code=2), "size: expected at most the radius")
-
-
-def test_nu12_of_all_cylinders(cylinders, drawn):
-    of_cylinders("nu12", "--card", "known", "--nu12", 0.4, "--out", "out", cwd=cylinders.parent)
-    models = result_in(cylinders.parent / "out")["models"]
-    assert list(models) == ["narrow", "wide"]
-    for model in models.values():
-        assert list(model["responses"]) == ["load at 40 mm, N"]
-    for axes, (name, model) in zip(drawn[-1].charts, models.items(), strict=True):
-        response = model["responses"]["load at 40 mm, N"]
-        wanted = [response["nu12"], response["to_base"]]
-        np.testing.assert_allclose(data(axes)[0], wanted, rtol=1e-5)
-        assert shown(axes)[::2] == ("nu12", name)
-    assert drawn[-1].charts[0].y_label == "load / that at nu12 = 0.24"

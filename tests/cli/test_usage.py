@@ -55,7 +55,6 @@ def test_what_was_mistyped_is_one_line_as_any_bad_input(typed, said):
 
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory):
-    """Two examples, a card, a file, an empty file and an empty folder."""
     place = tmp_path_factory.mktemp("desk")
     for name in ("known", "uniaxial", "biaxial", "bend"):
         in_process("init", name, "--example", name, cwd=place)
@@ -185,7 +184,6 @@ def test_the_help_of_every_command_has_examples_that_can_be_typed(name):
 
 
 def parse(line):
-    """Raises click's own error where the line cannot be."""
     command = main
     ctx, words = None, shlex.split(line)[1:]
     while True:

@@ -152,20 +152,6 @@ def test_gitlab_says_the_same():
     assert job["artifacts"]["paths"] == ["out", "result.json", "events.jsonl", "moduli.csv"]
 
 
-def test_the_image_starts_the_command(environment):
-    text = (BATCH / "Containerfile").read_text()
-    words = dict(re.findall(r"^(ENTRYPOINT|CMD|USER|ENV|FROM) (.*)$", text, flags=re.M))
-    assert words["USER"] == "fabric" and words["FROM"].endswith("-slim")
-    given = dict(part.split("=") for part in words["ENV"].split())
-    assert given.pop("BUBBLEFIT_CACHE") == "/cache"
-    entry, usual = json.loads(words["ENTRYPOINT"]), json.loads(words["CMD"])
-    done = subprocess.run([*entry, *usual], env={**environment, **given}, capture_output=True)
-    assert done.returncode == 0 and b"Usage: bubblefit" in done.stdout
-    # The command that its head says, less the engine's own part.
-    head = " ".join(line[1:] for line in text.splitlines() if line.startswith("#"))
-    assert options_of(re.search(r"bubblefit \\ +(fit .*?1e-3)", head)[1].split())["out"]
-
-
 def test_blanks_umlauts_no_home_and_a_read_only_project(tmp_path, environment):
     folder, out = tmp_path / "nur lesen ü", tmp_path / "aus ß"
     folder.mkdir()

@@ -45,7 +45,6 @@ NEAR = np.array([15.0, 190.0, 330.0])
 
 @cache
 def reference():
-    """What the known law does."""
     return MembraneSolver(1e-10).run(MODEL, LAW)
 
 
@@ -65,7 +64,6 @@ def problem(unknowns=CUBIC, noise=0.0, normalise="e", **other):
 
 
 def single(model, solver, law, objective, unknowns, **other):
-    """A fit to one bubble test."""
     nuisance = unknowns.nuisance.comparisons.get("bubble", ())
     comparison = Comparison("bubble", model, solver, objective, nuisance)
     return FitProblem((comparison,), law, unknowns, **other)
@@ -94,7 +92,6 @@ def levenberg_marquardt(fit, start, tolerance, most):
 
 
 def clean_fit(model, law, unknowns, shift=0.0, parameters=None):
-    """A fit to what a law shows on a model, shifted, with parameters of the model."""
     fields = MembraneSolver(1e-10).run(model.with_parameters(parameters or {}), law).displacement
     pairs = zip(model.pressures, fields, strict=True)
     data = [FieldTarget(p, u + shift) for p, u in pairs]

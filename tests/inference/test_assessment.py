@@ -7,7 +7,6 @@ import pytest
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.assessment import (
     BOUND,
-    Certainty,
     _on_bounds,
     certainty,
     moduli_error,
@@ -36,7 +35,6 @@ from scipy.ndimage import gaussian_filter
 
 from .cases import (
     CONSTANT,
-    CUBIC,
     LAW,
     MODEL,
     PRESSURES,
@@ -122,30 +120,6 @@ def test_what_the_data_never_reach_is_not_certain():
     shear = sure.sigma["G12"]
     assert shear[0] < 1.0 and shear[-1] > 5.0
     assert any(words.startswith("G12 is uncertain") for words in sure.undetermined)
-
-
-def test_words_name_what_lies_on_its_bound():
-    fit = problem(replace(CUBIC, nuisance=NuisanceOf({"bubble": (PRESSURE,)})))
-    y = fit.unknowns.at(np.where(np.arange(12) == 0, CUBIC.box[1], LAW.beta))
-    y[12] = PRESSURE.lower
-    words = certainty(fit, fit.evaluate(y, True), LAW, REACHED).undetermined
-    assert "beta_0 lies on its upper bound" in words
-    assert "pressure_offset lies on its lower bound" in words
-    tight = LawBounds.of_moduli({"E1": (20.0, 400.0), "E2": (250.0, 900.0), "G12": (0.5, 200.0)})
-    fit = flat(replace(CONSTANT, bounds=tight))
-    words = certainty(fit, evaluated(fit), FLAT_LAW, REACHED).undetermined
-    assert "E1 touches its upper bound: the data ask for more stiffness" in words
-    assert "E2 touches its positivity margin: the data ask for less stiffness" in words
-
-
-def test_noise_and_mesh_together():
-    sigma = {"E1": np.array([0.3, 0.5]), "E2": np.array([0.1, 0.1])}
-    mesh = {"E1": np.array([-0.4, 1.2]), "E2": np.array([0.0, 0.0])}
-    alone = Certainty({}, {}, sigma, ())
-    assert alone.total == sigma
-    together = replace(alone, mesh=mesh).total
-    assert together["E1"].tolist() == pytest.approx([0.5, 1.3])
-    assert together["E2"].tolist() == pytest.approx([0.1, 0.1])
 
 
 def test_bounds_are_touched_within_a_millionth_of_their_width():

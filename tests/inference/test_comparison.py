@@ -37,7 +37,6 @@ OTHER = BubbleModel(disk_mesh(80.0, 96, "quarter"), 0.81, [0.06, 0.15])
 
 
 def comparison(name, model, *nuisance, **other):
-    """Data of the known law, a little disturbed."""
     fields = MembraneSolver(TIGHT).run(model, LAW).displacement
     fields = fields + 0.02 * np.random.default_rng(5).standard_normal(fields.shape)
     return Comparison(name, model, MembraneSolver(TIGHT), to(model, fields), nuisance, **other)
@@ -115,8 +114,6 @@ def test_both_offsets_and_the_law_are_found():
 
 
 class Plain:
-    """A solver without derivatives, which is given a model, not an offset."""
-
     name, external = "plain", True
 
     def run(self, model, law, *unused):
@@ -185,7 +182,6 @@ STRIP = straight_strip("fill", 22.78, 27.0, 0.8, increments=5)
 
 
 def shared_fit(*shared, law=LAW):
-    """A bubble with offsets of its own, and a strip along the fill, with data of a law."""
     solver = MembraneSolver(TIGHT)
     bubble = to(BUBBLE, solver.run(BUBBLE, law).displacement)
     loads = solver.run(STRIP, law).load
@@ -246,7 +242,6 @@ def test_only_moduli_times_thickness_is_known(thickness_change):
 
 
 def evaluated(fit, nuisance=None):
-    """The evaluation at the law, with its derivatives, and the posterior there."""
     y = fit.unknowns.at(LAW.beta)
     if nuisance:
         y[12:] = nuisance

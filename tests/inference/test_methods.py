@@ -37,7 +37,6 @@ from bubblefit.inference.unknowns import (
     coefficients_at,
     dimensions,
 )
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs import best as budget
@@ -49,13 +48,11 @@ from ..complaints import complaint
 from .cases import (
     CONSTANT,
     CUBIC,
-    EVERYTHING,
     LAW,
     MODEL,
     NEAR,
     PRESSURES,
     Failing,
-    clean_fit,
     levenberg_marquardt,
     problem,
     reference,
@@ -77,8 +74,6 @@ def test_the_number_of_analyses_is_a_limit_and_failures_give_none(method):
 
 
 class Halving:
-    """Towards the first unknowns that fit better, by half a step whenever they do not."""
-
     needs_slope = False
 
     def minimise(self, problem, start, options):
@@ -172,23 +167,6 @@ def test_fits_that_meet_instability_get_past_it(seed, number):
     assert optimum is not None and optimum.value < 1e-6 and optimum.best.stable
 
 
-def test_linear_orthotropic_constants_are_recovered():
-    fit = clean_fit(MODEL, HypoelasticLaw.linear(400.0, 250.0, 12.0), CONSTANT)
-    for number in range(3):
-        fit.reset()
-        optimum = levenberg_marquardt(fit, feasible_start(fit, 7, number), 1e-7, 60)
-        assert optimum.value < 1e-6
-        assert optimum.coefficients == pytest.approx([12.0, 250.0, 400.0], rel=1e-5)
-
-
-def test_offsets_are_recovered_with_the_moduli():
-    shift, offset = np.array([0.0, 0.0, 0.8]), 0.002
-    fit = clean_fit(MODEL, LAW, EVERYTHING, shift, {"pressure_offset": offset})
-    optimum = levenberg_marquardt(fit, feasible_start(fit, 1, 0), 1e-7, 100)
-    assert optimum.value < 1e-6
-    assert optimum.best.unknowns[12:] == pytest.approx([*shift, 1e3 * offset], abs=1e-4)
-
-
 def test_reweighting_lowers_e_on_noisy_data():
     """Least squares of the blocks is not the least e; the second stage goes on to that."""
     fit = problem(noise=0.1)
@@ -203,15 +181,6 @@ def test_reweighting_lowers_e_on_noisy_data():
     options = FitOptions("slsqp", max_analyses=fit.analyses + 80)
     polished = fit_from(fit, whole.best.unknowns, options)
     assert whole.value == pytest.approx(polished.value, rel=2e-3)
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_slsqp_with_exact_gradient_and_margin(number):
-    fit = problem()
-    optimum = fit_from(fit, feasible_start(fit, 1, number), FitOptions("slsqp", max_analyses=600))
-    assert optimum.value < 1e-5
-    a, c = CUBIC.inequalities
-    assert (a @ optimum.best.unknowns >= c - 1e-7).all()
 
 
 def test_differences_and_flags_improve_on_its_start():
@@ -339,7 +308,6 @@ NOISE, REFITS = 0.02, 40
 
 
 def noisy(number):
-    """Constants fitted to fields of cubics with noise."""
     random = np.random.default_rng(number)
     fields = reference().displacement
     fields = fields + NOISE * random.standard_normal(fields.shape)

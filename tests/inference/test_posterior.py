@@ -306,7 +306,6 @@ NO_DOUBT = [np.zeros(SIDE**2)] * BLOCKS
 
 
 def smooth_noise(random, width, size=0.02):
-    """Blocks of noise that is alike over a Gaussian of `width` steps."""
     fields = random.standard_normal((BLOCKS, SIDE, SIDE))
     if width:
         fields = np.array([gaussian_filter(one, width, mode="wrap") for one in fields])

@@ -53,15 +53,6 @@ def test_jacobian_against_finite_differences(unknowns):
         assert slope[j] == pytest.approx(e_slope, rel=1e-3, abs=1e-5 * np.abs(slope).max())
 
 
-def test_nuisance_parameters_do_what_they_say():
-    offset, shift = 0.003, np.array([0.2, -0.1, 1.0])
-    fit = clean_fit(MODEL, LAW, EVERYTHING, shift, {"pressure_offset": offset})
-    y = EVERYTHING.at(LAW.beta)
-    y[12:] = [*shift, 1e3 * offset]
-    assert fit.evaluate(y, False).value < 1e-7
-    assert EVERYTHING.nuisance_names == ("offset_x", "offset_y", "offset_z", "pressure_offset")
-
-
 def test_watch_hears_of_every_analysis():
     heard = []
     fit = problem(watch=lambda y, value, status, solver: heard.append((value, status)))

@@ -36,7 +36,6 @@ def circumradius(mesh):
 
 
 def section(mesh):
-    """Area of the whole cross-section at mid-span, by triangles to the axis."""
     x, y = mesh.points[mesh.node_sets["mid_span"], :2].T
     angle = np.sort(np.arctan2(x, -y))
     quarter = "symmetry_x" in mesh.node_sets

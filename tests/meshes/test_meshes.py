@@ -1,9 +1,6 @@
 """Meshes of disks, round and elliptic."""
 
 import builtins
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -178,19 +175,6 @@ def test_without_gmsh_the_message_says_what_to_do(monkeypatch, failure):
     for words in (str(failure), "pip install gmsh", "libglu1-mesa", 'generator = "blocks"'):
         assert words in str(caught.value)
     assert len(disk_mesh(RADIUS, 800, "quarter").quads) == 200
-
-
-def test_slow_packages_are_loaded_only_when_used():
-    """meshio is there from the start: `import bubblefit` teaches it to read .frd."""
-    code = (
-        "import sys, bubblefit.meshes.disk, bubblefit.readers.fields;"
-        " bubblefit.meshes.disk.disk_mesh(1.0, 12);"
-        " print([m for m in ('gmsh', 'pandas') if m in sys.modules])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1]
-    )
-    assert done.stdout.strip() == "[]", done.stderr
 
 
 @pytest.mark.parametrize("symmetry", ["full", "quarter"])

@@ -10,7 +10,7 @@ import pytest
 from bubblefit.experiments.bubble.registration import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
 from bubblefit.readers.formats import workbook as xlsx
-from bubblefit.readers.formats.machine_text import cells_of, find_blocks, find_header
+from bubblefit.readers.formats.machine_text import cells_of, find_blocks
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.tables import split_unit
@@ -480,24 +480,6 @@ NEEDED = ("elongation", "load")
 
 def rows(*texts: str) -> list[tuple[int, list[str]]]:
     return [(line, cells_of(text, ",")) for line, text in enumerate(texts, start=11)]
-
-
-@pytest.mark.parametrize(
-    ("texts", "index"),
-    [
-        (("Load,Extension", "1,2"), 0),
-        (("Load,Extension", "N,mm", "1,2"), 0),
-        (("Load,Extension", "N,mm", "of steel", "1,2"), 0),  # names without numbers: the first
-        (("Load,Extension", "a,b", "c,d", "Load,Extension", "1,2"), 3),
-        (("Load,Extension", "x,2", "1,y"), 0),  # each in one of the two rows
-        (("Load,Extension", "x,2", "y,3", "Load,Extension", "1,2"), 3),
-        (("Load and extension: all", "1,2"), None),
-        (("Load,Time", "1,2"), None),
-        (("1,2", "3,4"), None),
-    ],
-)
-def test_the_row_of_names(texts, index):
-    assert find_header(rows(*texts), {}, NEEDED) == index
 
 
 def blocks(*texts: str):

@@ -220,7 +220,6 @@ PRESSURES = [0.05, 0.1, 0.2]
 
 @pytest.fixture(scope="module")
 def frames():
-    """A bubble that is not symmetric, above a sheet that is not flat, with a rim that holds."""
     random = np.random.default_rng(7)
     r, angle = 100 * np.sqrt(random.uniform(0.001, 1, 60)), random.uniform(0, 2 * np.pi, 60)
     r[:10] = 100.0

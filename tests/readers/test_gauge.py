@@ -13,8 +13,6 @@ from bubblefit.experiments.strips.gauge import (
     PairedLoads,
     gauge_load_curve,
     loads_at_frames,
-    place_of,
-    triangulated,
     virtual_strain_gauge,
 )
 from bubblefit.readers.curves import LoadCurve, read_load_curves
@@ -216,22 +214,6 @@ def test_a_hole_and_how_wide_it_is():
         ([still, together], (2.0, 2.0), (8.0, 8.0), "gauge: the two ends meet in a frame"),
     ):
         assert words in complaint(virtual_strain_gauge, frames, lower, upper)
-
-
-def test_places_in_a_single_triangle():
-    points = np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 2.0], [0.0, 4.0, 3.0]])
-    surface = triangulated(Frame(points, np.array([[0.0, 0, 0], [0, 0, 4], [8, 0, 0]])))
-    assert surface is not None and np.median(surface.longest_edge()) == pytest.approx(np.sqrt(32))
-    for place, height, moved in (((1.0, 1.0), 1.75, [3, 1, 2.75]), ((2.0, 2.0), 2.5, [6, 2, 4.5])):
-        found = place_of(np.array(place), surface, 6.0)
-        np.testing.assert_allclose(found, [[*place, height], moved], atol=1e-12)
-    assert place_of(np.array([2.01, 2.0]), surface, 6.0) == "outside the correlated points"
-    assert "5.66 mm apart, allowed 5" in place_of(np.array([1.0, 1.0]), surface, 5.0)
-    nearly = Frame(points * [1, 0, 1], 0 * points)
-    assert triangulated(nearly) is None and triangulated(Frame(points[:2], 0 * points[:2])) is None
-    # The same places are triangulated once.
-    again = triangulated(Frame(points + np.array([0, 0, 5.0]), 0 * points), surface)
-    assert again is not None and again.mesh is surface.mesh
 
 
 FILES, ENDS = ("a.csv", "b.csv", "c.csv", "d.csv"), ((1.5, -10.0), (1.5, 10.0))

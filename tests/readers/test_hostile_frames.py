@@ -40,8 +40,6 @@ FRAMES = [(POINTS, 0.01 * POINTS[:, [1, 0, 2]] + 0.02)]
 
 
 class Planted:
-    """Unpickled, it leaves a file behind."""
-
     def __init__(self, path):
         self.path = path
 
@@ -136,28 +134,6 @@ def assert_same(read, value):
         np.testing.assert_array_equal(read, np.atleast_2d(value))
 
 
-@settings(deadline=None, max_examples=40)
-@given(
-    value=st.recursive(
-        st.one_of(
-            st.lists(st.floats(allow_nan=False), min_size=1, max_size=4).map(np.array),
-            st.lists(st.integers(-9, 9), min_size=4, max_size=4).map(
-                lambda n: np.array(n, dtype="i2").reshape(2, 2)
-            ),
-            st.lists(st.booleans(), min_size=1, max_size=3).map(np.array),
-            st.text("abc xyz", min_size=1, max_size=8).filter(str.strip),
-        ),
-        lambda inner: st.dictionaries(st.sampled_from("abcd"), inner, min_size=1, max_size=3),
-        max_leaves=6,
-    ),
-    compressed=st.booleans(),
-)
-def test_what_scipy_writes_is_read(tmp_path_factory, value, compressed):
-    path = tmp_path_factory.getbasetemp() / "round.mat"
-    savemat(path, {"value": value, "other": 1.0}, do_compression=compressed)
-    assert_same(read_variables(path, ["value"])["value"], value)
-
-
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
     (secret,) = dic_exports.istra4d(tmp_path, FRAMES)
     secret, path = secret.rename(tmp_path / "secret.hdf5"), tmp_path / "a.hdf5"
@@ -248,49 +224,6 @@ def test_every_type_of_numbers(kind, code):
     body = struct.pack(f"<6{code}", 1, 2, 3, 4, 5, 6)
     for matrix in (6, 7, 15):  # along the first index first
         assert value(matrix, [2, 3], part(kind, body)).tolist() == [[1, 3, 5], [2, 4, 6]]
-
-
-def test_parts_of_a_matrix(tmp_path):
-    """A part of four bytes or fewer stands in the second half of its own tag."""
-    small = struct.pack("<HHBBxx", 2, 2, 7, 8)
-    assert value(6, [1, 2], small).tolist() == [[7, 8]]
-    assert MatrixParts(small + small, "<").part() == (2, b"\7\x08")
-    body = struct.pack(">II", 9, 16) + struct.pack(">2d", 1.5, 2.5)
-    assert MatrixParts(body, ">").numbers().tolist() == [1.5, 2.5]
-    # A struct without fields does not loop; empty cells fill a variable to its last byte.
-    path = tmp_path / "a.mat"
-    path.write_bytes(mat(variable(2, [2**31 - 1, 2**31 - 1], fields(8, b""))))
-    assert read_variables(path, ["X"]) == {"X": []}
-    assert [cell.shape for cell in value(1, [1, 2], part(14, b"") * 2)] == [(0, 0)] * 2
-    assert value(6, [0, 2], part(9, b"")).shape == (0, 2)
-    one = part(14, variable(6, [1, 1], doubles(1)))
-    two = part(14, variable(6, [1, 2], doubles(2, 3)))
-    cells = value(1, [1, 2], one + two)
-    assert [cell.tolist() for cell in cells] == [[[1.0]], [[2.0, 3.0]]]
-    names = fields(8, b"a\0xxxxxxbb".ljust(16, b"\0"))
-    found = value(2, [1, 2], names + one + two + two + one)
-    assert [{k: v.tolist() for k, v in each.items()} for each in found] == [
-        {"a": [[1.0]], "bb": [[2.0, 3.0]]},
-        {"a": [[2.0, 3.0]], "bb": [[1.0]]},
-    ]
-    assert value(4, [1, 3], part(4, struct.pack("<3H", 97, 0, 98))) == "ab"
-    assert value(4, [1, 5000], part(2, b"x" * 5000)) == "x" * 4096
-    assert value(4, [1, 2], part(6, struct.pack("<2I", 0x110000, 0x10FFFF))) == "\U0010ffff"
-    flags, shape = part(6, struct.pack("<II", 9 | 0x200, 0)), part(5, struct.pack("<2i", 1, 2))
-    truth = MatrixParts(flags + shape + part(1, b"X") + part(2, b"\0\2"), "<").matrix(0)
-    assert truth.dtype == bool and truth.tolist() == [[False, True]]
-    for kind in (3, 5, 16, 17):
-        assert value(kind, [1, 1], doubles(1)) is None
-    assert MatrixParts(b"", "<").matrix(0).shape == (0, 0)
-    body = variable(6, [1, 1], doubles(1))
-    for _ in range(16):
-        body = variable(1, [1, 1], part(14, body))
-    found = MatrixParts(body, "<").matrix(0)
-    for _ in range(16):
-        (found,) = found
-    assert found.tolist() == [[1.0]]
-    with pytest.raises(ValueError, match="nested too deeply"):
-        MatrixParts(variable(1, [1, 1], part(14, body)), "<").matrix(0)
 
 
 def test_files(tmp_path):

@@ -423,7 +423,6 @@ HEIGHTS = {
 
 
 def recorded(history, law, offset, noise, seed=0, count=150, start=-10.0):
-    """Times and heights of a frame a second, and the log, whose clock is `offset` ahead."""
     draw = np.random.default_rng(seed)
     times = np.arange(count) + start
     heights = np.abs(HEIGHTS[law](history(times)) + 60 * noise * draw.normal(size=count))

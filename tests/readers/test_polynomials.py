@@ -184,7 +184,6 @@ POINTS = RADIUS * np.random.default_rng(2).uniform(-0.7, 0.7, (60, 2))
 
 
 def surface(points: np.ndarray) -> np.ndarray:
-    """Two values, of degree two and three."""
     x, y = points.T / RADIUS
     return np.column_stack([3 + x - 2 * x * y, 0.5 * y**3 - x**2 * y])
 

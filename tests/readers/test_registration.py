@@ -32,7 +32,6 @@ def rotation(axes: str, angles) -> np.ndarray:
 
 
 def grid(step: float = 10.0, reach: float = 1.0) -> np.ndarray:
-    """Points on a square grid up to `reach` radii from the centre, off it by a third of a step."""
     line = np.arange(-reach * RADIUS, reach * RADIUS + step, step) + step / 3
     x, y = (axis.ravel() for axis in np.meshgrid(line, line))
     near = np.hypot(x, y) < reach * RADIUS
@@ -56,7 +55,6 @@ def bubble(points: np.ndarray, rise: float) -> Frame:
 
 
 def seen(frame: Frame, turn: np.ndarray, shift) -> Frame:
-    """The frame in the coordinates of a camera."""
     return Frame(frame.points @ turn.T + np.asarray(shift), frame.displacement @ turn.T)
 
 

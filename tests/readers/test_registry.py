@@ -1,15 +1,11 @@
 """The registry of readers, and what importing them costs."""
 
 import json
-import logging
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit import readers
-from bubblefit.errors import InputError, PlugInFailure
+from bubblefit.errors import PlugInFailure
 from bubblefit.readers import registry
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.fields import read_fields
@@ -40,7 +36,6 @@ def starred(name="starred", recognises=lambda path, head: head.startswith(b"*** 
 
 @pytest.fixture
 def own(monkeypatch):
-    """Formats registered by a test are gone after it."""
     formats("frame")
     monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
 
@@ -130,35 +125,3 @@ def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages
     path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')
     register_format(starred("mine", lambda path, head: head.startswith(b"{")))
     assert format_of("frame", path).name == "mine"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("raise RuntimeError('no licence')", "cannot be imported (RuntimeError: no licence)"),
-        ("THING = 3", "is no format: acme_json:THING has no name, content, read, recognises"),
-        (READER.replace("{name}", "else"), "calls its format 'else'; both must have one name"),
-        (READER.replace("in head", "in None"), "fails on "),
-    ],
-)
-def test_a_broken_reader_breaks_nothing_else(packages, tmp_path, caplog, text, words):
-    install_reader(packages, text=text)
-    path = tmp_path / "frame.csv"
-    path.write_text("x,y,z,dx,dy,dz\n1,2,3,4,5,6\n")
-    with caplog.at_level(logging.WARNING, logger="bubblefit"):
-        assert len(read_frames([path])) == 1
-    assert f"the plug-in 'json' of acme-things 2.5 {words}" in caplog.text
-    with pytest.raises((PlugInFailure, InputError)):
-        read_frames([path], format="json")
-
-
-def test_the_library_loads_without_pandas_and_scipy_spatial():
-    code = (
-        "import sys, bubblefit.experiments.strips.gauge, bubblefit.experiments.strips.data;"
-        "assert not {'pandas', 'scipy.spatial'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-    for name in readers.__all__:
-        assert callable(getattr(readers, name)), name
-    with pytest.raises(AttributeError, match="read_everything"):
-        _ = readers.read_everything

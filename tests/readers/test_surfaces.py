@@ -162,7 +162,6 @@ CENTRE = np.array([12.0, -7.0, 610.0])
 
 
 def cap(radius: float = 40.0, half: float = 45.0, count: int = 400, seed: int = 0):
-    """Points of a ball as a camera sees it, up to `half` degrees from the line of sight."""
     draw = np.random.default_rng(seed)
     height = draw.uniform(np.cos(np.radians(half)), 1.0, count)
     turn = draw.uniform(0, 2 * np.pi, count)

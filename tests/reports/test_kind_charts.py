@@ -1,7 +1,6 @@
 """Charts of kinds: cuts and maps of bubbles, loads of strips and beams, the deformed bodies."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -96,36 +95,6 @@ def sheet(count):
     return np.column_stack([r * np.cos(t), r * np.sin(t)])
 
 
-@pytest.mark.parametrize(("count", "step"), [(500, 1), (6000, 1), (6001, 2)])
-def test_registration(count, step):
-    points = sheet(count)
-    maps = [("height, mm", points[:, 0]), ("rise at 20 kPa, mm", points[:, 1])]
-    charts = bubbles.registration_charts(points, maps, EDGE)
-    for chart, (title, values) in zip(charts.charts, maps, strict=True):
-        spots = chart.series[0]
-        np.testing.assert_allclose(np.transpose([spots.x, spots.y]), points[::step], rtol=1e-5)
-        np.testing.assert_allclose(spots.values, values[::step], rtol=1e-5)
-        np.testing.assert_allclose(lines(chart, "rim")[0].T, EDGE, rtol=1e-5, atol=1e-9)
-        assert chart.equal and f"{chart.title}, {chart.scale}" == title
-        assert shown(chart)[:2] == ("x, mm", "y, mm")
-        assert lines(chart, "warp")[0].tolist() == [[0, 50], [0, 0]]
-        assert lines(chart, "fill")[0].tolist() == [[0, 0], [0, 50]]
-
-
-@pytest.mark.parametrize(("count", "step"), [(6000, 1), (24000, 3)])
-def test_the_first_spheres_in_one_scale(count, step):
-    points, used = np.column_stack([sheet(count), np.zeros(count)]), np.arange(count) % 4 > 0
-    off = np.where(used, points[:, 0] / 1e3, 7.0)
-    charts = bubbles.sphere_charts([(f"{i}", points, (i + 1) * off, used) for i in range(7)]).charts
-    assert [chart.title for chart in charts] == [str(i) for i in range(6)]
-    largest = 6 * np.abs(off[used]).max()
-    for i, chart in enumerate(charts):
-        inside = chart.series[0]
-        np.testing.assert_allclose(inside.x, points[used, 0][::step], rtol=1e-5)
-        np.testing.assert_allclose(inside.values, (i + 1) * off[used][::step], rtol=1e-5)
-        assert scale_ends(chart) == pytest.approx((-largest, largest))
-
-
 def test_points_astray_do_not_make_the_ball_small():
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     points = np.column_stack([20 + 10 * np.cos(turn), 10 * np.sin(turn), 0 * turn])
@@ -139,15 +108,6 @@ def test_points_astray_do_not_make_the_ball_small():
     assert chart.series[0].values == pytest.approx(off[used], rel=1e-5)
     assert lines(chart, "left out")[0].tolist() == [[600.0], [0.0]]
     assert chart.scale == "beyond the sphere, mm"
-
-
-def test_rises():
-    for least in (0.5, -3.0):
-        (chart,) = bubbles.rise_charts([0.002, 0.02, 0.3], [least, 20.0, 39.0]).charts
-        np.testing.assert_allclose(data(chart)[0], [[2.0, 20.0, 300.0], [least, 20.0, 39.0]])
-        low = axis_ends(chart)[1][0]
-        assert low == 0.0 if least > 0 else low < -3.0
-        assert shown(chart)[:2] == ("pressure, kPa", "rise about the centre, mm")
 
 
 def test_pressures_and_heights_by_one_clock():
@@ -219,18 +179,6 @@ def test_five_nodes_on_the_axis_are_its_profile(on, taken):
     assert np.interp(0.0, cut.position, cut.height) == pytest.approx(30.0, rel=0.01)
 
 
-def test_heights_at_rest_do_not_count():
-    draw = np.random.default_rng(2)
-    flat = draw.uniform(-50, 50, (200, 2))
-    moved = np.column_stack([0.01 * flat, 10.0 - 1e-3 * (flat**2).sum(axis=1)])
-    raised = np.column_stack([flat, 600.0 + 40.0 * draw.normal(size=200)])
-    for cut, axis in product((node_cut, point_cut), (0, 1)):
-        one, other = cut(flat, moved, axis), cut(raised, moved, axis)
-        assert len(one.position) > 3
-        np.testing.assert_array_equal(one.position, other.position)
-        np.testing.assert_array_equal(one.height, other.height)
-
-
 WAY = np.linspace(0.0, 40.0, 9)
 GRID = np.linspace(0.0, 30.0, 7)
 SOFT = BendLine(
@@ -281,20 +229,6 @@ def test_bands_of_the_solver_and_of_the_card():
     check_charts(charts)
     off = lines(charts.charts[1], "short")[0][1]
     assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)
-
-
-def test_all_cases_with_the_same_loads_in_a_row():
-    panels = [BendPanel("one", [SOFT]), BendPanel("two", [STIFF]), BendPanel("lost"), BendPanel("")]
-    charts = bending_charts(panels, columns=2)
-    check_charts(charts)
-    one, two, lost, free = charts.charts
-    for chart in (one, two):
-        assert axis_ends(chart)[0] == pytest.approx((0.0, 1.06 * 40.0))
-        assert axis_ends(chart)[1] == pytest.approx((0.0, 1.06 * 200.0))
-    assert lost.title == "lost" and not lost.series and not (free.title or free.series)
-    assert [c.title for c in bending_charts(panels).charts] == ["one: RMS error 3.11 N", "two"]
-    with pytest.raises(ValueError, match="no cases to draw"):
-        bending_charts([BendPanel("none")])
 
 
 def test_gas_in_kilopascal_and_litres():
@@ -349,35 +283,6 @@ def test_the_side_is_the_half_that_is_seen():
         assert scale_ends(charts.charts[0]) == pytest.approx(ends)
     charts = beam_charts(POINTS, QUADS, 0 * strain, OUTLINE, RING, BODIES)
     assert scale_ends(charts.charts[0]) == pytest.approx((0.0, 1.0))
-
-
-def test_what_is_nearer_hides_what_is_behind():
-    x = np.array([40.0, -40.0, 0.0, 80.0])
-    side = np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]])  # z, y
-    points = np.array([[at, y, z + at] for at in x for z, y in side])
-    quads, strain = np.arange(16).reshape(4, 4), np.array([0.1, 0.2, 0.3, 0.4])
-    body = beam_charts(points, quads, strain, 0.1 * OUTLINE, RING, BODIES).charts[0].series[0]
-    assert body.values == [0.3, 0.1, 0.4]
-    middles = np.array(body.x, dtype=float).reshape(-1, 4).mean(axis=1)
-    assert middles == pytest.approx([0.0, 40.0, 80.0])
-
-
-@pytest.mark.parametrize(
-    ("supports", "collar", "rises", "ends"),
-    [
-        (-150.0, 0.0, 0.0, (-200.0, 112.0)),  # feet, collar
-        (0.0, 10.0, 0.0, (-102.0, 122.0)),  # collar
-        (0.0, -10.0, 95.0, (-122.0, 170.0)),  # collar, inflated beam
-        (0.0, 60.0, -80.0, (-155.0, 172.0)),  # beam, collar
-    ],
-)
-def test_the_lowest_and_the_highest(supports, collar, rises, ends):
-    axes = ((-500.0, supports), (500.0, supports))
-    bodies = replace(BODIES, supports=axes, collar_height=collar)
-    now = POINTS + np.array([0.0, min(rises, 0.0), 0.0])
-    before = OUTLINE + np.array([0.0, max(rises, 0.0)])
-    whole = beam_charts(now, QUADS, STRAIN, before, RING, bodies).charts[0]
-    assert axis_ends(whole)[1] == pytest.approx((ends[0] - 20.0, ends[1] + 20.0))
 
 
 U = np.linspace(0.0, 4.0, 41)

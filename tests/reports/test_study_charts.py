@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from bubblefit.reports import studies
 from bubblefit.reports.charts import axis_ends
-from bubblefit.reports.moduli import moduli_charts, moduli_together, pinned_charts
-from bubblefit.reports.studies import ConvergencePanel, LawRow, ProfilePanel
-from bubblefit.reports.vega import view
+from bubblefit.reports.moduli import moduli_charts, pinned_charts
+from bubblefit.reports.studies import LawRow, ProfilePanel
 
 from ..drawings import check_charts, data, legend, lines, named
 
@@ -98,26 +97,7 @@ def test_nu12():
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
 
 
-def test_names_stand_where_numbers_would():
-    names = ["one", "two & a name that is far too long for its place in the row", *"abcd"]
-    sigma = {"E1": [1.0, 20.0, 100.0, 3, 4, 5], "G12": [2.0] * 6}
-    (chart,) = studies.plan_charts(names, sigma, "c").charts
-    assert axis_ends(chart)[0] == (0.5, 6.5) and chart.log_y
-    (words,) = [a for a in view(chart)["axes"] if a["orient"] == "bottom"]
-    assert words["values"] == [1, 2, 3, 4, 5, 6] and words["labelAngle"] == -28
-    assert chart.series[0].y == [1, 20, None, 3, 4, 5]
-    assert np.round(chart.series[1].x).tolist() == [1, 2, 3, 4, 5, 6]
-    ring = named(chart)["E1, not known"]
-    assert ring.hollow and ring.y == [100.0] and np.round(ring.x).tolist() == [3]
-    panel = ConvergencePanel("warp", [0.2, 0.1], {"load": [0.0]}, [8, 32], [0.1, 0.3])
-    found = studies.convergence_charts([panel], "increments", "Title")
-    chart = found.charts[0]
-    assert [series.y for series in chart.series] == [[None]] and chart.alt.endswith(": none")
-    assert view(chart)["marks"] and "below 1e-05 %" in found.caption
-
-
 STRAINS = np.linspace(0, [0.15, 0.2, 0.6], 20).T
-MODULI = np.array([[800.0], [150.0], [20.0]]) * (1 + STRAINS)
 
 
 @pytest.mark.parametrize("fits, known", [(5, True), (5, False), (1, True), (1, False)])
@@ -144,50 +124,6 @@ def test_moduli(fits, known):
         assert [y[0] for y in off[1:]] == pytest.approx([0.1 * i for i in range(1, fits)])
         assert below.alt == "best: at most 1e-10 %" and below.log_y
         assert below.y_label == "deviation from known, %"
-
-
-def test_named_laws_with_their_own_ranges():
-    band = np.array([MODULI - 5.0, MODULI + 5.0])
-    band[1, 2, 15:] = np.inf
-    both = np.array([STRAINS, 0.4 * STRAINS]), np.array([MODULI, 2 * MODULI])
-    charts = moduli_charts(*both, names=["uniaxial", "bubble"], band=band)
-    shear = charts.charts[2]
-    for k, name in enumerate(("uniaxial", "bubble")):
-        expected = [100 * both[0][k, 2], both[1][k, 2]]
-        np.testing.assert_allclose(lines(shear, name)[0], expected, rtol=1e-5)
-    first = named(shear)["uniaxial"]
-    assert first.ends and first.upper[15:] == [None] * 5
-    np.testing.assert_allclose(first.lower, MODULI[2] - 5.0, rtol=1e-5)
-    assert legend(charts) == ["uniaxial", "bubble"]
-    for known in (1200.0, 900.0):  # is seen, as the fit is
-        strains, fit = np.tile([0.0, 0.1], (3, 1)), np.full((1, 3, 2), 1000.0)
-        chart = moduli_charts(strains, fit, np.full((3, 2), known)).charts[0]
-        assert axis_ends(chart)[1] == pytest.approx((0.0, 1.12 * max(1000.0, known)))
-    # A band is seen whole up to three times the curve; where one goes on, the title says how far.
-    for upper, top, said in ((1050.0, 1120.0, False), (2000.0, 2080.0, False), (9e3, 3360.0, True)):
-        ends = np.array([fit[0] - 900.0, np.full((3, 2), upper)])
-        chart = moduli_charts(strains, fit, band=ends).charts[0]
-        assert axis_ends(chart)[1][1] == pytest.approx(top)
-        assert ("9e+03 MPa" in chart.title) is said
-    with pytest.raises(ValueError, match="1 names for 2 fits"):
-        moduli_charts(*both, names=["a"])
-    with pytest.raises(ValueError, match="same strains"):
-        moduli_charts(STRAINS[None], MODULI[None], MODULI)
-
-
-def test_the_three_moduli_together():
-    charts = moduli_together(STRAINS, MODULI, 0.1 * MODULI, "Table 3.2")
-    linear = moduli_together(STRAINS, MODULI - 30.0).charts[0]
-    check_charts(charts)
-    (log,) = charts.charts
-    assert log.log_y and not linear.log_y and log.title == "Table 3.2"
-    low, high = axis_ends(linear)[1]
-    assert low < MODULI.min() - 30.0 and high == pytest.approx(1.08 * (MODULI.max() - 30.0))
-    assert (log.x_label, log.y_label) == ("logarithmic strain, %", "tangent modulus, MPa")
-    for m, s in enumerate(log.series):
-        np.testing.assert_allclose([s.x, s.y], [100 * STRAINS[m], MODULI[m]], rtol=1e-5)
-        np.testing.assert_allclose([s.lower, s.upper], [0.9 * MODULI[m], 1.1 * MODULI[m]], 1e-5)
-        assert s.ends
 
 
 def test_what_each_test_determines():

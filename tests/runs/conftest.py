@@ -17,19 +17,16 @@ def strips_project(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def together(strips_project):
-    """Both tests, two starts."""
     return bf.fit(strips_project, jobs=1)
 
 
 @pytest.fixture(scope="session")
 def alone(strips_project):
-    """The second test."""
     return bf.fit(strips_project, tests=["two"], starts=1, jobs=1)
 
 
 @pytest.fixture(scope="session")
 def bubble(tmp_path_factory):
-    """The known solution from two starts, its folder, its charts, and what progress heard."""
     folder, heard, drawn = tmp_path_factory.mktemp("bubble"), [], []
     project = bf.read_project(small(folder))
     fit = bf.fit(project, tests="bubble", starts=2, jobs=1, progress=heard.append)

@@ -22,8 +22,7 @@ from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers import registry
 
 from ..commands import in_process, result_in
-from ..cylinder_cases import STOPS, Banded, Formula, write_project
-from ..drawings import data, lines
+from ..cylinder_cases import STOPS, Formula, write_project
 from ..projects import constant_strips, small, with_form
 
 SECOND = """
@@ -89,23 +88,6 @@ def test_tables(fitted, bubble):
     assert said == pytest.approx(card.law.strain_range[0])
 
 
-def test_figures_show_what_the_tables_hold(fitted, bubble):
-    by_panel = {c.y_label: c for charts in bubble.drawn[::-1] for c in charts.charts[::-1]}
-    residuals = fitted.residuals()
-    heights = residuals[residuals["quantity"] == "dz"]
-    shown = np.concatenate(data(by_panel["modelled z, mm"])[1:], axis=1)
-    assert shown == pytest.approx(heights[["measured", "modelled"]].to_numpy().T, rel=1e-5)
-    off = np.concatenate(data(by_panel["modelled − known solution, mm"]), axis=1)
-    assert off[1] == pytest.approx(heights["difference"].to_numpy(), abs=1e-12)
-    (best,) = lines(by_panel["tangent modulus, MPa"], "best")
-    assert best[1] == pytest.approx(fitted.law.E1(best[0] / 100), rel=1e-4)
-    assert (best[0].min(), best[0].max()) == pytest.approx(
-        (0.0, 100 * fitted.best.valid[0]), rel=1e-5
-    )
-    (optima,) = data(next(c for c in bubble.drawn if c.name == "optima").charts[0])
-    assert optima[1] == pytest.approx(sorted(fitted.starts()["objective"], reverse=True), rel=1e-5)
-
-
 def test_the_listed_uncertainty_is_one_standard_deviation(fitted):
     sure, moduli = fitted.best.certainty, fitted.moduli()
     for name, sigma in sure.sigma.items():
@@ -143,26 +125,6 @@ def test_the_best_start_is_the_one_run_again(fitted):
         assert [r is again.ranked[0] for r in again.records] == [r.number == k for r in records]
         np.testing.assert_array_equal(again.law.beta, fitted.law.beta)
         assert again.objective == pytest.approx(fitted.objective, abs=1e-9)
-
-
-def test_the_command_says_so_and_writes_no_result(fitted, tmp_path, monkeypatch):
-    ended = replace(fitted.best.ranked[0], objective=fitted.objective + 1e-3)
-    monkeypatch.setattr(
-        "bubblefit.runs.executor.Executor.run_starts", lambda *a: iter([replace(ended, number=0)])
-    )
-    arguments = ("bubble", fitted.project.path, "--starts", 1, "--out", "out", "--json")
-    gone = [tmp_path / "out" / name for name in ("result.json", "material.toml")]
-    gone[0].parent.mkdir()
-    for path in gone:
-        path.write_text("of an earlier fit")
-    done = in_process(*arguments, "--overwrite", cwd=tmp_path, code=4)
-    assert done.stdout == "" and len(done.stderr.splitlines()) == 1
-    for text in (done.stderr, (tmp_path / "out" / "report.html").read_text()):
-        assert "from the unloaded state" in text
-    assert not any(path.exists() for path in gone)
-    # Its start is kept, so that going on says the same at once.
-    done = in_process(*arguments, "--resume", cwd=tmp_path, code=4)
-    assert "from the unloaded state" in done.stderr
 
 
 def maps_and_surface_say_what_the_table_says(fit, folder):
@@ -349,35 +311,6 @@ def test_steps_and_draws_give_the_spread_to_first_order(tmp_path):
         ("samples", (1.0, 1.0), [two[0], None], [np.nan] * 3),
     ):
         np.testing.assert_allclose(Around(how, shares).sigma(own, curves), sigma)
-
-
-def test_the_spread_stands_wherever_the_load_does(tmp_path, monkeypatch, drawn):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
-    plain = replace(card(), certainty=None)
-    project = read_project(write_project(tmp_path))
-    done = predict(project, ["high"], {"sure": card(), "plain": plain}, jobs=1, out=tmp_path / "o")
-    assert [(r.card, r.wall, r.around is None) for r in done.each] == [
-        ("sure", "slack", False), ("sure", "rigid wall", True),
-        ("plain", "slack", True), ("plain", "rigid wall", True),
-    ]  # fmt: skip
-    done.report(tmp_path / "o")
-    table = pd.read_csv(tmp_path / "o" / "load_deflection.csv")
-    known = table[table["load_sigma_N"].notna()]
-    assert set(zip(known["card"], known["wall"], strict=True)) == {("sure", "slack")}
-    load = done.outcomes["cylinder"][0].measures[0].loads["100 mm"]
-    sigma = done.result["runs"][0]["load_sigma_N"]["100 mm"]
-    told = f"{load:.0f} ± {sigma:.2g}"
-    assert any(f"{told} N" in line for line in done.lines())
-    page = (tmp_path / "o" / "report.html").read_text()
-    assert told.replace(" ", "\u00a0") in page
-    assert [run["load_sigma_N"] for run in done.result["runs"][2:]] == [
-        dict.fromkeys(("40 mm", "100 mm", "240 mm"))
-    ] * 2
-    (chart,) = [c for charts in drawn for c in charts.charts if c.y_label == "load, N"]
-    (sure,) = [s for s in chart.series if s.y and s.lower]
-    ends = [known["load_N"] + sign * 1.96 * known["load_sigma_N"] for sign in (-1, 1)]
-    np.testing.assert_allclose([sure.lower, sure.upper], ends, rtol=1e-5)
-    assert "95 % by the card" in [s.name for s in chart.series]
 
 
 def test_another_program_is_not_run_unasked(tmp_path, monkeypatch):

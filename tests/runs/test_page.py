@@ -15,8 +15,6 @@ from bubblefit.experiments.kinds import UNSTABLE
 from bubblefit.experiments.strips import report as strips_report
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.unknowns import LawBounds
-from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page as page
@@ -24,24 +22,21 @@ from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Words
 from bubblefit.reports.fit_page import (
-    COEFFICIENTS_TITLE,
     WORDS,
     band_words,
     sigma_words,
-    two_digits,
 )
 from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of
 from bubblefit.runs.folder import versions, write_table
 from bubblefit.runs.predictions import predict
-from bubblefit.runs.result import COMPARED, TABLES, TOGETHER, next_step, notes_of_fit, reaches
+from bubblefit.runs.result import COMPARED, TABLES, next_step, reaches
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
-from bubblefit.solvers.base import SNAP
 
 from ..complaints import complaint_with
-from ..cylinder_cases import FAILS, Banded, Formula, write_project, write_readings
+from ..cylinder_cases import FAILS, Banded, write_project, write_readings
 from ..places import ROOT
 from ..projects import ELONGATION, MODULI, small
 
@@ -49,7 +44,6 @@ ENDS = {"one": 2.9, "two": 2.5}
 
 
 def drawn_by(monkeypatch):
-    """Arguments of the charts by name, which are not drawn."""
     calls = {}
     monkeypatch.setattr(page, "save", lambda path, charts: None)
     for name in ("optima_chart", "moduli_charts", "pinned_charts"):
@@ -98,7 +92,6 @@ def captions(report):
 
 @pytest.fixture(scope="module")
 def written(together, tmp_path_factory):
-    """The page of both tests."""
     with pytest.MonkeyPatch.context() as patch:
         told = drawn_by(patch)
         return reported(together, tmp_path_factory.mktemp("page"), patch), told
@@ -106,7 +99,6 @@ def written(together, tmp_path_factory):
 
 @pytest.fixture
 def nothing_shown(together, monkeypatch):
-    """Let the tests draw nothing, which takes longest."""
     monkeypatch.setattr(strips_report, "show", lambda *_: Exhibit())
 
 
@@ -195,20 +187,6 @@ def test_the_answer_in_words(together, written, tmp_path):
     inside.write_text(card.text)
     assert card.file == "material.toml"
     assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
-
-
-def test_the_verdict_by_its_numbers(together, written):
-    fit, (found, _) = together, written
-    verdict, sure = fit.result["verdict"]["moduli"], fit.best.certainty
-    for name, own in verdict.items():
-        lower, upper = sure.band[name][:, 0]
-        off = max(upper / fit.law.modulus(name, 0.0), 2 - lower / fit.law.modulus(name, 0.0)) - 1
-        end = float(fit.best.valid[COMPONENTS[name]])
-        assert own["usable"] == (pytest.approx((0.0, end)) if off <= 0.2 else None)
-        assert own["not_known"] == (pytest.approx((0.0, end)) if off >= 1.0 else None)
-    assert [own["not_known"] is None for own in verdict.values()] == [True, True, False]
-    assert fit.result["verdict"]["within"] == 0.2 and "G12 nowhere" in found.summary
-    assert found.summary.count(".") == 1 and fit.result["verdict"]["next"] in found.summary
 
 
 @pytest.mark.parametrize(
@@ -354,81 +332,12 @@ def test_a_known_solution_with_the_band_of_noise(together, told, tmp_path, monke
         assert "known" in [series.name for series in chart.series]
 
 
-def test_the_band_is_about_the_best_fit(together, told, tmp_path):
-    one, two = together.best.ranked
-    unknowns = tuple(1.5 * u for u in one.unknowns)
-    best = replace(together.best, ranked=[one, replace(two, unknowns=unknowns)])
-    fit = replace(together, best=best)
-    page._moduli(fit, tmp_path)
-    _, curves, _, band, _ = told["moduli_charts"]
-    assert curves[1][0] == pytest.approx(1.5 * curves[0][0])
-    own = fit.best.certainty.band["E1"]
-    assert band[:, 0] == pytest.approx(np.tile(own[:, :1], 121))
-    # Of many, those of the five best.
-    many = replace(fit, best=replace(best, ranked=[one, *[two] * 7]))
-    assert len(many.laws) == 5
-
-
-def test_every_unknown_with_its_sigma_and_correlations(together, written):
-    fit, (found, _) = together, written
-    table = fit.coefficients()
-    assert table["unknown"].tolist() == ["beta_3", "beta_7", "beta_11"]
-    assert table["unit"].tolist() == ["GPa"] * 3
-    assert table["value"].to_numpy() == pytest.approx(1e-3 * fit.law.beta[[3, 7, 11]])
-    assert table["lower_bound"].tolist() == [0.005, 0.03, 0.02]
-    assert table["upper_bound"].tolist() == [0.2, 1.0, 2.0]
-    sure = fit.best.certainty
-    # A modulus that is one coefficient is as sure as that.
-    for place, name in enumerate(("G12", "E2", "E1")):
-        relative = table["sigma"][place] / table["value"][place]
-        assert relative == pytest.approx(sure.sigma[name][0])
-    assert table[["beta_3", "beta_7", "beta_11"]].to_numpy() == pytest.approx(
-        sure.posterior.correlations
-    )
-    (shown,) = [t for t in found.tables if t.title == COEFFICIENTS_TITLE]
-    assert shown.header == ["unknown", "value", "1 sigma", "unit", "beta_3", "beta_7", "beta_11"]
-    warp = shown.rows[2]
-    assert warp[:4] == ["beta_11", table["value"][2], table["sigma"][2], "GPa"]
-    assert warp[4:] == ["0.00", "0.00", "1.00"] == [two_digits(value) for value in (-1e-9, 0, 1)]
-
-
-SNAPS = Note(SNAP, "snaps, or nearly, before 20 mm of deflection")
-
-
-class Snapping(Formula):
-    """The tubes of 140 kPa snap."""
-
-    def run(self, model, *arguments, **named):
-        history = super().run(model, *arguments, **named)
-        return replace(history, remarks=(SNAPS,)) if model.pressure > 0.1 else history
-
-
-def test_marks_and_notes_stand_wherever_a_run_does(tmp_path, monkeypatch):
-    monkeypatch.setitem(registry.SOLVERS, "formula", Snapping)
-    monkeypatch.setattr(cylinders, "show_outcome", lambda *_: Exhibit())
-    law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
-    short = replace(law, strain_range=np.array([0.3, 0.01, 0.3]))
-    cards = {"wide": MaterialCard(law, 0.81), "short": MaterialCard(short, 0.81)}
-    done = predict(read_project(write_project(tmp_path)), cards=cards, jobs=1)
-    done.report(tmp_path / "out")
-    expected = [[], ["beyond card range"], ["snap"], ["beyond card range", "snap"]]
-    assert [run["marks"] for run in done.result["runs"]] == expected
-    table = pd.read_csv(tmp_path / "out" / "runs.csv", keep_default_na=False)
-    assert table["marks"].tolist() == ["; ".join(each) for each in expected]
-    lines = [line for line in done.lines() if "kPa  " in line or line.startswith("high")]
-    for row, some in zip(lines, expected, strict=True):
-        assert row.endswith(f"[{', '.join(some)}]") if some else "[" not in row
-    kinds = [note["kind"] for note in done.result["notes"]]
-    assert kinds.count("snap") == 2 == kinds.count("beyond card range")
-
-
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
 
 
 def banded(folder, soft=500.0, **options):
-    """Predictions of two cylinders, the first of them measured, with two cards."""
     write_readings(folder / "made-up.csv")
     path = write_project(folder, 'measured.files = ["made-up.csv"]', soft)
     return predict(read_project(path), jobs=1, **options)
@@ -486,86 +395,6 @@ def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
     assert all(len(row) == 5 for row in notes.rows) and notes.text == (1, 2, 3, 4)
     assert {row[2] for row in notes.rows} == {"slack", "rigid wall"}
     assert ["rigid wall" in line for line in page.warnings[:2]] == [False, True]
-
-
-def test_everything_of_two_tests(together):
-    fit, law = together, together.law
-    result = dict(fit.result)
-    assert result.pop("provenance") == "provenance.json"
-    sure = fit.best.certainty
-    pinned = result.pop("pinned")
-    assert list(pinned) == ["one", "two", TOGETHER]
-    for name, sigma in sure.sigma.items():
-        least, most = float(sigma.min()), float(sigma.max())
-        own = {"least": least, "median": float(np.median(sigma)), "largest": most}
-        assert pinned[TOGETHER][name] == own
-    assert set(result.pop("tests")) == {"one", "two"}
-    assert list(result.pop("mean_relative_error")) == ["one", "two"]
-    assert result.pop("warnings") == [note.line for note in fit.notes]
-    assert result.pop("notes") == [
-        {"of": note.of, "kind": note.kind, "note": str(note)} for note in fit.notes
-    ]
-    own = fit.misfits["one: fill"]
-    silent = replace(fit)
-    silent.__dict__["misfits"] = {"one: fill": replace(own, noise=0.0)}
-    assert silent.result["misfit"]["one: fill"]["times_noise"] is None
-    for name, misfit in result.pop("misfit").items():
-        own = fit.misfits[name]
-        assert misfit == {
-            "rms": own.rms, "noise": own.noise, "noise_is": "specimens' scatter", "unit": "N",
-            "times_noise": pytest.approx(own.rms / own.noise),
-        }  # fmt: skip
-    ends = dict(zip(("warp", "fill", "shear"), fit.best.reached.tolist(), strict=True))
-    assert result == {
-        "command": "strips", "title": "made", "solver": "membrane", "method": "lm",
-        "objective": fit.objective,
-        "objective_is": "weighted sum of the tests' mean relative RMS errors", "moduli": "constant",
-        "beta": {
-            "unit": "GPa", "labels": [f"beta_{i}" for i in range(12)],
-            "values": pytest.approx((1e-3 * law.beta).tolist()),
-        },
-        "nu12": 0.0, "strain_reached": ends, "valid_strain": {**ends, "warp": 0.12}, "seed": 7,
-        "starts": [
-            {
-                "start": number, "seed": [7, number], "objective": record.objective,
-                "status": "converged", "analyses": record.analyses, "external_runs": 0,
-                "cached_runs": 0,
-            }
-            for number, record in enumerate(fit.best.records)
-        ],
-        "coarse_to_fine": None, "analyses": sum(record.analyses for record in fit.best.records),
-        "external_runs": 0, "cached_runs": 0, "wall_s": fit.wall_s, "versions": versions(),
-        "uncertainty": {
-            "noise": sure.noise, "values_that_err_as_one": sure.alike,
-            "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
-            "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
-            "largest_relative_mesh": {n: float(np.abs(s).max()) for n, s in sure.mesh.items()},
-            "largest_relative_total": {n: float(s.max()) for n, s in sure.total.items()},
-            "mesh_error": "told", "second_order": None, "smooth_beyond_noise": {},
-        },
-        "verdict": fit.result["verdict"],
-        "noise_given": {}, "weights": {"one": 1.0, "two": 3.0},
-    }  # fmt: skip
-
-
-def test_remarks_and_unstable_equilibria_with_the_name_of_the_part(together):
-    def said(counts, leads):
-        histories = together.best.point.histories
-        marked, beside = (
-            replace(together.best.point, histories=tuple(
-                replace(h, unstable=words if k == 1 else (), remarks=("snaps",) * (k == 2))
-                for k, h in enumerate(histories)))
-            for words in (counts, leads)
-        )  # fmt: skip
-        best = replace(together.best, point=marked, differentiated=beside)
-        return [note.line for note in notes_of_fit(replace(together, best=best), {})]
-
-    unstable = "one: fill: unstable equilibrium at 1 mm: the model would not stay there"
-    # Where another program does not look, what leads it does.
-    for counts, leads, count in (((), (), 0), (("1 mm",), (), 1), (None, ("1 mm",), 1)):
-        lines = said(counts, leads)
-        assert [line for line in lines if "unstable" in line] == [unstable] * count
-        assert "two: warp: snaps" in lines
 
 
 @pytest.mark.parametrize("table", TABLES)

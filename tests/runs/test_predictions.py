@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, Note, SolverFailure, rows
+from bubblefit.errors import InputError, Note, SolverFailure
 from bubblefit.experiments import registry as kinds_of_test
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.materials.card import MaterialCard
@@ -156,41 +156,6 @@ def test_failures_errors_and_notes(tmp_path, seen):
     assert found.versions == versions()
 
 
-def test_result_json(tmp_path):
-    done = predictions(tmp_path, FAILS, measured=True)
-    result = dict(done.result)
-    runs, tests = result.pop("runs"), result.pop("tests")
-    assert result.pop("notes") == rows(done.notes)
-    assert result == {
-        "command": "predict", "title": "Tubes", "solver": "formula", "cards": ["soft", "stiff"],
-        "walls": [], "worst_relative_error": done.worst, "wall_s": 30.0, "cached_runs": 0,
-        "versions": versions(),
-    }  # fmt: skip
-    assert runs[0] == {
-        "test": "150 mm, 90 kPa", "card": "soft", "wall": "", "predicted": True,
-        "ended": "failed: made to fail", "marks": [], "seconds": 2.0,
-    }  # fmt: skip
-    assert [run["marks"] for run in runs[1:]] == [["snap"], [], []]
-    told = ("card", "ended", "seconds", "iterations", "warnings")
-    assert {key: runs[1][key] for key in told} == {
-        "card": "stiff", "ended": "finished", "seconds": 3.0, "iterations": 0,
-        "warnings": ["made up", "also"],
-    }  # fmt: skip
-    assert runs[1]["error"]["relative"] == done.worst and runs[3]["error"] is None
-    high = tests["high"]
-    assert (high["kind"], high["diameter_mm"], high["length_mm"]) == ("cylinder", 150.0, 3000.0)
-    assert high["pressure_kPa"] == pytest.approx(140.0)
-    assert (high["repetitions"], tests["150 mm, 90 kPa"]["repetitions"]) == (0, 2)
-    table = done.runs()
-    assert table["notes"].tolist() == ["", "made up; also", "", "made up"]
-    assert table["seconds"].tolist() == [2.0, 3.0, 4.0, 5.0]
-    assert done.lines()[-3:] == [
-        "note: 150 mm, 90 kPa with stiff: made up",
-        "note: high with stiff: made up",
-        "note: 150 mm, 90 kPa with stiff: also",
-    ]
-
-
 @dataclass(frozen=True)
 class Strut:
     """A bar that is pulled by so many mm per mm."""
@@ -259,8 +224,6 @@ class StrutKind:
 
 
 class Both(Formula):
-    """Also pulls struts."""
-
     def run(self, model, law, *rest, **named):
         if not isinstance(model, Strut):
             return super().run(model, law, *rest, **named)
@@ -271,7 +234,6 @@ class Both(Formula):
 
 @pytest.fixture
 def mixed(tmp_path, monkeypatch):
-    """A project of two cylinders and a strut."""
     kind, ours = StrutKind(), kinds_of_test.kind_named
 
     def kind_named(name):

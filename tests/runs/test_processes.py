@@ -222,23 +222,6 @@ def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(monk
     assert not list(tmp_path.iterdir())
 
 
-def test_processes_end_by_themselves_when_all_is_done(tmp_path):
-    parent = os.getpid()
-
-    def ending():
-        atexit = multiprocessing.util.Finalize(None, written, exitpriority=1)
-        assert atexit.still_active()
-        return lambda number, tell: number
-
-    def written():
-        assert os.getpid() != parent
-        time.sleep(0.2)
-        (tmp_path / str(os.getpid())).touch()
-
-    assert sorted(filter(None, run_tasks(ending, [1, 2, 3, 4], 2))) == [1, 2, 3, 4]
-    assert len(list(tmp_path.iterdir())) == 2
-
-
 #: The workers do not have the tests: their functions travel with what they are.
 for module in (sys.modules[__name__], counted_program):
     cloudpickle.register_pickle_by_value(module)
@@ -249,7 +232,6 @@ NOBODY = "tcp://127.0.0.1:1"
 
 @pytest.fixture(scope="module")
 def scheduler():
-    """The address of one with two workers."""
     distributed = needs.library("distributed")
     options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
     with distributed.LocalCluster(n_workers=2, processes=True, **options) as local:
@@ -287,24 +269,6 @@ def test_what_a_task_tells_comes_once_and_before_its_end(scheduler):
     for number in range(5):
         at = records.index((number, 0))
         assert records[at : at + 3] == [(number, 0), (number, 1), number]
-
-
-def test_it_is_got_ready_once_a_worker(scheduler):
-    def prepare():
-        made = [os.getpid(), 0]
-
-        def task(number, tell):
-            made[1] += 1
-            return list(made)
-
-        return task
-
-    counts = {}
-    for pid, count in tasks(scheduler, prepare, 8):
-        counts.setdefault(pid, []).append(count)
-    assert sum(map(len, counts.values())) == 8
-    for own in counts.values():
-        assert sorted(own) == list(range(1, len(own) + 1))
 
 
 def test_no_more_at_once_than_asked_for(scheduler, tmp_path):
@@ -420,24 +384,6 @@ def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
             said = complaint(tasks, scheduler, lambda: None, 3)
         assert said.startswith("--scheduler: worker tcp://127.0.0.1:") and words in said
         assert sum("is not used" in one.words for one in heard) == 2
-
-
-def test_the_code_counts_by_content(tmp_path, monkeypatch):
-    files = {name: tmp_path / name for name in
-             ("errors.py", "runs/starts.py", "templates/marc/deck.j2", "tests/test_a.py",
-              "docs/make_api.py", "fits/__pycache__/start.pyc")}  # fmt: skip
-    for path in (*files.values(), tmp_path / "runs/__init__.py", tmp_path / "tests/__init__.py"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("")
-    monkeypatch.setattr(cluster, "ROOT", tmp_path)
-    counted = {}
-    for name, path in files.items():
-        before = cluster._code()
-        path.write_text("changed")
-        counted[name] = cluster._code() != before
-    assert counted == {name: k < 3 for k, name in enumerate(files)}
-    monkeypatch.undo()
-    assert cluster.version()[2] == cluster._code()
 
 
 def test_workers_that_come_later_are_waited_for_and_used():

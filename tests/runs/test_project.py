@@ -16,8 +16,6 @@ from bubblefit.project.schema import (
     SHIPPED,
     CardSection,
     NamedCard,
-    _plain,
-    _used,
     read_cards,
     schema_text,
 )
@@ -47,7 +45,6 @@ beta = [0, 0, 0, 0.02, 0, 0, 0, 0.1, 0, 0, 0, 0.5]
 
 @pytest.fixture
 def edit(tmp_path):
-    """Read the known-solution example after replacing one text by another."""
     return partial(edited, tmp_path)
 
 
@@ -342,27 +339,6 @@ def with_cards(folder, *names):
     return SimpleNamespace(cards=cards, path=folder / "fabric" / "project.toml")
 
 
-def test_cards_of_the_project_come_first_in_its_order(tmp_path):
-    own, file = with_cards(tmp_path, "soft", "stiff", "third"), filed(tmp_path, "from a file")
-    asked = [str(file), "third", "soft"]
-    assert list(chosen_cards(own, asked)) == ["soft", "third", "from a file"]
-    assert card_sources(own, asked) == ["soft", "third", str(file)]
-    assert list(chosen_cards(own)) == card_sources(own) == ["soft", "stiff", "third"]
-    assert list(chosen_cards(own, [])) == ["soft", "stiff", "third"]
-    given = {"mine": MaterialCard(LAW, 1.0)}
-    assert chosen_cards(own, given) == given and card_sources(own, given) is None
-
-
-def test_files_of_cards_have_names_of_their_own(tmp_path):
-    own = with_cards(tmp_path, "soft")
-    one, bare = filed(tmp_path), filed(tmp_path, "", "bare.toml")
-    assert list(chosen_cards(own, ["soft", one, bare])) == ["soft", f"soft ({one})", "bare"]
-    assert list(chosen_cards(own, [one])) == ["soft"]
-    said = complaint(chosen_cards, own, ["hard"])
-    assert said.startswith(f"{own.path}: --card: ") and "'hard'" in said and "soft" in said
-    assert complaint(chosen_cards, with_cards(tmp_path), [tmp_path]).endswith("has: none")
-
-
 def test_the_card_of_the_fit_where_the_project_has_none(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     bare, fitted = with_cards(tmp_path), Path("out/fabric/material.toml")
@@ -399,21 +375,3 @@ def test_the_card_of_a_fit_is_as_sure_as_the_fit(together, tmp_path):
 
 def test_the_shipped_schema_is_what_the_sections_say():
     assert SHIPPED.read_text() == schema_text(with_plug_ins=False)
-
-
-def test_schema_without_null_and_titles_and_its_used_definitions():
-    either = [{"anyOf": [{"type": "string"}, {"type": "number"}]}]
-    pydantics = {
-        "title": "Width", "anyOf": [{"type": "number", "title": "A"}, {"type": "null"}],
-        "properties": {"title": {"title": "Title", "type": "string", "default": 0}},
-        "default": None, "list": either,
-    }  # fmt: skip
-    properties = {"title": {"type": "string", "default": 0}}
-    assert _plain(pydantics) == {"type": "number", "properties": properties, "list": either}
-    # A key that is called "$ref" is no reference.
-    definitions = {
-        "A": {"items": [{"$ref": "#/$defs/B"}]}, "B": {"$ref": "#/$defs/A"},
-        "C": {"properties": {"$ref": {"type": "string"}}}, "D": {},
-    }  # fmt: skip
-    for name, used in (("A", {"A", "B"}), ("C", {"C"})):
-        assert _used({"x": {"$ref": f"#/$defs/{name}"}}, definitions) == used

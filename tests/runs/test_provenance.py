@@ -13,7 +13,7 @@ import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
-from bubblefit.inference.unknowns import ProposedStarts, SobolStarts
+from bubblefit.inference.unknowns import ProposedStarts
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.project.project import Project, project_text, read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
@@ -26,12 +26,10 @@ from bubblefit.runs.folder import (
     Store,
     data_rows,
     differences,
-    solver_facts,
     this_run,
     versions,
 )
 from bubblefit.runs.setup import fingerprints, prepare_fit, proposals
-from bubblefit.solvers.decks import in_words
 
 from ..complaints import complaint
 from ..places import EXAMPLES
@@ -70,7 +68,6 @@ FILES = ("low.csv", "high.csv")
 
 
 def written(folder, *changes):
-    """A bubble of two measured frames, and the project of it, changed by replacing text."""
     folder.mkdir(exist_ok=True)
     x, y = (a.ravel() for a in np.meshgrid(*[np.linspace(-90, 90, 9)] * 2))
     inside = np.hypot(x, y) < 95
@@ -99,7 +96,6 @@ def begun(folder, setup, resume):
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
-    """The output folder of the project as it stands."""
     folder = tmp_path_factory.mktemp("first")
     begun(folder / "out", prepared(written(folder / "here")), False)
     return folder / "out"
@@ -197,23 +193,6 @@ def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     assert said == 'the solver = "calculix", now "membrane"'
 
 
-def test_differences_of_tests_and_long_values():
-    before = {"tests": {"a": {"k": list(range(40))}, "b": {"n": 1}}}
-    now = {"tests": {"a": {"k": list(range(1, 41))}, "c": {}}}
-    tests, values = differences(before, now)
-    assert tests == "the tests: a, b, now a, c"
-    assert values.startswith("a.k = [0, 1, 2") and "..., now [1, 2, 3" in values
-    assert len(values) < 160
-    assert differences({}, {}) == []
-
-
-def test_a_solver_of_any_words_has_facts():
-    words = in_words("own", "3.1", element=4, templates="")
-    parts = {"version": "own 3.1", "element": "4", "templates": ""}
-    assert solver_facts("own", words) == {"name": "own", **parts}
-    assert solver_facts("bar", "anything at all")["version"] == "anything at all"
-
-
 OWN = [
     path
     for path in sorted(EXAMPLES.glob("*/*.toml"))
@@ -277,25 +256,6 @@ def test_the_record_of_data_files(tmp_path):
     assert low["units"] == dict.fromkeys(("x", "y", "dx", "dy", "dz"), "mm")
     rows = len((tmp_path / "low.csv").read_text().splitlines()) - 1
     assert low["rows_used"] == rows - 1 and low["rows_dropped"] == {"flagged as doubtful": 1}
-
-
-def test_the_record_of_load_curves(tmp_path):
-    text = (EXAMPLES / "uniaxial-valmex7318" / "project.toml").read_text()
-    table = "[strips.warp]\ngauge_length = 20.0\nfinal_length = 22.0\n[strips.data]"
-    path = project_file(
-        tmp_path, text,
-        ('polynomials = "curves.csv"', 'files = { warp = ["a.csv"] }\nfolder = "lab"'),
-        ('match = "polynomial"', 'match = "points"'), ("[strips.data]", table),
-        ("# strain_range = [0.153, 0.232, 0.883]", "strain_range = [0.2, 0.2, 0.2]"),
-    )  # fmt: skip
-    (tmp_path / "lab").mkdir()
-    rows = "".join(f"{0.25 * k:.2f};{0.01 * k}\n" for k in range(-1, 11))
-    (tmp_path / "lab" / "a.csv").write_text(f"Gauge elongation [mm];Load [kN]\n{rows}")
-    (row,) = data_rows([("strips", prepared(path).tests[0])])
-    assert row["format"] == "text" and row["units"] == {"elongation": "mm", "load": "kN"}
-    assert row["columns"] == {"elongation": "Gauge elongation [mm]", "load": "Load [kN]"}
-    assert row["rows_used"] == 9
-    assert row["rows_dropped"] == {"elongation below zero": 1, "beyond the final length": 2}
 
 
 def test_the_record_says_when_where_and_with_what(tmp_path):
@@ -381,7 +341,6 @@ def regions(tmp_path_factory):
 
 
 def changed(setup, **other):
-    """Which parts of the fingerprint another setup has otherwise, its data being the same."""
     problem = setup.problem()
     one, two = fingerprints(setup, problem), fingerprints(replace(setup, **other), problem)
     assert list(one) == list(two) == ["law", "fit settings", "tests", "data", "solver"]
@@ -411,7 +370,6 @@ def test_breaks_count(regions):
 
 @pytest.fixture(scope="module")
 def earlier(strips_project, tmp_path_factory):
-    """The folder of a fit of two starts."""
     folder = tmp_path_factory.mktemp("earlier") / "out"
     bf.fit(strips_project, jobs=1, starts=2, out=folder)
     return folder
@@ -488,14 +446,3 @@ def test_damaged_and_failed_rows(earlier, tmp_path):
     odd = rows[0].split(",")
     odd[-1] = "many"
     assert "is damaged" in complaint(taken, ",".join(odd))
-
-
-def test_where_starts_begin_is_a_matter_of_the_project(tmp_path, earlier):
-    sobol = ("starts = 2", 'starts = 2\nstarts_from = "sobol"')
-    project = bf.read_project(constant_strips(tmp_path, sobol))
-    assert project.fit.starts_from == "sobol"
-    assert isinstance(bf.fit(project, jobs=1, starts=1).setup.starts, SobolStarts)
-    said = complaint(bf.fit, project, jobs=1, earlier=earlier)
-    assert "fit.earlier (or --earlier): means something with" in said
-    said = complaint(bf.fit, project, jobs=1, starts_from="proposed")
-    assert "name the folder of an earlier fit of this project" in said

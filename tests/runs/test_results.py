@@ -46,7 +46,6 @@ MODELS = {
 
 
 def ran(model, law, solver=None):
-    """The history with its model, and the membrane behind it."""
     solver = solver or MembraneSolver(1e-9)
     return replace(solver.run(model, law), model=model, law=law), solver._prepared[1]
 

@@ -20,12 +20,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
 from bubblefit.project.project import (
-    HEAD,
-    plain,
-    project_text,
-    read_project,
     section_as_run,
-    settings_of_predictions,
 )
 from bubblefit.project.schema import usual_folder
 from bubblefit.reports.content import Report
@@ -42,7 +37,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ..complaints import complaint
-from ..cylinder_cases import FAILS, STOPS, Formula, ran, write_project
+from ..cylinder_cases import FAILS, STOPS, Formula, ran
 
 WAY = np.linspace(0.0, 240.0, 61)
 KIND = CylinderPredicted()
@@ -219,8 +214,6 @@ def finished(number):
 
 
 class Folder(RunningFiles):
-    """The running files of a fit in a store of their own."""
-
     def __init__(self, path):
         super().__init__(Store(path), COLUMNS, SCALE)
 
@@ -454,38 +447,6 @@ def test_the_folder_of_a_section_is_in_full(tmp_path, told):
              "files": ["a.csv", beside, "none.csv", "plain"]}  # fmt: skip
     assert found == {"radius": 5.0, "name": "first", "data": {"points": whole}}
     assert said["data"]["points"]["folder"] == "lab"
-
-
-def test_a_section_without_a_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("HOME", "/home/a")
-    computed = {"data": {"known_solution": {"beta": [1.0]}}}
-    for said, key, folder, whole in (
-        ({"a": 1}, None, None, {"a": 1}),
-        (computed, "data.points.folder", tmp_path, computed),
-        # Beside the project unless it is said; ~ is the home.
-        ({"data": {}}, "data.folder", None, {"data": {"folder": str(tmp_path)}}),
-        ({"data": {"folder": "~/lab"}}, "data.folder", None, {"data": {"folder": "/home/a/lab"}}),
-    ):
-        assert section_as_run(said, "x", key, tmp_path, folder) == {**whole, "name": "x"}
-    said = {"a": None, "b": (1, None, {"c": None, 3: Path("x/y")}), "d": [[0.5]], "e": False}
-    assert plain(said) == {"b": [1, None, {"3": "x/y"}], "d": [[0.5]], "e": False}
-    assert project_text({"law": {"nu12": 0.5}}) == f"{HEAD}\n[law]\nnu12 = 0.5\n"
-
-
-def test_cards_of_a_prediction(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "here").mkdir()
-    card().write(tmp_path / "here" / "d.toml")
-    path = write_project(tmp_path / "here")
-    path.write_text(path.read_text() + '[[card]]\nname = "of a file"\nfile = "d.toml"\n')
-    own = read_project(path)
-    found = settings_of_predictions(own, ["high"], ["of a file", "x/new.toml", "soft"])
-    assert "law" not in found and [test["name"] for test in found["cylinder"]] == ["high"]
-    one, other, soft = found["card"]
-    assert one == {"name": "of a file", "file": str(tmp_path / "here" / "d.toml")}
-    assert other == {"file": str(tmp_path / "x" / "new.toml")}
-    assert soft["name"] == "soft" and soft["beta"][11] == 500.0
-    assert own.written.cards[2]["file"] == "d.toml"
 
 
 def test_a_folder_far_below_is_made(tmp_path):

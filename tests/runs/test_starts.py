@@ -9,8 +9,6 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.cli.fits import lines_of
-from bubblefit.cli.progress import StudyProgress
 from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
@@ -26,9 +24,8 @@ from bubblefit.runs.best import MESH, TAKEN_OUT, UNKNOWN, notes_of_mesh, with_ce
 from bubblefit.runs.fit import distinct, moduli_apart, one_fit
 from bubblefit.runs.result import answers
 from bubblefit.runs.setup import coarse_problem
-from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord, run_start
+from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 
-from ..commands import result_in
 from ..places import KNOWN
 from ..projects import BUBBLE, project_file
 
@@ -54,8 +51,6 @@ OPTIMUM = SimpleNamespace(
 
 
 def started(monkeypatch, problem, optimum):
-    """Two analyses by the surrogate, and one of each of the program's, one of which failed."""
-
     def fit_from(problem, begun, options, near):
         assert (begun, options, near) == ("at start 4 of 7", "options", False)
         for value in (0.9, 0.8):
@@ -213,32 +208,7 @@ def test_one_start_of_an_optimum_goes_on_to_the_full_mesh(fitted):
     assert max(error.values()) < 1e-3
 
 
-def test_every_place_says_what_ran_where(fitted, folder):
-    history = pd.read_csv(folder / "out" / "history.csv")
-    records = fitted.best.records
-    for record in records:
-        own = history[history["start"] == record.number]
-        assert list(own["analysis"]) == list(range(1, record.analyses + 1))
-        assert (own["mesh"] == "coarse").sum() == record.coarse_analyses
-        assert (own["mesh"][: record.coarse_analyses] == "coarse").all()
-    result = result_in(folder / "out")
-    coarse = int((history["mesh"] == "coarse").sum())
-    assert result["coarse_to_fine"] == {
-        "quads": {"bubble": {"coarse": 12, "full": 48}}, "starts": STARTS, "distinct": 1,
-        "coarse_analyses": coarse, "full_analyses": len(history) - coarse,
-    }  # fmt: skip
-    table = fitted.starts()
-    for name in ("coarse_objective", "coarse_analyses", "same_as"):
-        assert [s[name] for s in result["starts"]] == [getattr(r, name) for r in records]
-        assert name in table.columns
-    words = f"{coarse} analyses"
-    assert words in (folder / "out" / "report.html").read_text()
-    (line,) = [one for one in lines_of(fitted, folder) if one.startswith("coarse to fine: ")]
-    assert words in line and "12 of 48" in line
-
-
 def when_it_is(mesh, analyses):
-    """Interrupts once so many analyses of the last start ran on a mesh."""
     seen = []
 
     def tell(event):
@@ -370,27 +340,11 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
             assert own[-1].objective == 0.0 and own[-1].coarse_objective == 0.2
 
 
-def test_progress_counts_each_stage_and_forgets_the_other_meshs_objective(fitted):
-    progress = StudyProgress(2, quiet=True)
-    coarse, full = "starts on the coarse mesh", "distinct optima on the full mesh"
-    for event, *said in (
-        (Stage(coarse, 2), coarse, 0, 2, "no analysis yet"),
-        (ended(fitted, 0, 0.5), coarse, 1, 2, "best 0.5"),
-        (ended(fitted, 1, 0.25), coarse, 2, 2, "best 0.25"),
-        (Stage(full, 1), full, 0, 1, "no analysis yet"),
-        ("the next fit", "starts", 0, 2, "no analysis yet"),
-    ):
-        progress.saw(event)
-        note = progress.note().split(",")[0]
-        assert [progress.what, progress.done, progress.total, note] == said
-
-
 #: Quads of the fit's disk; of a mesh so fine beside it that it is the limit.
 COARSE, FINE = 192, 7200
 
 
 def known(elements):
-    """The known solution's data of another mesh, matched on the coarse one."""
     project = bf.read_project(KNOWN).with_fit(starts=1)
     (test,) = project.tests.values()
     case = replace(test, elements=COARSE, data=replace(test.data, elements=elements))
@@ -431,24 +385,6 @@ def test_data_of_the_same_model_have_no_mesh_error(own):
     best = replace(own.best.differentiated, residual=0 * own.best.differentiated.residual)
     limit = limit_of(own.problem, best, best.residual, 2.0)
     assert not limit.step.any() and not limit.residual.any()
-
-
-def test_noise_and_mesh_are_put_together_everywhere(off):
-    sure, table = off.best.certainty, off.moduli()
-    said = off.result["uncertainty"]
-    for name in COMPONENTS:
-        both = np.sqrt(sure.sigma[name] ** 2 + sure.mesh[name] ** 2)
-        assert sure.total[name] == pytest.approx(both)
-        rows = table[table["modulus"] == name]
-        for column, along in (
-            ("sigma_relative", sure.total),
-            ("noise_relative", sure.sigma),
-            ("mesh_relative", sure.mesh),
-        ):
-            expected = np.interp(rows["strain"], sure.strain[name], along[name])
-            assert rows[column].to_numpy() == pytest.approx(expected, rel=1e-12)
-        assert said["largest_relative_mesh"][name] == np.abs(sure.mesh[name]).max()
-        assert said["largest_relative_total"][name] == sure.total[name].max()
 
 
 def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():

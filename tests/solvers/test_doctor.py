@@ -30,7 +30,6 @@ from ..programs import program
 
 
 def fake(path, version="2.99", then="exit 0"):
-    """A script that tells a version and does something else when it is to run a deck."""
     return program(path, f'#!/bin/sh\n[ "$1" = -v ] && echo "This is Version {version}"\n{then}\n')
 
 
@@ -251,7 +250,6 @@ COMMON = ("sh", "id", "sed", "head", "tail", "find", "mktemp", "dirname", "rm", 
 
 @pytest.fixture
 def machine(tmp_path):
-    """A PATH without apt, and an empty cache."""
     (tmp_path / "bin").mkdir()
     for name in COMMON:
         found = shutil.which(name)
@@ -269,23 +267,3 @@ def build(machine, code):
     )
     assert done.returncode == code, done.stderr
     return done.stderr
-
-
-@pytest.mark.parametrize(
-    ("ccx", "code", "words"),
-    [
-        ("#!/bin/sh\necho 'This is Version 2.99'\n", 0, "ccx is there already"),
-        ("#!/bin/sh\nexit 127\n", 1, "does not run any more"),
-        (None, 1, "apt-get is not there"),
-        ("no compiler", 1, "as root: apt-get install gcc"),
-    ],
-)
-def test_what_is_there_is_not_built_again_and_what_lacks_is_named(machine, ccx, code, words):
-    if ccx == "no compiler":
-        (machine / "bin" / "cc").unlink()
-    elif ccx:
-        program(machine / "cache" / "calculix" / "ccx-2.99-external" / "ccx", ccx)
-    text = build(machine, code)
-    assert words in text
-    assert bool(list(machine.glob("cache/**/ccx"))) == (code == 0)
-    assert ccx is not None or (text.count("\n") == 1 and "BUBBLEFIT_CCX" in text)

@@ -12,9 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from bubblefit.cli.progress import StudyProgress
-from bubblefit.errors import LicenceDenied, SolverFailure
-from bubblefit.runs.executor import run_tasks
+from bubblefit.errors import LicenceDenied
 from bubblefit.solvers import licences
 from bubblefit.solvers.base import (
     Announcement,
@@ -22,7 +20,6 @@ from bubblefit.solvers.base import (
     DifferentiatingSolver,
     ProgramSolver,
     Solver,
-    announce,
     hearing,
 )
 from bubblefit.solvers.licences import LicensedSolver, held, locked, patiently
@@ -315,63 +312,8 @@ def test_every_external_solver_has_the_keys(packages, tmp_path):
     assert solver.options == {}  # licences change no result
 
 
-def test_what_a_worker_announces_is_heard_here():
-    def prepare():
-        return lambda number, tell: announce("waiting", f"run {number}")
-
-    heard = []
-    with hearing(heard.append):
-        records = list(run_tasks(prepare, [4], 1))
-    assert heard == [Announcement("waiting", "run 4")]
-    assert records[-1] is None  # what the task gives; nothing else is a record
-
-
-def test_progress_says_who_waits(capsys, monkeypatch):
-    with StudyProgress(4, quiet=False) as progress:
-        for who in "ab":
-            announce("waiting for a licence of marc", who)
-        assert progress.states == ", 2 waiting for a licence of marc"
-        announce("", "a")
-        announce("denied")
-        assert progress.states == ", 1 waiting for a licence of marc"
-        announce("", "b")
-        assert progress.states == ""
-    # Where there is no bar each is a line, a state once a minute.
-    assert capsys.readouterr().err == "waiting for a licence of marc\ndenied\n"
-    with StudyProgress(4, quiet=True):
-        announce("waiting for a licence of marc", "a")
-    assert capsys.readouterr().err == ""
-    with StudyProgress(4, quiet=False) as progress:
-        announce("waiting for a licence of marc", "a")
-        progress.said -= 100.0
-        progress.show()
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said.endswith("not known yet, 1 waiting for a licence of marc")
-
-
 def wait_for(there):
     end = time.monotonic() + 30
     while not there():
         assert time.monotonic() < end
         time.sleep(0.01)
-
-
-def test_pauses_differ_by_chance_and_a_site_has_words_of_its_own(tmp_path, monkeypatch):
-    made = []
-    monkeypatch.setattr(licences.time, "sleep", made.append)
-    for k in range(40):
-        (tmp_path / str(k)).mkdir()
-        run, _ = denials(1, tmp_path / str(k))
-        patiently(run, "acme", settings(tmp_path, licence_wait=60.0, licence_retry=2.0))
-    assert 1.0 <= min(made) < 1.4 and 2.6 < max(made) <= 3.0 and len(set(made)) == 40
-    for word, tried in (("flexlm ERROR -4", 2), ("FLEXlm error -18", 1)):
-        (tmp_path / word).mkdir()
-        run, tries = denials(1, tmp_path / word, SolverFailure)
-        given = settings(tmp_path, licence_denied=[word], licence_retry=0.1, licence_wait=9.0)
-        if tried == 2:
-            assert patiently(run, "acme", given) == 7
-        else:
-            with pytest.raises(SolverFailure, match="none free") as caught:
-                patiently(run, "acme", given)
-            assert "tries" not in caught.value.reason
-        assert len(tries) == 1

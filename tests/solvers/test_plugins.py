@@ -34,7 +34,6 @@ DIAGNOSE = "bubblefit.solvers.calculix.solver.diagnose"
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    """A folder for PYTHONPATH with the example installed from a copy of it, by pip."""
     place = tmp_path_factory.mktemp("adapter")
     shutil.copytree(ADAPTER, place / "source")
     subprocess.run(
@@ -168,16 +167,6 @@ def test_the_code_in_the_documentation_is_that_of_the_example():
         assert any(block in source for source in sources), block
 
 
-# --- broken ones ---
-BROKEN = {
-    "failing": ("raise RuntimeError('no licence file\\nand more')",
-                "cannot be imported (RuntimeError: no licence file)"),
-    "number": ("THING = 3", "is no factory: acme_number:THING cannot be called"),
-    "empty": ("class THING: name = 'empty'",
-              "gives no solver: THING has no external, progress, identity, run, check"),
-    "falling": ("def THING(): raise ValueError('no DISPLAY')",
-                "fails when it is made (ValueError: no DISPLAY)"),
-}  # fmt: skip
 WORKING = """
 class THING:
     name, external, progress, identity = "acme", True, None, "acme 9"
@@ -187,36 +176,6 @@ class THING:
         {check}
 """
 FINE = "return SolverCheck('acme', True, '9', True)"
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_plug_in_breaks_nothing_else(packages, strips, monkeypatch, name):
-    text, words = BROKEN[name]
-    install(packages, name, text, group=GROUP)
-    with pytest.raises(SolverFailure) as found:
-        solver_named(name)
-    message = str(found.value)
-    assert message.startswith(f"{name}: the plug-in '{name}' of acme-things 2.5 {words}")
-    assert "\n" not in message
-    monkeypatch.chdir(strips)
-    monkeypatch.setenv("BUBBLEFIT_CCX", "")
-    monkeypatch.setattr(DIAGNOSE, lambda named: [])
-    run = CliRunner()
-    done = run.invoke(main, ["doctor"])
-    assert done.exit_code == 0 and "membrane    ok" in done.output
-    assert f"{name:10}  NOT USABLE  plug-in of acme-things 2.5\n" in done.output
-    assert words.split(" (")[0] in done.output
-    if name != "failing":  # whole commands, once
-        return
-    assert run.invoke(main, ["doctor", "--solver", name]).exit_code == 4
-    for solver, code, said in (
-        (name, 4, "acme-things 2.5"),
-        ("nothere", 2, "calculix, failing, marc, membrane"),
-        ("membrane", 0, ""),
-    ):
-        done = run.invoke(main, [*SIMULATE, "--solver", solver])
-        assert done.exit_code == code and said in done.output, done.output
-        assert code != 4 or done.output.count("\n") == 1
 
 
 def test_our_own_names_stay_ours(packages, monkeypatch):

@@ -27,7 +27,6 @@ from bubblefit.solvers.base import (
     SolverCheck,
 )
 from bubblefit.solvers.calculix.solver import CalculixSolver
-from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.run_cache import (
     LIMIT,
     TITLE,
@@ -49,7 +48,6 @@ KEY = hashlib.sha256(b"a run").hexdigest()
 
 
 def history(number=1.0, frames=3):
-    """One with everything that a solver may say, in numbers of all digits."""
     random = np.random.default_rng(int(number))
     return History(
         load=number + random.standard_normal(frames),
@@ -253,32 +251,6 @@ def test_where_it_is_and_whether(monkeypatch, tmp_path):
     assert "BUBBLEFIT_RUNS: is 'off': no runs are kept, name a folder instead" in done.output
 
 
-def test_the_command_shows_and_drops(cache, monkeypatch, tmp_path):
-    monkeypatch.setenv(VARIABLE, str(cache.folder))
-    said = in_process("cache", cwd=tmp_path).output
-    assert said == f"{cache.folder}: 0 runs, 0 B of at most 2 GB\n"
-    size = filled(cache, 4)
-    said = in_process("cache", cwd=tmp_path).output.splitlines()
-    total = sum(entry.size for entry in cache.entries())
-    assert said[0] == f"{cache.folder}: 4 runs, {total / 1000:.3g} kB of at most 2 GB"
-    assert said[1].startswith("last used between ") and said[1].endswith(" weeks ago")
-    told = json.loads(in_process("cache", "--prune", 2 * size, "--json", cwd=tmp_path).output)
-    assert (told["runs"], told["dropped"]) == (2, 2) and told["bytes"] <= 2 * size
-    assert there(cache, 4) == [2, 3]
-    assert "dropped: 2 runs" in in_process("cache", "--older", "1h", cwd=tmp_path).output
-    filled(cache, 4)
-    assert "of at most 1 B" in in_process("cache", "--limit", "1B", cwd=tmp_path).output
-    assert cache.entries() == []
-    in_process("cache", "--limit", "3 MB", cwd=tmp_path)
-    filled(cache, 3)
-    other = RunCache(tmp_path / "other")
-    filled(other, 2)
-    in_process("cache", "--folder", other.folder, "--clear", cwd=tmp_path)
-    assert other.entries() == [] and len(cache.entries()) == 3
-    in_process("cache", "--clear", cwd=tmp_path)
-    assert cache.entries() == []
-
-
 @pytest.mark.parametrize(
     ("option", "value"),
     [("--prune", "much"), ("--prune", "-1GB"), ("--limit", "2 K"), ("--older", "30")],
@@ -377,24 +349,6 @@ def test_another_solver_is_another_run(cache, tmp_path):
     assert runs({"element": 4}) == 1
     one.write_text("#!/bin/sh\nexit 3\n")  # in place
     assert runs() == 1
-
-
-def test_the_code_of_a_plug_in_counts(packages):
-    from importlib import import_module, reload
-
-    from bubblefit.solvers.decks import code_mark
-
-    ours = code_mark(CalculixSolver.__module__)
-    assert ours == code_mark(MarcSolver.__module__)
-    code_mark.cache_clear()
-    assert code_mark(CalculixSolver.__module__) == ours
-    path = packages / "acme_cached.py"
-    path.write_text("A = 1\n")
-    reload(import_module("acme_cached"))
-    first = code_mark("acme_cached")
-    path.write_text("A = 2\n")
-    code_mark.cache_clear()
-    assert first != code_mark("acme_cached") and first != ours
 
 
 def test_runs_that_are_not_kept(cache):

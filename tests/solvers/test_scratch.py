@@ -154,23 +154,6 @@ def test_whose_is_swept(tmp_path, monkeypatch):
     os.close(lock)
 
 
-def test_what_was_cut_off_at_its_beginning_or_end_goes_when_it_is_old(tmp_path):
-    empty, cut, others = (tmp_path / f"bubblefit-{n}-1" for n in ("empty", "cut", "others"))
-    for folder in (empty, cut, others):
-        folder.mkdir()
-    (cut / OWNER).write_text("machine")
-    (others / "file").touch()
-    plain = tmp_path / "somebody-else"
-    plain.mkdir()
-    link = tmp_path / "bubblefit-link-1"
-    link.symlink_to(others)
-    assert sweep([tmp_path]) == []
-    for folder in (empty, cut, others, plain):
-        os.utime(folder, (1e9, 1e9))
-    assert sorted(sweep([tmp_path])) == [cut, empty]
-    assert others.exists() and plain.exists() and link.is_symlink()
-
-
 def test_the_usual_places_are_swept(tmp_path, monkeypatch):
     monkeypatch.setattr(scratch, "MEMORY", tmp_path / "memory")
     monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))

@@ -24,7 +24,7 @@ from bubblefit.runs import plan as plan_module
 from bubblefit.runs import weights as study_of
 from bubblefit.runs.best import NOT_THE_CARD
 from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
-from bubblefit.runs.plan import NOW, plan
+from bubblefit.runs.plan import plan
 from bubblefit.runs.poisson import by_response, ratios, vary_nu12
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.result import Fit
@@ -308,31 +308,6 @@ def test_what_cannot_be_computed_is_left_out_and_named(project, few, monkeypatch
     assert "fill strip" in [name for _, _, name in told]
 
 
-def test_the_command_plan(tmp_path, few):
-    with_range = replace(CARD, law=replace(CARD.law, strain_range=np.array(PLANNED_ENDS)))
-    words, result, page, out = commanded(tmp_path, with_range, "plan", "project.toml")
-    table = pd.read_csv(out / "plan.csv")
-    assert table["test"].tolist() == [NOW, *(c["test"] for c in result["candidates"])]
-    assert table["rank"].tolist() == list(range(len(table)))
-    first = result["candidates"][0]
-    assert table.loc[1, "sigma_G12"] == pytest.approx(first["sigma"]["G12"], rel=1e-5)
-    assert table.loc[1, "sigma_E1_at_0.1"] == pytest.approx(first["sigma_at"]["E1"][2], rel=1e-5)
-    assert result["now"]["unknown"] == ["G12"]
-    for text in (first["test"], "unknown", "Assumed:"):
-        assert text in page and text in words
-    (chart,) = charts_of(out)["plan"]
-    for name, own in zip(chart.x_names[1:], table["test"][1:], strict=True):
-        assert own in name
-    for series in chart.series:
-        if series.name.endswith(", not known"):
-            assert set(series.y) == {100.0}
-            continue
-        own = 100 * table[f"sigma_{series.name}"].to_numpy()
-        assert series.y == [pytest.approx(v, rel=1e-4) if v < 100 else None for v in own]
-    bad = in_process("plan", "project.toml", "--noise", "strips", cwd=tmp_path, code=2)
-    assert "--noise: expected KIND=VALUE" in bad.output
-
-
 #: MPa; not quite the optimum of test "one", which is at 330 and 190.
 PROFILED = MaterialCard(HypoelasticLaw.linear(328.0, 190.5, 10.0, 0.0), 0.8, "near")
 
@@ -383,28 +358,6 @@ def test_words_of_what_is_uneven():
     assert one.words.endswith("; asymmetric: 1.96 below, 3.92 above")
     better = replace(one, above=Side((10.0, 12.0), (0.0, -3.0), "bound", 2))
     assert {note.kind for note in better.notes} == {NOT_THE_CARD, NOT_CLOSED}
-
-
-def test_the_command_profile(tmp_path):
-    words, said, _, folder = commanded(
-        tmp_path, PROFILED, "profile", "project.toml", "--modulus", "E1", "--modulus",
-        "E2=0.02,0.1", "--strain", "0.04", "--test", "one", "--quiet", "--jobs", "2",
-    )  # fmt: skip
-    first, *_ = every = said["profiles"]
-    names = [(one["modulus"], one["strain"]) for one in every]
-    assert names == [("E1", 0.04), ("E2", 0.02), ("E2", 0.1)]
-    table = pd.read_csv(folder / "profile.csv")
-    own = table[(table["modulus"] == "E1") & (table["strain"] == 0.04)]
-    np.testing.assert_allclose(own["MPa"], first["curve_MPa"], rtol=1e-8)
-    np.testing.assert_allclose(own["minus_2_log_L"], first["curve_minus_2_log_L"], rtol=1e-8)
-    np.testing.assert_allclose(own["by_sigma"], own["minus_2_log_L"], atol=0.01)
-    assert said["analyses"] > sum(one["analyses"] for one in every)
-    assert f"{said['analyses']} analyses" in words
-    charts = charts_of(folder)["profiles"]
-    assert len(charts) == 3 and charts[0].series[0].x == pytest.approx(own["MPa"], rel=1e-5)
-    assert charts[0].series[0].y == pytest.approx(own["minus_2_log_L"], rel=1e-5, abs=1e-9)
-    ends = [series.x[0] for series in charts[0].series if series.name == "ends"]
-    assert ends == pytest.approx([first["lower_MPa"], first["upper_MPa"]], rel=1e-5)
 
 
 VARIED = MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0), 0.5, "soft")
@@ -465,7 +418,6 @@ def test_a_value_that_fails_is_named(bars):
 
 @pytest.fixture(autouse=True)
 def without_pages(monkeypatch):
-    """The page of the fit is no matter here, and takes most of the time."""
     monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
 
 

@@ -4,30 +4,28 @@ import json
 from collections import Counter
 from dataclasses import replace
 from functools import cache
-from itertools import groupby
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, NoFeasibleStart, Note, OutputError, SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.kinds import BEYOND_CARD, Weighting
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import compare, validation, verification
-from bubblefit.runs.compare import FoldError, folds
+from bubblefit.runs.compare import folds
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import FAILED
-from bubblefit.runs.validation import HeldOut, Judged, Validation, fit_without, held_out, parts_of
-from bubblefit.runs.verification import SUBJECTS, Number, marc_bars, numbers
+from bubblefit.runs.validation import fit_without, held_out, parts_of
+from bubblefit.runs.verification import SUBJECTS, Number, numbers
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import in_process
-from ..drawings import charts_of
 from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, small
 from ..published_laws import TABLE_4_2
 
@@ -75,37 +73,6 @@ def setup_of(**specimens):
 )
 def test_how_many_folds(specimens, count):
     assert len(folds(setup_of(**specimens), 5)) == count
-
-
-def test_the_best_start_of_a_fold_counts(monkeypatch):
-    ends, drawn, reset = [3.0, None, NoFeasibleStart("none"), 1.0, 2.0], [], []
-
-    def feasible_start(problem, seed, number):
-        drawn.append((seed, number))
-        if isinstance(ends[number], NoFeasibleStart):
-            raise ends[number]
-        return number
-
-    def fit_from(problem, start, options):
-        best = SimpleNamespace(unknowns=f"of start {start} by {options}")
-        return ends[start] and SimpleNamespace(value=ends[start], best=best)
-
-    monkeypatch.setattr(compare, "feasible_start", feasible_start)
-    monkeypatch.setattr(compare, "fit_from", fit_from)
-    problem = SimpleNamespace(reset=lambda: reset.append(1))
-    assert compare.best_of(setup_of(), problem, 5) == "of start 3 by options"
-    assert drawn == [(3, number) for number in range(5)] and len(reset) == 5
-    assert compare.best_of(setup_of(), problem, 3) == "of start 0 by options"
-    ends[0] = None
-    assert compare.best_of(setup_of(), problem, 3) is None
-    part = SimpleNamespace(evaluate=lambda unknowns, jacobian, warm: None)
-    parts = (SimpleNamespace(name="bubble"), SimpleNamespace(name="warp"))
-    whole = SimpleNamespace(comparisons=parts, part=lambda numbers: {(1,): part}[tuple(numbers)])
-    own = SimpleNamespace(problem=lambda masks: {(False, True): whole}[tuple(masks["warp"])])
-    for unknowns in (None, "unknowns"):
-        monkeypatch.setattr(compare, "fit_of", lambda *_, y=unknowns: (own, y))
-        masks = {"warp": np.array([True, False])}
-        assert compare._fold(setup_of(), 4, masks, 1) == FoldError(4, None, {})
 
 
 #: mm at the last point of specimens a, b and c.
@@ -196,7 +163,6 @@ def test_strains_beyond_the_law_and_unstable_equilibria_with_their_part():
 
 @pytest.fixture(autouse=True)
 def without_pages(monkeypatch):
-    """The pages of the fits are no matter here, and take most of the time."""
     monkeypatch.setattr(Fit, "report", lambda self, folder: Path(folder))
 
 
@@ -377,66 +343,6 @@ def test_a_law_that_cannot_be_run_is_told(project, monkeypatch):
     assert (note.kind, note.of) == (FAILED, "two") and "too tired" in note
 
 
-#: Law, test, compared, RMS foretold and fitted, relative foretold and fitted.
-ROWS = [
-    ("cubic", "one", "one: warp", 12.5, 5.0, 0.05, 0.02),
-    ("cubic", "one", "one: fill", 7.0, 2.0, 0.05, 0.02),
-    ("cubic", "two", "two: warp", 30.0, None, 0.15, None),
-    ("constant", "one", "one: warp", 20.0, None, 0.06, None),
-    ("constant", "one", "one: fill", 1.0, None, 0.06, None),
-    ("constant", "two", "two: warp", 3.0, None, 0.07, None),
-    ("spline", "one", "one: warp", 12.5, None, 0.05, None),
-    ("spline", "one", "one: fill", 7.0, None, 0.05, None),
-    ("spline", "two", "two: warp", None, None, None, None),
-]
-
-
-def held(rows, rms, relative):
-    known = {row[2]: row[rms] for row in rows if row[rms] is not None}
-    failed = Note(FAILED, "no analysis: too tired", rows[0][1])
-    units = {row[2]: "N" for row in rows}
-    return HeldOut(rows[0][1], rows[0][relative], known, units, () if known else (failed,))
-
-
-EACH = [list(own) for _, own in groupby(ROWS, key=lambda row: row[:2])]
-FOUND = Validation("made", tuple(Judged(o[0][0], held(o, 3, 5), held(o, 4, 6)) for o in EACH))
-
-
-def test_table_result_and_lines(tmp_path):
-    expected = {"cubic": 0.1, "constant": 0.065, "spline": np.nan}
-    assert FOUND.means == pytest.approx(expected, nan_ok=True)
-    columns = [
-        "law", "test", "compared", "unit", "foretold_rms", "fitted_rms", "foretold_relative",
-        "fitted_relative", "foretold_words",
-    ]  # fmt: skip
-    wanted = [dict(zip(columns, (*row[:3], "N", *row[3:], ""), strict=True)) for row in ROWS]
-    table = pd.DataFrame(wanted, dtype=None)
-    pd.testing.assert_frame_equal(FOUND.table(), table, check_dtype=False)
-    out = tmp_path / "new" / "folder"
-    FOUND.write(out)
-    result = json.loads((out / "result.json").read_text())
-    assert result == FOUND.result and result["rows"] == wanted
-    assert result["mean_foretold"] == pytest.approx({**expected, "spline": None})
-    assert [(note["of"], note["kind"]) for note in result["notes"]] == [("spline, two", "failed")]
-    (chart,) = charts_of(out)["held out"]
-    assert chart.x_names == ["one", "two"]
-    assert {series.name: series.y for series in chart.series} == {
-        "cubic, predicted": [5.0, 15.0], "constant, predicted": [6.0, 7.0],
-        "spline, predicted": [5.0, None], "cubic, fitted": [2.0, None],
-    }  # fmt: skip
-    for series in chart.series:
-        assert np.round(series.x).tolist() == [1.0, 2.0]
-    text = (out / "validation.csv").read_text().splitlines()
-    assert text[:2] == [",".join(columns), "cubic,one,one: warp,N,12.5,5,0.05,0.02,"]
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError):
-        FOUND.write(tmp_path / "file")
-    lines = FOUND.lines()
-    assert len(lines) == 1 + len(ROWS) + 3 and "constant" in lines[-1]
-    assert [line.split()[0] for line in lines[1:10]] == [row[0] for row in ROWS]
-    assert "10 %" in lines[-3] and "6.5 %" in lines[-2]
-
-
 COUNTS = {
     "bars": 4, "hencky": 7, "abaqus": 16, "marc bubble": 7, "strips": 5, "thin walls": 6,
     "bent tube": 3, "nu12": 5,
@@ -499,33 +405,3 @@ def test_a_number_further_off_than_allowed_is_missed():
         assert number.met and number.deviation == pytest.approx(off)
         for worse in (2.03, 1.97, float("nan")):
             assert not replace(number, ours=worse).met
-
-
-class Stiff(MembraneSolver):
-    def run(self, *args, **options):
-        history = super().run(*args, **options)
-        return replace(history, load=1.0002 * np.asarray(history.load))
-
-
-def test_the_command(monkeypatch, tmp_path):
-    subjects = {"bars": marc_bars, "calculix": lambda: iter(())}
-    monkeypatch.setattr(verification, "SUBJECTS", subjects)
-    done = in_process("verify", "--subject", "bars", "--subject", "calculix", cwd=tmp_path)
-    row = next(line for line in done.output.splitlines() if "direct warp bar" in line)
-    assert row.split()[5:10] == ["62.6747", "62.677", "MPa", "-0.0036", "%"]
-    assert "MSC Marc; Jekel et al., Composite Structures 161 (2017)" in row
-    assert "calculix: not here" in done.output
-    assert done.output.endswith("all 4 numbers are met\n")
-    subjects["bars"] = lambda: marc_bars(Stiff())
-    done = in_process("verify", "--subject", "bars", cwd=tmp_path, code=1)
-    assert done.output.count("   MISSED\n") == 4
-    assert "4 of 4 missed: end stress, direct warp bar; " in done.output.splitlines()[-1]
-    done = in_process("verify", "--subject", "bars", "--json", cwd=tmp_path, code=1)
-    told = json.loads(done.output)
-    first = told["numbers"][0]
-    assert (told["ok"], first["subject"], first["met"]) == (False, "bars", False)
-    assert first["deviation"] == pytest.approx(1.64e-4, abs=1e-6)
-    assert list(first) == [
-        "subject", "what", "ours", "theirs", "unit", "deviation", "allowed", "absolute", "met",
-        "source",
-    ]  # fmt: skip

@@ -13,10 +13,8 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
-from bubblefit.reports.study_pages import panels
 from bubblefit.runs import refinement
 from bubblefit.runs.refinement import Level, LevelRun, convergence, observed_order, refine
-from bubblefit.runs.simulation import FAILED
 from bubblefit.solvers.base import SNAP
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -203,30 +201,6 @@ def test_numbers():
     said = told([RUNS[0], RUNS[3]])
     assert said["quantities"] == {} and "rms_N" not in said and len(said["levels"]) == 2
     assert "rms_N" not in told([LevelRun(r.level, r.seconds, 1, r.values) for r in RUNS[:2]])
-
-
-def test_table_panels_and_notes():
-    table, nan = study(RUNS).table(), np.nan
-    rows = [
-        (25, LOAD, 11.0, 0.75, 100 * 0.75 / 10.25), (25, refinement.RMS, 0.2 * ROOT, nan, nan),
-        (100, LOAD, 10.5, 0.25, 100 * 0.25 / 10.25), (100, LATE, 21.0, 0.5, 100 * 0.5 / 20.5),
-        (100, refinement.RMS, 0.1 * ROOT, nan, nan), (400, LOAD, 10.25, 0.0, 0.0),
-        (400, LATE, 20.5, 0.0, 0.0), (1600, "failed: no equilibrium", nan, nan, nan),
-    ]  # fmt: skip
-    columns = ["elements", "quantity", "value", "off_finest", "off_finest_percent"]
-    for row, wanted in zip(table[columns].itertuples(index=False), rows, strict=True):
-        assert tuple(row[:2]) == wanted[:2]
-        assert row[2:] == pytest.approx(wanted[2:], nan_ok=True)
-    (panel,) = panels(study(RUNS))
-    assert (panel.name, panel.sizes) == ("bar", [8.0, 4.0, 2.0])
-    assert (panel.work, panel.seconds) == ([250, 1000, 4000], [0.25, 1.0, 4.0])
-    assert panel.changes[LOAD] == pytest.approx([50 / 10.25, 25 / 10.25])
-    assert panel.changes[LATE] == pytest.approx([nan, 50 / 20.5], nan_ok=True)
-    assert panel.changes["RMS along the load curve"] == pytest.approx([2 * ROOT, ROOT])
-    for what, size in (("elements", "1600 quads"), ("increments", "10 increments")):
-        failed, own = study(RUNS, what=what).notes
-        assert failed.line == f"bar, {size}: no equilibrium" and failed.kind is FAILED
-        assert own.line == "made up"
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)

@@ -35,7 +35,6 @@ def points_on(outline):
 
 
 def inflated(law, outline=CIRCLE, thickness=THICKNESS, pressures=PRESSURES):
-    """Return fields at points of a grid, as a camera has them, of a computed bubble."""
     mesh = elliptic_disk_mesh(outline, 192, "quarter" if outline.round else "full")
     history = MembraneSolver().run(BubbleModel(mesh, thickness, pressures), law)
     points, fields = points_on(outline), []
@@ -48,7 +47,6 @@ def inflated(law, outline=CIRCLE, thickness=THICKNESS, pressures=PRESSURES):
 
 
 def clamped(fields, out=118.0):
-    """With points of the clamp, which stand still."""
     angle, radius = np.meshgrid(np.arange(0.0, 2 * np.pi, 0.1), np.arange(101.0, out, 4.0))
     ring = np.stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()], axis=1)
     z, still = np.zeros(len(ring)), np.zeros((len(ring), 3))
@@ -89,7 +87,6 @@ def pressed(field, by):
 
 
 def zeros(field, by):
-    """Six points that do not move, their places times a factor."""
     places, moved = field.points.copy(), field.displacement.copy()
     places[200:206], moved[200:206] = by * places[200:206], 0.0
     return replace(field, points=places, displacement=moved)
@@ -111,7 +108,6 @@ def exchanged(fields):
 
 
 def columns(points: float = 1.0, moved=(1.0, 1.0, 1.0)):
-    """Places and displacements times factors."""
     return each(lambda f: replace(f, points=f.points * points, displacement=f.displacement * moved))
 
 
@@ -225,7 +221,6 @@ def field(pressure, moved, points=POINTS, z=None):
 
 
 def said(check, expected=FABRIC, **seen):
-    """Return name, certainty and text of what a check finds in a made-up view."""
     whole = View(seen.pop("fields", (field(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
     names = "outline radius top last fields thickness registered inner rises flat".split()
     view = SimpleNamespace(clamp=None, **({name: getattr(whole, name) for name in names} | seen))
@@ -233,7 +228,6 @@ def said(check, expected=FABRIC, **seen):
 
 
 def finds(check, count, name, sure, *words, **seen):
-    """Assert that a check finds so many doubts, each of a name and with these words."""
     found = said(check, **seen)
     assert [one[:2] for one in found] == [(name, sure)] * count
     assert all(word in one[2] for one in found for word in words), found

@@ -550,7 +550,6 @@ MOVED = np.array([[0, 0, 9.0], [0.1, 0, 8.0], [0, 0.2, 7.0], [0.3, 0.4, 6.0]])
 
 
 def inflated(points: np.ndarray) -> np.ndarray:
-    """Displacement of a doubly symmetric bubble, another along x than along y."""
     x, y = points.T
     height = 1.0 - 0.6 * x**2 - 0.8 * y**2
     return np.stack([0.3 * x * height, -0.2 * y * height**2, height], axis=1)

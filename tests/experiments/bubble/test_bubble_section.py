@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import point_files
-from bubblefit.experiments.bubble import report as examined
-from bubblefit.experiments.bubble.doubts import Apex
 from bubblefit.experiments.bubble.objective import (
     at_points,
     at_rest,
@@ -26,7 +24,7 @@ from bubblefit.experiments.bubble.section import (
 )
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
 from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
-from bubblefit.experiments.kinds import Fabric, Output, Place, Scales
+from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.project.project import Project, read_project
 from bubblefit.readers.fields import DisplacementField
@@ -35,7 +33,6 @@ from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint, complaint_with
-from ...drawings import caught
 from ...places import EXAMPLES, KNOWN, SHARED
 from ...projects import edited, small
 
@@ -46,7 +43,6 @@ R, ELLIPSE = "radius = 100.0", "ellipse = { major = %s }"
 
 @pytest.fixture
 def edit(tmp_path):
-    """Read the known-solution example after replacing one text by another."""
     return partial(edited, tmp_path)
 
 
@@ -366,37 +362,6 @@ def test_times_of_frames(tmp_path):
 def test_times_that_cannot_be_had(tmp_path, said, words):
     found = complaint(times, tmp_path, **said)
     assert found.removeprefix(f"{tmp_path}/").startswith(words)
-
-
-def test_every_cell_of_what_is_seen(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, examined, "bubbles.rise_charts")
-    monkeypatch.setattr(examined, "registration_picture", lambda *_: ("maps.png", "maps"))
-    at = np.zeros((4, 2)), np.zeros((4, 3))
-    dropped = {"all zero": 2, "without a value": 1}
-    fields = [
-        DisplacementField(0.02, *at, dropped), DisplacementField(0.2, *at, path=Path("x/b.csv"))
-    ]  # fmt: skip
-    view = SimpleNamespace(
-        rises=np.array([3.0, 30.0]), apexes=[Apex(0.2, 31.0, 0.012, 16.0, 0.5, (0.03, 0.05))],
-        rim=SimpleNamespace(x=1.234, y=-0.5, error=0.123),
-        axes=SimpleNamespace(off=-2.346, error=0.456, clear=0.876),
-    )  # fmt: skip
-    test = SimpleNamespace(thickness=0.8, outline=None)
-    prepared: Any = SimpleNamespace(fields=fields, view=view, test=test, registration=None)
-    shown = examined.examine(prepared, Output(tmp_path))
-    facts = ["1.23, -0.50 (+- 0.12)", "-2.35 (+- 0.46, 88% clear)"]
-    assert [value for _, value in shown.facts] == facts
-    frames, equilibrium = shown.tables
-    first, second = frames.rows
-    assert first == [20.0, "computed", 4, "2 all zero, 1 without a value", 3.0]
-    assert second == [200.0, "b.csv", 4, "none", 30.0]
-    assert equilibrium.rows == [pytest.approx([200.0, 31.0, 12.0, 16.0, 0.5, 20.0, 3.0, 5.0])]
-    assert [name for name, _ in shown.figures] == ["maps.png", "rises.png"]
-    ((path, pressures, rises),) = drawn
-    assert (path, pressures) == (tmp_path / "rises.png", [0.02, 0.2]) and rises is view.rises
-    view.apexes, view.rim, view.axes = [], None, None
-    bare = examined.examine(prepared, Output(tmp_path))
-    assert bare.facts == [] and len(bare.tables) == 1
 
 
 class Other(MembraneSolver):

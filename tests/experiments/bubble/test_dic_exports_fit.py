@@ -8,9 +8,9 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import KIND
-from bubblefit.experiments.bubble.findings import registration_line, registration_numbers
+from bubblefit.experiments.bubble.findings import registration_numbers
 from bubblefit.experiments.bubble.point_files import PointFiles
-from bubblefit.experiments.bubble.report import ASKED, correlation_table, registration_table
+from bubblefit.experiments.bubble.report import ASKED, correlation_table
 from bubblefit.experiments.bubble.section import CorrelationSection
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.meshes.mesh import Facet
@@ -21,16 +21,13 @@ from scipy.spatial.transform import Rotation
 from ...camera import camera_project
 from ...commands import in_process, result_in
 from ...complaints import complaint
-from ...dic_exports import EXPORTS
 from ...projects import small
 
 ONE_START = ("--starts", 1, "--jobs", 1)
-DATA = re.compile(r"(?m)^\[bubble\.data\.known_solution\].*?(?=^\[fit\])", re.S)
 
 
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
-    """The text of a project of computed data, and its frames."""
     path = small(tmp_path_factory.mktemp("computed"), ("elements = 48", "elements = 108"))
     text = path.read_text().replace('symmetry = "quarter"', 'symmetry = "full"')
     path.write_text(text)
@@ -39,23 +36,6 @@ def bubble(tmp_path_factory):
     fields = KIND.prepare(test, law_of(project, [test.reach]), MembraneSolver).fields
     points = np.column_stack([fields[0].points, np.zeros(len(fields[0].points))])
     return text, [(points, field.displacement) for field in fields]
-
-
-def project_of(bubble, folder, case: str):
-    text, frames = bubble
-    files = [file.name for file in EXPORTS[case][1](folder, frames)]
-    path = folder / "project.toml"
-    path.write_text(DATA.sub(f"[bubble.data.points]\nfiles = {files}\n\n", text))
-    return path
-
-
-def test_a_fit_says_what_was_read(bubble, tmp_path):
-    path = project_of(bubble, tmp_path, "pyaldic")
-    done = in_process("bubble", path, *ONE_START, "--out", tmp_path / "out", cwd=tmp_path)
-    assert "y and z are turned over" in done.output
-    assert "places in the deformed state" in done.output
-    said = result_in(tmp_path / "out")["data"]
-    assert said["dropped"] == {"without a value": 7} and said["read"]["columns"]["dz"] == "W"
 
 
 #: Warp turned by 12 degrees, the sheet tilted by 3, 600 mm away and 5 mm off the middle.
@@ -71,7 +51,6 @@ REGISTRATION = "[bubble.data.points.registration]\n"
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """A folder with frames and a log of their pressures, the text of a project, the law behind."""
     folder = tmp_path_factory.mktemp("registered")
     text, known = camera_project(folder, lambda x, u: (x @ TURN.T + SHIFT, u @ TURN.T))
     log = np.column_stack([5.0 + 2.0 * np.arange(len(SHOWN)), SHOWN])
@@ -177,19 +156,6 @@ def test_numbers():
     assert bare["clamp_motion"]["removed"] is False
     unseen = registration_numbers(found(motions=MOTIONS[1:2]))["clamp_motion"]
     assert unseen == {"removed": False, "shift_mm": [], "turn_degrees": []}
-
-
-def test_table_and_line():
-    soft = SimpleNamespace(remove_clamp_motion=False, warp_is_stiff=False)
-    for changes, words in (
-        ({}, ["1.46 0.068", "1.23, -5.68, 600.00 0.12", "12.35 0.46 87% stiffer", "0.5 removed"]),
-        ({"options": soft, "warp": None}, ["", "", "given", "left in"]),
-    ):
-        for row, own in zip(registration_table(found(**changes)).rows, words, strict=True):
-            assert all(word in " ".join(row) for word in own.split()), row
-    for warp, end in ((found().warp, "(+- 0.5)"), (None, "(given)")):
-        line = registration_line(found(warp=warp))
-        assert "1.23, -5.68, 600.00 mm, tilt 1.46, warp 12.35" in line and line.endswith(end)
 
 
 def read(seen, more: str) -> bf.Project:

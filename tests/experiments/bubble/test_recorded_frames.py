@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
-from bubblefit.experiments.bubble.point_files import RecordedFrames
 from bubblefit.experiments.bubble.prepared import prepare
 from bubblefit.experiments.bubble.report import clock_pictures, recorded_table
-from bubblefit.experiments.kinds import Output, files_of
-from bubblefit.project.project import project_text, read_project, settings_of
-from bubblefit.readers.pressure_log import ClockOffset, picture_numbers
+from bubblefit.experiments.kinds import Output
+from bubblefit.project.project import read_project
+from bubblefit.readers.pressure_log import picture_numbers
 
 from ...complaints import complaint, complaint_with
 from ...dic_exports import pyaldic
@@ -115,19 +114,6 @@ def test_all_frames_and_some(folder):
     assert test.pressures == pytest.approx([0.033, 0.060])
     left = recorded_numbers(test.data.recorded)["left_out"]
     assert left == {"at no pressure": 3, "at a pressure that another frame has": 9}
-
-
-def test_the_log_is_in_the_record_of_a_run(folder, tmp_path):
-    (folder / "beside.csv").write_bytes((folder / "data" / "valve.csv").read_bytes())
-    text = LOG.format(more="").replace("valve.csv", "beside.csv")
-    found = read_project(project(folder, text, "[10, 60]"))
-    (test,) = found.tests.values()
-    *frames, log = files_of(prepare(test, None, None))
-    assert [file.path.name for file in frames] == [file.name for file in test.data.files]
-    assert log.path == folder / "beside.csv" and log.source.format == "log" and log.used is None
-    again = tmp_path / "again.toml"
-    again.write_text(project_text(settings_of(found, [test.name])))
-    assert bubble(again).pressures == test.pressures
 
 
 def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
@@ -285,46 +271,3 @@ def test_bad_logs_name_file_and_field(folder, old, new, words):
     assert old in text
     path.write_text(text.replace(old, new))
     complaint_with(words, read_project, path)
-
-
-#: Of all five frames of the film, MPa; the first of them is before the log begins.
-DOUBT = np.array([np.nan, 0.0002, 0.0004, 0.0006, 0.0008])
-CLOCK = ClockOffset(
-    offset=41.254, lower=40.996, upper=41.504, misfit=0.00234,
-    pressure=np.array([np.nan, 0.01, 0.021, 0.033, 0.06]), doubt=DOUBT,
-    times=np.arange(5.0), heights=np.array([0.0, 10.0, 20.0, 30.0, 40.0]),
-)  # fmt: skip
-TAKEN = RecordedFrames(
-    files=(Path("a.csv"), Path("b.csv")), frames=None, names=("a.csv", "b.csv"),
-    pressure=np.array([0.021, 0.06]), asked=np.array([0.0215, 0.0598]), source="the log valve.csv",
-    count=5, left_out={"at no pressure": 1, "before the log": 2}, doubt=DOUBT[[2, 4]], clock=CLOCK,
-)  # fmt: skip
-#: Without a log, and of what frames there are.
-PLAIN = replace(TAKEN, asked=None, doubt=None, clock=None, left_out={}, source="the files' names")
-
-
-def test_numbers_and_tables_of_frames():
-    found = recorded_numbers(TAKEN)
-    rows = [("a.csv", 21.0, 21.5, 0.4), ("b.csv", 60.0, 59.8, 0.8)]
-    names = ("frame", "pressure_kPa", "asked_kPa", "uncertain_kPa")
-    for row, own in zip(found.pop("taken"), rows, strict=True):
-        assert row == pytest.approx(dict(zip(names, own, strict=True)))
-    assert found == {
-        "from": "the log valve.csv", "frames": 5,
-        "left_out": {"at no pressure": 1, "before the log": 2},
-        "clock": {
-            "offset_s": 41.254, "between_s": [40.996, 41.504], "misfit": 0.00234,
-            "how": "found by the apex heights",
-        },
-    }  # fmt: skip
-    for row, (name, own, asked, doubt) in zip(recorded_table(TAKEN).rows, rows, strict=True):
-        assert row[0] == name and row[1:] == pytest.approx([own, asked, own - asked, doubt])
-    line = recorded_lines(TAKEN)[1]
-    assert all(word in line for word in ("41.25 s", "41.00 and 41.50 s", "0.0023", "0.5 kPa"))
-    # Where the offset was given, the clocks leave nothing open.
-    given = replace(TAKEN, asked=None, clock=replace(CLOCK, misfit=None))
-    assert recorded_numbers(given)["clock"]["how"] == "given"
-    assert recorded_table(given).header == ["frame", "pressure, kPa"]
-    plain = recorded_numbers(PLAIN)
-    assert plain["taken"][1] == pytest.approx({"frame": "b.csv", "pressure_kPa": 60.0})
-    assert "clock" not in plain and len(recorded_lines(PLAIN)) == 1

@@ -20,7 +20,6 @@ from bubblefit.experiments.bubble.objective import (
     counted_from,
     with_places,
 )
-from bubblefit.experiments.bubble.report import misfit_table, residuals, surface_tables
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial, measured_sheet, with_sheet
 from bubblefit.experiments.kinds import FittedTest, Output
@@ -80,7 +79,6 @@ UNEVEN = script("benchmarks/bench_sheet.py")
 
 
 def project(folder: Path, sheet: str, **what: float) -> Path:
-    """The project of a computed uneven test, and its files."""
     UNEVEN.write_test(folder, UNEVEN.Uneven(**what), PRESSURES, 112)
     path = folder / "project.toml"
     path.write_text(UNEVEN.project_text(PRESSURES, 112, sheet))
@@ -115,7 +113,6 @@ def test_noise_of_the_surface_is_told():
 
 
 def targets() -> tuple[list[FieldTarget], np.ndarray, np.ndarray]:
-    """Three pressures at the nodes of a mesh, each with a node left out, and a model's frames."""
     random = np.random.default_rng(5)
     nodes = disk_mesh(100.0, 16).points[:, :2]
     frames = random.standard_normal((3, len(nodes), 3))
@@ -184,7 +181,6 @@ def test_displacements_counted_from_a_loaded_frame():
 
 
 def loaded(folder: Path, pressures: Sequence[float]) -> Path:
-    """A project of a flat sheet whose reference picture was taken at the first of the pressures."""
     mesh = disk_mesh(100.0, 112)
     model = BubbleModel(mesh, UNEVEN.THICKNESS, pressures, default_increments(pressures))
     moved = MembraneSolver().run(model, UNEVEN.law()).displacement
@@ -261,7 +257,6 @@ ALL = Sheet(
 
 
 def fitted(sheet: Sheet) -> tuple[Any, Any]:
-    """Preparation and fit of a test with this sheet."""
     model = BubbleModel(MESH, 0.8, TWO, TWO)
     nuisance, values = [], {}
     if sheet.measured:
@@ -325,43 +320,6 @@ def test_every_number():
 def test_a_sheet_of_which_nothing_is_known(sheet, known, warned):
     test = SimpleNamespace(known=known, test=SimpleNamespace(sheet=sheet))
     assert [n.kind for n in sheet_report.sheet_warnings(test)] == [sheet_report.FLAT_SHEET] * warned
-
-
-@pytest.mark.parametrize(("objective", "scales"), [("mm", (1, 1, 1)), ("e", (2, 4, 5))])
-def test_misfit_by_pressure(objective, scales):
-    read = np.array([[[2.0, 4.0, 5.0]], [[2.0, 4.0, -5.0]]])
-    moved = read + np.array([[[0.1, 0.2, -0.4]], [[0.5, 0.0, 0.3]]])
-    targets = [FieldTarget(p, u) for p, u in zip((0.02, 0.2), read, strict=True)]
-    comparison = SimpleNamespace(objective=FieldObjective(targets, objective))
-    history = History(np.array([0.02, 0.2]), moved, np.zeros(3), np.zeros(3))
-    fitted: Any = SimpleNamespace(comparisons=[comparison], histories=[history], nuisance={})
-    prepared: Any = SimpleNamespace(test=SimpleNamespace(objective=objective))
-    comparison.model = SimpleNamespace(mesh=SimpleNamespace(points=np.array([[7.0, 8.0, 0.0]])))
-    each = residuals(prepared, fitted)
-    assert list(each.columns) == [
-        "part", "frame", "pressure_kPa", "x_mm", "y_mm", "quantity", "measured", "modelled",
-        "difference", "unit",
-    ]  # fmt: skip
-    assert each.iloc[5].tolist()[:6] == ["bubble", 2, 200.0, 7.0, 8.0, "dz"]
-    assert each.iloc[5].tolist()[6:9] == pytest.approx([-5.0, -4.7, 0.3])
-    assert each["frame"].tolist() == [1, 1, 1, 2, 2, 2] and set(each["unit"]) == {"mm"}
-    table = misfit_table(prepared, fitted)
-    off = np.array([[0.1, 0.2, 0.4], [0.5, 0.0, 0.3]]) / scales
-    np.testing.assert_allclose(table.rows, np.column_stack([[20.0, 200.0], off]), atol=1e-12)
-    assert ("in mm" in table.note) is (objective == "mm")
-
-
-def test_how_well_surfaces_follow():
-    surface = SimpleNamespace(r_squared=np.array([0.999994, 0.5, 1.0]))
-    test = SimpleNamespace(match_by="points", match_degree=6, pressures=(0.02,))
-    prepared: Any = SimpleNamespace(test=test, surfaces=[])
-    assert surface_tables(prepared) == []
-    prepared.surfaces = [surface]
-    (table,) = surface_tables(prepared)
-    assert "degree 6" in table.title and table.note
-    assert table.rows == [[20.0, "0.99999", "0.50000", "1.00000"]]
-    test.match_by = "surfaces"
-    assert surface_tables(prepared)[0].note == ""
 
 
 #: kPa and mm, as unknowns of a fit.

@@ -1,13 +1,12 @@
 """The whole beam of a run that meshed a part of it, its bodies, and the picture of its end."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bubblefit.experiments.cylinder import report
 from bubblefit.experiments.cylinder.predicted import run_of
-from bubblefit.experiments.cylinder.report import Beam, bodies_of, whole_beam
+from bubblefit.experiments.cylinder.report import bodies_of, whole_beam
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import inflated_cylinder
@@ -69,34 +68,6 @@ def test_bodies_touch_the_inflated_beam(quarter):
     assert reach == pytest.approx(120.0)
 
 
-@pytest.mark.parametrize(
-    ("points", "height", "top"),
-    [
-        # In a collar of 100 mm in radius a point 60 mm aside is touched 80 mm above the middle.
-        ([[0.0, 20.0, 0.0], [60.0, 30.0, 0.0]], 10.0, -50.0),
-        # As long as the collar, and no longer; as wide as its inside, less nothing.
-        ([[0.0, 90.0, 20.1], [0.0, 95.0, -20.1], [0.0, 20.0, 20.0]], 10.0, -80.0),
-        ([[-99.0, 20.0, 0.0], [100.0, 500.0, 0.0]], 10.0, 20.0 - np.sqrt(199.0)),
-        # On a support of 50 mm in radius 30 mm beside its middle, on either side.
-        ([[0.0, 20.0, 0.0], [0.0, -5.0, 170.0]], -45.0, -80.0),
-        ([[0.0, 20.0, 0.0], [0.0, -5.0, -230.0]], -45.0, -80.0),
-        ([[0.0, 20.0, 0.0], [0.0, -99.0, 250.0]], 10.0, -80.0),
-    ],
-)
-def test_bodies_touch_where_the_beam_is_nearest(points, height, top):
-    """Beside a node that stands on a support 60 mm high."""
-    rest = np.array([*points, [0.0, 60.0, 200.0]])
-    model = SimpleNamespace(
-        supports=SimpleNamespace(diameter=100.0, span=400.0),
-        collar=SimpleNamespace(inner_diameter=200.0, length=40.0),
-    )
-    moved = np.tile([0.0, 7.0, 0.0], (len(rest), 1))
-    found = bodies_of(model, Beam(SimpleNamespace(points=rest - moved), moved, moved), 12.0)
-    assert found.supports == ((-200.0, pytest.approx(height)), (200.0, pytest.approx(height)))
-    assert (found.support_radius, found.collar_radius, found.collar_length) == (50.0, 100.0, 40.0)
-    assert found.collar_height == pytest.approx(top - 12.0)
-
-
 # The picture shows the run's own places, strains and bodies
 
 
@@ -113,16 +84,11 @@ def in_turn(model, moved, name, along):
 
 
 def same(points, others) -> bool:
-    """Of two sets of places, to six digits."""
     return max(cKDTree(a).query(b)[0].max() for a, b in ((points, others), (others, points))) < 0.01
 
 
 def length(line) -> float:
     return float(np.linalg.norm(np.diff(line, axis=1), axis=0).sum())
-
-
-def middle(ring):
-    return 0.5 * (ring.min(axis=1) + ring.max(axis=1))
 
 
 def test_the_dashed_outline_is_the_inflated_tube_from_the_side(quarter, picture):

@@ -236,21 +236,6 @@ def test_without_readings_there_is_nothing_to_compare(tmp_path, undrawn):
     assert plain.error(0) is None and plain.ended(1) == "finished"
 
 
-@pytest.mark.parametrize(
-    ("cases", "words"),
-    [
-        (((150.0, 20.0), (200.0, 20.0)), "20 mm"),
-        (((150.0, 15.0), (200.0, 20.0)), "0.1 diameters (15 to 20 mm)"),
-        (((150.0, 20.0), (200.0, 15.0)), "15 to 20 mm"),
-        (((150.0, 20.0), (200.0, 20.0000004)), "20 mm"),
-        (((150.0, 20.0), (200.0, 20.00001)), "20 to 20 mm"),
-    ],
-)
-def test_over_what_a_slope_is_taken(cases, words):
-    tests = [case("a", d, reading=SimpleNamespace(places={}, slope_over=s)) for d, s in cases]
-    assert report._slopes(tests) == words
-
-
 # Figures
 
 
@@ -270,7 +255,6 @@ def drawn(monkeypatch) -> dict[str, list[Any]]:
 
 
 def ended(*runs, bent) -> CylinderOutcome:
-    """Of runs that differ by their number."""
     return outcome_of(
         *runs,
         bent={i: replace(BENT, load=BENT.load + i) for i in bent},
@@ -279,68 +263,6 @@ def ended(*runs, bent) -> CylinderOutcome:
             for i in bent
         },
     )
-
-
-def test_figures_of_every_test(tmp_path, drawn):
-    # The second reading ends half-way.
-    read = (BendingCurve("1", WAY, 2 * WAY), BendingCurve("2", WAY[:2], 2 * WAY[:2] + 4.0))
-    first, second = case("a b", measured=read), case("a/b", 200.0)
-    found = ended(
-        run(first, "soft"), run(second, "stiff"), run(first, "stiff"), run(case("broken"), "soft"),
-        bent=(0, 1, 2),
-    )  # fmt: skip
-    assert report.draw_figures(found, Output(tmp_path, "c/")) == [
-        ("c/figures/a-b-beam.png", "a b: the bent beam, card soft"),
-        ("c/figures/a-b-gas.png", "a b: the gas while bending"),
-        ("c/figures/a-b-2-beam.png", "a/b: the bent beam, card stiff"),
-        ("c/figures/a-b-2-gas.png", "a/b: the gas while bending"),
-    ]
-    (path, (panel,)), gas, (_, (other,)), more, (last, laid) = drawn["saved"]
-    assert path == tmp_path / "c/figures/a-b-load.png"
-    assert [path.name for path, _ in (gas, more)] == ["a-b-gas.png", "a-b-2-gas.png"]
-    assert [(line.name, line.rank) for line in panel.lines] == [("soft", 0), ("stiff", 1)]
-    assert [(line.name, line.rank) for line in other.lines] == [("stiff", 1)]
-    one, two = panel.lines
-    assert one.load.tolist() == LOAD.tolist() and two.load[0] == LOAD[0] + 2
-    assert (one.deflection is WAY) and one.pressure is BENT.pressure and one.volume is BENT.volume
-    assert (one.rms, two.rms) == (3.1, None)
-    assert (one.knee, two.knee, one.limit) == ((1.0, 2.0), (3.0, 2.0), MEASURES.limit)
-    assert [beam[3] for beam in drawn["draw_beam"]] == ["a b, soft, 80 mm", "a/b, stiff, 80 mm"]
-    assert drawn["draw_beam"][0][0] == "model of a b"
-    # Mean and scatter as far as all repetitions go.
-    readings = panel.measured
-    assert [load.tolist() for _, load in readings.readings] == [c.load.tolist() for c in read]
-    whole = readings.deflection <= 40.0 + 1e-9
-    np.testing.assert_array_equal(np.isfinite(readings.mean), whole)
-    np.testing.assert_array_equal(np.isfinite(readings.deviation), whole)
-    np.testing.assert_allclose(readings.mean[whole], 2 * readings.deflection[whole] + 2.0)
-    np.testing.assert_allclose(readings.deviation[whole], np.sqrt(8.0))
-    assert other.measured is None
-    assert last == tmp_path / "c/figures/all-loads.png"
-    assert [panel.title for panel in laid] == ["a b", "broken", "a/b", ""]
-    # One test that ended has no figure of all.
-    drawn["saved"].clear()
-    found = ended(run(case("a"), "soft"), run(case("b"), "soft"), bent=(0,))
-    assert len(report.draw_figures(found, Output(tmp_path))) == 2
-    assert [path.name for path, _ in drawn["saved"]] == ["a-load.png", "a-gas.png"]
-
-
-@pytest.mark.parametrize(
-    ("diameters", "rows"),
-    [
-        ((150.0, 150.0, 200.0), [2, 1]),
-        ((150.0, 200.0, 150.0 + 1e-8), [2, 1]),
-        ((150.0, 150.0, 150.0, 150.0), [3, 1]),
-        ((150.0, 200.0, 250.0, 300.0), [3, 1]),
-        ((150.0, 200.0, 250.0), [3]),
-        ((150.0,), [1]),
-    ],
-)
-def test_rows_of_a_figure_of_all(diameters, rows):
-    tests = [case(str(k), diameter) for k, diameter in enumerate(diameters)]
-    found = report._rows(tests)
-    assert [len(row) for row in found] == rows
-    assert sorted(test.name for row in found for test in row) == [t.name for t in tests]
 
 
 # A band: both ends with one card, the prediction alone with another, whose other end failed
@@ -354,29 +276,6 @@ def banded() -> CylinderOutcome:
         run(test, "hard", slack), run(test, "hard", rigid, failure="killed"),
         bent={0: BENT, 1: replace(BENT, load=1.5 * LOAD), 2: BENT},
     )  # fmt: skip
-
-
-def test_every_row_says_which_wall(banded, tmp_path, undrawn):
-    shown = report.show_outcome(banded, Output(tmp_path))
-    runs, errors = shown.tables
-    assert runs.header[:4] == ["test", "card", "wall", "stiffness, N/mm"]
-    assert [table.title for table in shown.tables] == ["Runs", "Against measured loads"]
-    names = [["soft", "slack"], ["soft", "rigid wall"], ["hard", "slack"], ["hard", "rigid wall"]]
-    assert [unbroken(row[1:3]) for row in runs.rows] == names
-    assert all(len(row) == len(runs.header) for row in runs.rows)
-    assert runs.rows[3][runs.header.index("ended")] == "failed:\u00a0killed"
-    assert runs.text == (1, 2, runs.header.index("ended"), runs.header.index("marked"))
-    assert runs.note.endswith(" Slack: it wrinkles. Rigid wall: it does not.")
-    assert errors.header[:4] == ["test", "card", "wall", "RMS, N"] and errors.text == (1, 2)
-    assert [unbroken(row[1:4]) for row in errors.rows] == [[*name, 3.1] for name in names[:3]]
-    curves = pd.read_csv(tmp_path / "load_deflection.csv")
-    assert curves["wall"].tolist() == ["slack"] * 3 + ["rigid wall"] * 3 + ["slack"] * 3
-    assert curves["load_N"].tolist() == [*LOAD, *1.5 * LOAD, *LOAD]
-    head, *rows = banded.lines()
-    assert head.startswith("test    card  wall         N/mm   buckles at")
-    for row, (card, wall) in zip(rows, names, strict=True):
-        assert row.startswith(f"150/90  {card}  {wall}  ")
-    assert rows[3].endswith("failed: killed")
 
 
 def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undrawn):

@@ -55,7 +55,6 @@ def ends(further: float) -> list[tuple[str, str]]:
 def read(
     path: Path, data_folder: Path | None = None, need_data: bool = True, length: str = "mm"
 ) -> StripsTest:
-    """The test of a file that holds one section alone, as a project's first [[strips]]."""
     try:
         section = StripsSection.model_validate(tomllib.loads(path.read_text()))
     except ValidationError as found:

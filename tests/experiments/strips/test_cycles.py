@@ -163,7 +163,6 @@ def test_command(plain, golden, tmp_path):
 
 
 def by_hand(path, reference):
-    """Return permanent strain, both stiffnesses and loss by cycle, from the file's own steps."""
     with open(path, newline="") as stream:
         rows = [row for row in csv.DictReader(stream) if float(row["cycle"]) > 0]
     found, zero = [], None

@@ -90,7 +90,6 @@ def exact(part: str, law: HypoelasticLaw) -> History:
 
 
 def strip_tests(law, relative: bool = False, noise: float = 0.0, seed: int = 0):
-    """Loads that the law gives, at every increment."""
     for k, (name, model) in enumerate(STRIPS.items()):
         load = exact(name, law).load
         load = load + noise * np.random.default_rng(10 * seed + k).standard_normal(len(load))
@@ -122,7 +121,6 @@ def joint(unknowns: Unknowns = CUBIC, law: HypoelasticLaw = LAW, **how: Any) -> 
 
 
 def near(unknowns: Unknowns, law: HypoelasticLaw, factor: float = 1.03) -> Any:
-    """Unknowns a little off the law, offsets on."""
     y = unknowns.at(law.beta[list(unknowns.free)] * factor)
     y[unknowns.size :] = [0.3, -0.2, 0.5, 1.5][: len(unknowns.nuisance_names)]
     return y
@@ -147,7 +145,6 @@ class Thicker:
 
 
 def led(fit: FitProblem) -> FitProblem:
-    """The same tests, measured and run by the other program."""
     tests = []
     for one in fit.comparisons:
         history, objective = Thicker().run(one.model, LAW), one.objective
@@ -290,7 +287,6 @@ def check_jacobian(fit, y):
 
 
 def errors(fit, unknowns, law, y) -> list[float]:
-    """Of the moduli up to the strains that the gauges reach."""
     ends = [np.log(1 + m.elongations[-1] / m.gauge_length) for m in STRIPS.values()]
     return list(moduli_error(law.with_beta(unknowns.beta(y)), law, np.array(ends)).values())
 

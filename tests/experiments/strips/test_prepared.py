@@ -14,7 +14,7 @@ from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, FittedTest,
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
 from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective, PreparedStrips
-from bubblefit.experiments.strips.report import LEFT_OUT, examine, load_table, misfit_table
+from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import straight_strip
@@ -40,20 +40,17 @@ def of(folder: Path, text: str, *changes: tuple[str, str]) -> PreparedStrips:
 
 @pytest.fixture
 def published(tmp_path) -> Prepare:
-    """The published polynomials, five increments."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
     return lambda *changes: of(tmp_path, PUBLISHED, COARSE, *changes)
 
 
 @pytest.fixture
 def exported(tmp_path) -> Prepare:
-    """Measured points of one or two specimens a direction, five increments."""
     write_exports(tmp_path)
     return lambda *changes: of(tmp_path, SMALL, POINTS, *changes)
 
 
 def fitted(prepared: PreparedStrips) -> FittedTest:
-    """As if the law had been found."""
     comparisons = prepared.comparisons(MembraneSolver, Weighting())
     histories = tuple(c.solver.run(c.model, LAW) for c in comparisons)
     valid = np.array([0.1, 0.5, 0.3])
@@ -61,7 +58,6 @@ def fitted(prepared: PreparedStrips) -> FittedTest:
 
 
 def norms(prepared: PreparedStrips, *weighting) -> dict[str, float]:
-    """Of each comparison's residual with the law."""
     return {
         c.name: float(np.linalg.norm(c.objective.residual(c.solver.run(c.model, LAW), {})))
         for c in prepared.comparisons(MembraneSolver, Weighting(*weighting))
@@ -216,24 +212,6 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
     assert not report.draw_orders([strip], tmp_path / "orders.png")
 
 
-def test_panels_of_loads():
-    """The polynomial from rest to the end of the model; points only where there are any."""
-    u = np.linspace(0.5, 4.5, 9)
-    polynomial = fit_load_polynomial(u, 100 * u + 3 * u**2)
-    curves = (LoadCurve("warp", "a", u, 100 * u, None),)
-    warp = Strip("warp", 20.0, 23.5, polynomial, curves, scatter=7.0)
-    models = {"warp": [("model", u, 90 * u)]}
-    one, bare = report.load_panels([warp, Strip("fill", 20.0, 23.0)], models, {"warp": [4.2]})
-    places, loads = one.polynomial
-    assert (places[0], places[-1], len(places)) == (0.0, pytest.approx(3.5), 200)
-    assert loads == pytest.approx(100 * places + 3 * places**2, abs=1e-6)
-    assert one.points[0].tolist() == u[u <= 3.5].tolist()
-    assert (one.direction, one.scatter, one.rms) == ("warp", 7.0, [4.2])
-    assert one.models is models["warp"]
-    assert (bare.direction, bare.points, bare.polynomial, bare.scatter) == ("fill", *[None] * 3)
-    assert (bare.models, bare.rms) == ((), ())
-
-
 def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
     """A row of quads, 10 mm long, from -20 mm on, between gauge points at -10 and 10 mm."""
     shear = [0.9, 0.2, -0.3, 0.8]
@@ -324,30 +302,6 @@ def test_findings():
     test.match_by = "polynomial"
     found = report.findings(holding(test, [matched()]), None)
     assert LEFT_OUT not in [n.kind for n in found.warnings]
-
-
-def test_tables():
-    both = [matched(), matched(BIAS, (200.0, 410.0))]
-    table = misfit_table(both)
-    assert [h.split(", ")[-1] for h in table.header] == [
-        "strip", "N", "N", "R² of polynomial", "N", "points matched", "N"
-    ]  # fmt: skip
-    assert [row[0] for row in table.rows] == ["warp", "bias"]
-    assert table.rows[0][1:] == pytest.approx([RMS, 7.5, 1.0, 0.0, 2, 396.0], abs=1e-9)
-    assert table.rows[1][1:] == [pytest.approx(np.sqrt(50.0)), None, None, None, 2, 410.0]
-    loads = load_table(both)
-    columns = "direction elongation_mm engineering_strain model_N polynomial_N"
-    assert list(loads.columns) == columns.split()
-    assert loads["direction"].tolist() == ["warp"] * 2 + ["bias"] * 2
-    assert loads.iloc[1].tolist()[1:] == pytest.approx([4.0, 0.2, 396.0, 440.0])
-    assert loads["polynomial_N"].isna().tolist() == [False, False, True, True]
-    rest = report.residuals(holding(None, both), None)
-    assert loads.index.tolist() == rest.index.tolist() == [0, 1, 2, 3]
-    columns = "part elongation_mm quantity measured modelled difference unit"
-    assert list(rest.columns) == columns.split()
-    part, at, quantity, *numbers, unit = rest.iloc[1].tolist()
-    assert (part, at, quantity, unit) == ("warp", 4.0, "load", "N")
-    assert numbers == pytest.approx([400.0, 396.0, -4.0])
 
 
 def test_points_of_a_strip_and_those_left_out():
@@ -479,31 +433,6 @@ def test_curves_end_where_the_range_of_the_card_does(tmp_path, drawn, monkeypatc
     ((_, _, (panel,)),) = drawn["loads"]
     assert [len(model[1]) for model in panel.models] == [shown] * bool(shown)
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
-
-
-def test_every_cell(tmp_path):
-    way = np.array([0.1, 1.0, 2.0, 4.0, 3.9])
-    curve = LoadCurve("warp", "W1", way, np.array([2.0, 50.0, 90.0, 160.0, 120.0]), None)
-    line = fit_load_polynomial(np.linspace(0, 6, 9), 30 * np.linspace(0, 6, 9), 1)
-    strips = {
-        "warp": Strip("warp", 20.0, 24.0, None, (curve,)),
-        "fill": Strip("fill", 25.0, 30.0, line),
-        "bias": Strip("bias", 20.0, 30.0),  # without data
-    }
-    test = SimpleNamespace(strips=strips, width=25.0, rate=None, conditioning=None)
-    shown = examine(SimpleNamespace(test=test), Output(tmp_path, "s/"))
-    assert [name for name, _ in shown.figures] == ["s/curves.png"]
-    assert (tmp_path / "s" / "curves.png").is_file()
-    standard, table = shown.tables
-    assert standard.rows == [["warp", "W1", 160.0, 320.0, 6.4, pytest.approx(20.0)]]
-    assert [h.split(", ")[-1] for h in table.header] == [
-        "direction", "specimen", "points", "mm", "mm", "%", "N", "N"
-    ]  # fmt: skip
-    first, second = table.rows
-    assert first[:2] == ["warp", "W1"] and second[:2] == ["fill", "polynomial"]
-    assert first[2:] == pytest.approx([5, 0.1, 3.9, 100 * np.log(23.9 / 20), 2.0, 160.0])
-    assert second[2:] == pytest.approx([50, 0.0, 5.0, 100 * np.log(1.2), 0.0, 150.0])
-    assert table.text == (1,)
 
 
 # Cards that the membrane runs

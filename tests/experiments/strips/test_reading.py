@@ -16,14 +16,12 @@ HEAD = "Extension (mm),Load (N)\n"
 
 @pytest.fixture
 def small(tmp_path) -> Edit:
-    """Read the small section beside its exports after replacing some texts."""
     write_exports(tmp_path)
     return lambda *changes, **options: read(project_file(tmp_path, SMALL, *changes), **options)
 
 
 @pytest.fixture
 def example(tmp_path) -> Edit:
-    """Read the published polynomials after replacing some texts."""
     (tmp_path / "curves.csv").write_bytes((CURVES / "curves.csv").read_bytes())
     return lambda *changes, **options: read(project_file(tmp_path, PUBLISHED, *changes), **options)
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError, PlugInFailure
+from bubblefit.errors import InputError
 from bubblefit.materials.forms.base import (
     COMPONENTS,
     ORDER,
@@ -415,23 +415,3 @@ def test_a_plug_ins_form_is_one_of_them(packages):
     assert "a acme law has no knots" in complaint(form_named, "acme", {"knots": 1}, ENDS)
     install(packages, "cubic", "raise RuntimeError", distribution="acme-others")
     assert form_named("cubic", {}, ENDS).name == "cubic" and form_names().count("cubic") == 1
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("raise RuntimeError('no licence')", "no licence"),
-        ("THING = 3", "acme_acme:THING has no name, make, settings"),
-        (WORKING.format(body="pass").replace('"acme"', '"else"'), "'else'"),
-        (WORKING.format(body="return settings['k']"), "KeyError: 'k'"),
-        (WORKING.format(body="return 3"), "int has no describe, free, from_values"),
-    ],
-)
-def test_a_broken_form_is_one_line_and_breaks_no_other(packages, text, words):
-    install(packages, "acme", text)
-    with pytest.raises(PlugInFailure) as failure:
-        form_named("acme", {}, ENDS)
-    message = str(failure.value)
-    assert message.startswith("the plug-in 'acme' of acme-things 2.5") and words in message
-    assert "\n" not in message
-    assert form_named("cubic", {}, ENDS).name == "cubic"

@@ -1,11 +1,9 @@
 """The bubble on CalculiX: agreement with the membrane and with published numbers, and the deck."""
 
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from bubblefit.cli.options import with_solver
 from bubblefit.errors import InputError, SolverFailure
@@ -26,11 +24,9 @@ from bubblefit.solvers.calculix.sheets import bubble_decks
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.run_cache import VARIABLE, RunCache
+from bubblefit.solvers.run_cache import VARIABLE
 
-from ...commands import in_process as bubblefit
 from ...fortran_build import LAWS
-from ...programs import program
 from ...projects import BUBBLE, changed
 from ...published_laws import TABLE_4_2
 
@@ -89,7 +85,6 @@ def test_agrees_with_the_membrane(ccx, element, elements, law, pressures):
 
 
 def uneven(elements, pressures):
-    """A sheet that is raised, longer than its picture, and whose rim moves."""
     flat = bubble(elements, "full", pressures)
     points = flat.mesh.points + np.outer(
         5.0 * disk_modes(flat.mesh.points, 100.0, 1)["z0_1"], [0, 0, 1]
@@ -305,64 +300,6 @@ def test_a_pressure_offset_reaches_calculix_and_a_disk_is_four_quarters(ccx):
         np.testing.assert_allclose(disk.displacement[:, j], found.displacement[:, i], atol=2e-3)
     up = disk.reactions["rim"][:, 2], found.reactions["rim"][:, 2]
     np.testing.assert_allclose(up[0], 4 * up[1], rtol=1e-3)
-
-
-#: What a second fit may say differently: how long it took, and that nothing ran.
-TIMES = ("wall_s", "external_runs", "cached_runs")
-
-
-@pytest.fixture
-def counted(ccx, tmp_path):
-    """A ccx that writes a line into a file for every analysis, and the file."""
-    told = tmp_path / "analyses"
-    text = f'#!/bin/sh\ncase "$1" in -i) echo run >> {told} ;; esac\nexec {ccx.path} "$@"\n'
-    return program(tmp_path / "bin" / "ccx", text), told
-
-
-def result_of(folder):
-    result = json.loads((folder / "result.json").read_text())
-    result["starts"] = [{k: v for k, v in s.items() if k not in TIMES} for s in result["starts"]]
-    return result
-
-
-def test_a_second_identical_fit_runs_no_ccx(counted, tmp_path, monkeypatch):
-    ccx, told = counted
-    cache = RunCache(tmp_path / "runs")
-    monkeypatch.setenv(VARIABLE, str(cache.folder))
-    (tmp_path / "project.toml").write_text(PROJECT.replace("elements = 64", "elements = 32"))
-    arguments = ("bubble", "project.toml", "--solver", "calculix", "--ccx", ccx, "--quiet")
-
-    bubblefit(*arguments, "--out", "one", cwd=tmp_path)
-    first, runs = result_of(tmp_path / "one"), len(told.read_text().splitlines())
-    assert first["external_runs"] >= 2 and first["cached_runs"] == 0
-    # The known solution is one of them; the best fit once more is in the cache already.
-    assert runs == first["external_runs"] + 1 == len(cache.entries())
-
-    done = bubblefit(*arguments, "--out", "two", cwd=tmp_path)
-    second = result_of(tmp_path / "two")
-    assert len(told.read_text().splitlines()) == runs
-    assert (second["external_runs"], second["cached_runs"]) == (0, first["external_runs"])
-    assert f"(0 of calculix, {first['external_runs']} from the cache)" in done.stdout
-    for name in TIMES:
-        first.pop(name), second.pop(name)
-    assert first == second
-    cards = [(tmp_path / name / "material.toml").read_text() for name in ("one", "two")]
-    assert cards[0] == cards[1]
-    rows = pd.read_csv(tmp_path / "two" / "history.csv")
-    status = rows[rows.solver == "calculix"].status
-    assert set(status) == {"ok, from the cache"}
-    page = (tmp_path / "two" / "report.html").read_text()
-    assert "of them from the cache" in page
-
-    # A damaged one is told, run again, and the fit is the same.
-    cache.entries()[0].path.write_bytes(b"bubblefit run 1\ncut")
-    done = bubblefit(*arguments, "--out", "three", cwd=tmp_path)
-    assert "is dropped from the cache of runs and run again" in done.stderr
-    third = result_of(tmp_path / "three")
-    assert len(told.read_text().splitlines()) == runs + 1
-    for name in TIMES:
-        third.pop(name)
-    assert third == second
 
 
 def test_it_can_be_turned_off(tmp_path, monkeypatch):

@@ -163,7 +163,6 @@ def test_work_of_collar_and_gas_is_energy_of_fabric_and_contact(bent, scratch):
     gauge = np.array([closed.pressure(v) for v in middle])
 
     def work(force, way):
-        """From the first increment, where the cylinder has come to lie on its supports."""
         return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(way)))
 
     fabric = fabric[len(model.inflation) :]
@@ -339,7 +338,6 @@ def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, s
 
 
 def jacobians(points, elements):
-    """Least of the Jacobians at the corners, as a sign that a solid is the right way out."""
     spokes = ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7))
     spokes += ((4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3))
     b, c, d = (points[elements][:, [s[k] for s in spokes]] for k in (1, 2, 3))

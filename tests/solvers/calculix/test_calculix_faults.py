@@ -1,7 +1,5 @@
 """What can go wrong with an external program, each tried with a real or a fake one."""
 
-import csv
-import json
 import os
 import re
 import signal
@@ -20,7 +18,6 @@ from bubblefit.solvers.calculix.library import law_number
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 
-from ...commands import in_process as bubblefit
 from ...commands import interrupted
 from ...projects import BUBBLE
 
@@ -232,19 +229,6 @@ def study(folder, script):
     (folder / "ccx").write_text(f'#!/bin/sh\n[ "$1" = -v ] && exec true\n{script}\n')
     (folder / "ccx").chmod(0o755)
     return ["bubble", "project.toml", "--out", "out"]
-
-
-def test_a_study_carries_on_and_names_the_runs_that_failed(ccx, tmp_path):
-    script = f"echo x >> {tmp_path}/runs; [ $(wc -l < {tmp_path}/runs) = 2 ] && kill -9 $$\n"
-    arguments = [*study(tmp_path, f'{script}exec {ccx.path} "$@"'), "--starts", "2", "--jobs", "1"]
-    bubblefit(*arguments, cwd=tmp_path)
-    with (tmp_path / "out" / "history.csv").open() as file:
-        rows = [row for row in csv.DictReader(file) if row["solver"] == "calculix"]
-    assert "killed by SIGKILL" in rows[0]["status"]
-    assert all(row["status"] == "ok" for row in rows[1:]) and len(rows) > 2
-    assert json.loads((tmp_path / "out" / "result.json").read_text())["objective"] < 1e-3
-    (kept,) = (tmp_path / "scratch").iterdir()
-    assert (kept / "job.inp").exists()
 
 
 @pytest.mark.parametrize("moment", ["mkdtemp", "rmtree"])

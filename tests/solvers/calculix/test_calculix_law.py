@@ -167,7 +167,6 @@ def close(found, wanted, tolerance=1e-10):
 
 
 def follow(point, law, axes, gradients):
-    """Along a path, stress, stiffness and state are those of the Python law."""
     for gradient in gradients:
         before = point.committed[2, 1].copy()
         stress, stiffness, state, request = point.call(gradient)

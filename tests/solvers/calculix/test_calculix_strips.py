@@ -41,7 +41,6 @@ def model(name, increments=100, **counts):
 
 
 def off(found, expected):
-    """Largest difference anywhere on the load curve, as a part of the end load."""
     assert found.load.shape == expected.load.shape
     return float(np.abs(found.load - expected.load).max() / expected.load[-1])
 

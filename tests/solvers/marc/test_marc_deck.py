@@ -349,7 +349,6 @@ def frames_of(model, grown, name="Contact Normal Force", last=3):
 
 @pytest.fixture
 def marc(tmp_path, monkeypatch, model, grown):
-    """Makes a Marc that answers inflation and bending with the frames given."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
 
     def make(frames, number=3004, ended=True):

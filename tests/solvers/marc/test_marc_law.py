@@ -27,8 +27,6 @@ COUNTS = {"membrane": (3, 1), "thick shell": (5, 3)}  # ngens, nshear
 
 
 class Point:
-    """One integration point of an element, as Marc calls it."""
-
     def __init__(self, library, element="membrane", integer=np.int32, number=1, own_state=True):
         self.function, self.integer, self.number = library.hypela2_, integer, number
         self.own_state = own_state

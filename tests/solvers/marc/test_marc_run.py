@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from bubblefit.cli.options import with_solver
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.law import HypoelasticLaw
@@ -38,7 +37,6 @@ def model():
 
 @pytest.fixture
 def machine(tmp_path, monkeypatch):
-    """A machine without a Marc of its own."""
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
@@ -47,8 +45,6 @@ def machine(tmp_path, monkeypatch):
 
 @pytest.fixture
 def fake(machine):
-    """Makes a solver of a shell script, which runs in the scratch folder."""
-
     def make(script, **options):
         path = machine / "run_marc"
         path.write_text(f"#!/bin/sh\n{script}\n")
@@ -75,7 +71,6 @@ def files(folder, given, history, reactions=None, number=3004, path=None):
 
 @pytest.fixture
 def good(machine):
-    """Files of a bubble that ended well, and the embedded solver's own history of it."""
     history = MembraneSolver().run(model(), LAW)
     return files(machine / "good", model(), history), history
 
@@ -305,9 +300,6 @@ def test_bars_that_carry_the_law_pass(machine, monkeypatch):
         proof.prove(Embedded())
 
 
-NOTHING = {"solver": None, "ccx": None, "marc": None, "templates": None, "element": None}
-
-
 @pytest.fixture(autouse=True)
 def no_site(monkeypatch):
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
@@ -384,36 +376,8 @@ def test_mistakes_elsewhere_are_one_line(given, words):
     assert words in complaint(MarcSolver, **given)
 
 
-def test_a_project_file_and_the_command_line(tmp_path):
-    (tmp_path / "nl.dat").write_text("mine")
-    path = project(
-        tmp_path,
-        "[solver.marc]\nelement = 75\nscratch = 'here'\nexecutable = 'bin/run_marc'",
-        "[solver.marc.include]\nnlelast = 'nl.dat'",
-    )
-    settings = read_project(path, need_data=False)
-    solver = solver_named("marc", **settings.solver_options["marc"]).settings
-    assert solver.element == 75 and solver.executable == str(tmp_path / "bin" / "run_marc")
-    assert solver.include == {"nlelast": str(tmp_path / "nl.dat")}
-    assert solver.scratch == str(tmp_path / "here")
-    given = {**NOTHING, "solver": "marc", "element": "18", "marc": "/opt/run_marc",
-             "templates": tmp_path}  # fmt: skip
-    options = with_solver(settings, given).solver_options["marc"]
-    solver = solver_named("marc", **options).settings
-    assert (solver.element, solver.executable) == (18, "/opt/run_marc")
-    assert solver.templates == str(tmp_path)
-    # What a project does not say, the site does.
-    (tmp_path / "site.toml").write_text("threads = 3\nelement = 139\n")
-    options = with_solver(
-        settings, {**NOTHING, "solver": "marc", "marc": str(tmp_path / "site.toml")}
-    )
-    solver = solver_named("marc", **options.solver_options["marc"]).settings
-    assert (solver.threads, solver.element) == (3, 75)
-
-
 @pytest.fixture
 def ready(tmp_path):
-    """A project, its card, and a program that leaves what Marc would of simulating it."""
     path = project(tmp_path)
     settings = read_project(path, need_data=False)
     card = tmp_path / "card.toml"

@@ -96,7 +96,6 @@ def test_the_law_is_found_in_tables_and_in_the_subroutine(tmp_path, name):
 
 
 def first(pattern, text, new):
-    """`text` with the first match of `pattern` replaced by what `new` says."""
     changed, count = re.subn(pattern, new, text, count=1, flags=re.MULTILINE)
     assert count == 1 and changed != text, pattern
     return changed
