@@ -58,8 +58,12 @@ class OwnTest:
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the test of a fabric thicker by values["thickness"] mm."""
+        return self.changed(thickness=self.thickness + values["thickness"])
+
+    def changed(self, **values: float) -> Self:
+        """Return the test with other values of attributes."""
         other = copy.copy(self)
-        other.thickness = self.thickness + values["thickness"]
+        vars(other).update(values)
         return other
 
     def values(self, law: HypoelasticLaw) -> Array:

@@ -18,7 +18,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -111,14 +111,19 @@ class Registration(Keys):
 class Law(Keys):
     """The form of the moduli, and between what they are looked for: the keys of [law].
 
-    bounds : [least, largest] of E1, E2 and G12 in MPa, those of coated fabrics unless given.
-    Keywords beside nu12, strain_range and margin are settings of the form, such as knots.
+    form : a name, or a class or an object of one's own. bounds : [least, largest] of E1, E2 and G12
+    in MPa, those of coated fabrics unless given. Keywords beside nu12, strain_range and margin are
+    settings of the form, such as knots.
     """
 
     section = LawSection
 
-    def __init__(self, form: str = "cubic", **said: Any) -> None:
-        if form not in form_names():
+    own_form: Any = None
+
+    def __init__(self, form: Any = "cubic", **said: Any) -> None:
+        if not isinstance(form, str):
+            self.own_form, form = form, getattr(form, "__name__", type(form).__name__)
+        elif form not in form_names():
             form_named(form, {}, [UNLIMITED] * 3)  # says which there are
         _check_names(said, [*LawSection.model_fields, *form_settings(form)])
         super().__init__(**{"form": form, "bounds": BOUNDS, **said})
@@ -146,17 +151,22 @@ class Definition:
     """A test as its table [[kind]] of a project file says it, in mm, N and MPa.
 
     section : the keys of the table, files by full paths. files : that stand in the section by name
-    and are held in memory. InputError: names the key that is wrong.
+    and are held in memory. function : an objective of one's own, in place of a name. InputError:
+    names the key that is wrong.
     """
 
     kind: str
     section: Mapping[str, Any]
     files: Mapping[str, Held] = field(default_factory=dict)
+    function: Callable[..., Any] | None = None
     of_kind: ClassVar[str]
 
     def __post_init__(self) -> None:
+        said = dict(self.section)
+        if callable(said.get("objective")):
+            object.__setattr__(self, "function", said.pop("objective"))
         try:
-            said = checked_keys(kind_named(self.kind).section, self.section)
+            said = checked_keys(kind_named(self.kind).section, said)
         except InputError as error:
             raise InputError(None, self.argument(error.field), error.problem) from None
         object.__setattr__(self, "section", said)
@@ -183,7 +193,7 @@ class Definition:
     def with_keys(self, **keys: Any) -> Definition:
         """Return the test with other values of some keys of its section."""
         made = object.__new__(type(self))
-        Definition.__init__(made, self.kind, {**self.section, **keys}, self.files)
+        Definition.__init__(made, self.kind, {**self.section, **keys}, self.files, self.function)
         return made
 
     def argument(self, field: str) -> str:

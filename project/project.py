@@ -218,7 +218,7 @@ class Project:
     @classmethod
     def of(
         cls,
-        tests: Definition | Sequence[Definition],
+        tests: Definition | OwnTest | Sequence[Definition | OwnTest],
         law: Law | None = None,
         *,
         fabric: Fabric,
@@ -234,7 +234,8 @@ class Project:
         in which arrays are kept as files, below data; a temporary one unless given. fit : keys of
         [fit]. InputError names the argument; OutputError.
         """
-        made = [tests] if isinstance(tests, Definition) else list(tests)
+        given = [tests] if isinstance(tests, (Definition, OwnTest)) else list(tests)
+        made = [own for own in given if isinstance(own, Definition)]
         needed = isinstance(cards, Mapping) or any(own.files for own in made)
         held = Path(folder) / "data" if folder is not None else scratch_folder() if needed else None
         content = plain({
@@ -246,7 +247,20 @@ class Project:
         with arguments_named(made):
             project = _project(content, PYTHON, project_text(content), None, need_data, made)
         assert project.written is not None
-        return replace(project, written=replace(project.written, held=held))
+        for name, one in project.written.made.items():
+            if one.function is not None:
+                project = project.with_objective(name, one.function)
+        if law is not None and law.own_form is not None:
+            project = project.with_form(law.own_form)
+        project = project.with_tests(*(own for own in given if not isinstance(own, Definition)))
+        return replace(project, written=replace(project.written, held=held))  # type: ignore[type-var]
+
+    @property
+    def own_parts(self) -> list[str]:
+        """Return the parts that are objects of Python and that no file says, by argument."""
+        form = [] if self.form is None else ["law.form"]
+        tests = [f"test {n!r}" for n, test in self.tests.items() if isinstance(test, OwnTest)]
+        return [*form, *(f"objective of {name!r}" for name in self.objectives), *tests]
 
     @property
     def definitions(self) -> dict[str, Definition]:
@@ -263,9 +277,16 @@ class Project:
         """Return the arguments with which `Project.of` makes the same project."""
         law, fit = (plain(own.model_dump(exclude_unset=True)) for own in (self.law, self.fit))
         cards = [] if self.written is None else _cards(self)
+        given = Law.of(in_base_units(LawSection, law, self.scales))
+        given.own_form = self.form
+        own = [test for test in self.tests.values() if isinstance(test, OwnTest)]
         return {
-            "tests": list(self.definitions.values()),
-            "law": Law.of(in_base_units(LawSection, law, self.scales)),
+            "tests": [
+                one.with_keys(objective=self.objectives[name]) if name in self.objectives else one
+                for name, one in self.definitions.items()
+            ]
+            + own,
+            "law": given,
             "fabric": self.fabric,
             "cards": [in_base_units(CardSection, card, self.scales) for card in cards],
             "solver_options": {name: _solver_options(self, name) for name in self.solver_options},
@@ -276,9 +297,11 @@ class Project:
         """Write the project file, and its arrays below a folder beside it; return its path.
 
         `read_project` reads the same project from it. Files of the tests stay where they are.
-        InputError : a test that was made without a definition. OutputError.
+        InputError : a part that was made without a definition. OutputError.
         """
         path = Path(path)
+        for name in self.own_parts:
+            raise InputError(None, name, "is an object of Python: no project file can say it")
         for name in self.tests:
             if self.written is None or name not in self.written.tests:
                 problem = "is of no file and no definition, and cannot be written"
@@ -347,8 +370,12 @@ class Project:
                 raise InputError(None, f"weights.{key}", problem)
         given = {n: w for n, t in tests.items()
                  if (w := weights.get(n, weights.get(t.kind))) is not None}  # fmt: skip
-        made = {name: self.definitions[name].with_keys(weight=w) for name, w in given.items()}
-        tests |= {name: replace(tests[name], weight=float(w)) for name, w in given.items()}
+        known = self.definitions
+        made = {name: known[name].with_keys(weight=w) for name, w in given.items() if name in known}
+        for name, w in given.items():
+            own = tests[name]
+            own_kind = isinstance(own, OwnTest)
+            tests[name] = own.changed(weight=w) if own_kind else replace(own, weight=float(w))
         written = self.written
         if written is not None:
             said, whole = (
@@ -383,8 +410,7 @@ class Project:
             if not isinstance(test, OwnTest) or test.name in made:
                 problem = "expected an object of a subclass of bubblefit.OwnTest, and a new name"
                 raise InputError(None, "tests", f"{problem}, got {test!r}")
-            thicker = self.fabric.thickness - test.thickness
-            made[test.name] = test.with_parameters({"thickness": thicker})
+            made[test.name] = test.changed(thickness=self.fabric.thickness)
         return replace(self, tests=made)
 
     def with_objective(self, test: str, function: Callable[..., Any]) -> Project:

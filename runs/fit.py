@@ -24,6 +24,7 @@ from ..experiments.kinds import (
     files_of,
     judged,
 )
+from ..experiments.own import OwnTest
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
 from ..inference.problem import FitProblem
@@ -222,7 +223,7 @@ Progress = Callable[[FitEvent | None], None]
 
 @checked
 def fit(
-    project: Project | Definition | Sequence[Definition],
+    project: Project | Definition | OwnTest | Sequence[Definition | OwnTest],
     tests: str | Sequence[str] | Law | None = None,
     *,
     law: Law | None = None,
@@ -246,17 +247,18 @@ def fit(
 ) -> Fit:
     """Fit the law of a project to its tests, from random feasible starts.
 
-    project : one that was read; or tests as objects, and then the law follows, and `fabric` and
-        `solver_options` are given by name. tests : names of tests, or a kind of test; by default
-        all that can be fitted. weights : by name or kind of test, in place of their own.
+    project : one that was read; or tests as objects (`OwnTest` among them), and then the law
+        follows, and `fabric` and `solver_options` are given by name. tests : names of tests, or a
+        kind of test; by default all that can be fitted. weights : by name or kind of test, in place
+        of their own.
     starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
     scheduler : address of a Dask scheduler, whose workers run the starts.
     starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", from the evaluations in
         the folder `earlier`.
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
-        content. progress : receives every record, None now and then. command_line : for the record.
-        settings : any other key of [fit].
+        content. progress : receives every `FitEvent`, None now and then. command_line : for the
+        record. settings : any other key of [fit].
     InputError : in the project or its data, or nothing to resume. OutputError. NoFeasibleStart : of
         all starts. SolverFailure : the solver is not there, failed in every start, or the best fit
         does not run again or gives another objective: then the page in `out` says so.
@@ -290,7 +292,8 @@ def fit(
     for judgement in judgements:
         judgement.demand(project.path)
     named = [(test.test.name, test) for test in setup.tests]
-    as_run = settings_of(project, [n for n, _ in named]) if project.written is not None else None
+    said = project.written is not None and not project.own_parts  # else no file says it
+    as_run = settings_of(project, [n for n, _ in named]) if said else None
     record = Record.of(project, as_run, named, problem.solver, command_line)
     files = None
     done: list[StartRecord] = []

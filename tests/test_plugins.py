@@ -93,7 +93,8 @@ COBYLA = ROOT / "inference" / "methods" / "cobyla.py"
 
 
 def test_the_code_is_that_of_the_example():
-    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", TEXT, re.DOTALL)
+    *_, text = TEXT.partition("\n## A form of the moduli")
+    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
     paths = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", COBYLA]
     sources = [plain(path.read_text()) for path in paths]
     assert len(blocks) > 8

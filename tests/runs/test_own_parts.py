@@ -8,6 +8,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import BubblefitError, InputError
+from bubblefit.experiments.bubble.objective import mirrored
 from bubblefit.experiments.own import OwnTest
 from bubblefit.inference.comparison import OwnObjective
 from bubblefit.inference.search import evaluate_law
@@ -19,9 +20,10 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.reports.content import read_page_data
 from bubblefit.runs.setup import fingerprints, prepare_fit
-from bubblefit.runs.starts import EvaluationRecord, StartRecord
+from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
-from ..projects import constant_strips, with_form
+from ..places import ROOT
+from ..projects import constant_strips, small, with_form
 
 RANGE = (0.13, 0.12, 0.1)
 LINE = """form = "spline"
@@ -312,6 +314,35 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
     with pytest.raises(InputError) as error:
         prepared(changing).problem()
     assert error.value.field == "objective"
+
+
+def test_the_script_of_the_documents(tmp_path):
+    text = (ROOT / "docs" / "adding.md").read_text().partition("## In a script")[2]
+    code = text[text.index("```python\n") + 10 :].partition("```")[0]
+    known = prepared(read_project(small(tmp_path)))
+    fields = [mirrored(field) for field in known.tests[0].fields[1::2]]
+    law, fabric, heard = known.tests[0].known, known.project.fabric, []
+    path = np.linspace(0.0, SHEAR, 41)
+    torque = 2 * np.pi * 40.0**2 * fabric.thickness * np.trapezoid(law.G12(path), path, axis=0)
+    space = {
+        "bf": bf, "np": np, "heard": heard, "fabric": fabric, "shear": SHEAR, "torque": torque,
+        "points": np.column_stack([fields[0].points, np.zeros(len(fields[0].points))]),
+        "displacements": np.array([field.displacement for field in fields]),
+        "pressures": [field.pressure for field in fields],
+    }  # fmt: skip
+    exec(code, space)  # noqa: S102 - our own document
+    fit, project = space["fit"], space["fit"].project
+    assert fit.law.form.title == "Decaying" and list(fit.tests) == ["bubble", "torsion"]
+    assert any(isinstance(r, Stage) for r in heard)
+    assert isinstance(fit.problem.comparisons[0].objective, OwnObjective)
+    assert abs(fit.law.G12(0.0) / law.G12(SHEAR).mean() - 1) < 0.3
+    assert project.own_parts == ["law.form", "objective of 'bubble'", "test 'torsion'"]
+    with pytest.raises(InputError) as error:
+        project.to_toml(tmp_path / "again.toml")
+    assert error.value.field == "law.form" and not (tmp_path / "again.toml").exists()
+    again = bf.Project.of(**project.objects).with_weights({"torsion": 2.0, "bubble": 1.0})
+    assert again.own_parts == project.own_parts and again.tests["torsion"].weight == 2.0
+    assert project.tests["torsion"].weight == 1.0 and again.form is project.form
 
 
 SHEAR = np.linspace(0.01, 0.12, 12)
