@@ -33,16 +33,22 @@ if TYPE_CHECKING:
     from .project.objects import Bubble, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
+    from .runs.compare import compare
     from .runs.fit import check, fit
     from .runs.plan import plan
     from .runs.predictions import predict
     from .runs.profile import profile
+    from .runs.refinement import refine
     from .runs.result import Fit
     from .runs.simulation import simulate
+    from .runs.validation import validate
+    from .runs.verification import verify
+    from .runs.weights import weights
 
 __all__ = ["Bubble", "Fabric", "Fit", "Form", "Law", "MaterialCard", "OwnTest", "Project",
-           "Registration", "Sheet", "Strips", "bootstrap", "check", "cycles", "fit", "plan",
-           "predict", "profile", "read_card", "read_project", "simulate"]  # fmt: skip
+           "Registration", "Sheet", "Strips", "bootstrap", "check", "compare", "cycles", "fit",
+           "plan", "predict", "profile", "read_card", "read_project", "refine", "simulate",
+           "validate", "verify", "weights"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -60,6 +66,7 @@ _PLACES = {
     "Strips": "project.objects",
     "bootstrap": "runs.bootstrap",
     "check": "runs.fit",
+    "compare": "runs.compare",
     "cycles": "experiments.strips.cycles",
     "fit": "runs.fit",
     "plan": "runs.plan",
@@ -67,7 +74,11 @@ _PLACES = {
     "profile": "runs.profile",
     "read_card": "materials.card",
     "read_project": "project.project",
+    "refine": "runs.refinement",
     "simulate": "runs.simulation",
+    "validate": "runs.validation",
+    "verify": "runs.verification",
+    "weights": "runs.weights",
 }
 
 

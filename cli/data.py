@@ -42,7 +42,6 @@ from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run
-from ..runs.starts import timed
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .progress import NamedProgress
@@ -72,9 +71,9 @@ def check_command(**options: Any) -> None:
     read = read_project(options["project"], given.data_folders(options["data"]))
     folder = given.folder_of(options, "check")
     with NamedProgress("steps", given.quiet(options)) as progress:
-        found = check(read, options["tests"] or None, options["trust"], progress=progress.saw)
-        with timed(f"tables and figures in {folder}"):
-            found.report(folder)
+        found = check(
+            read, options["tests"] or None, options["trust"], out=folder, progress=progress.saw
+        )
     show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
     if not found.sound:
         sys.exit(InputError.exit_code)

@@ -152,9 +152,10 @@ def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
 
 def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
     """Return `folder_of`, where no result may be without --overwrite or --resume."""
+    from ..runs.folder import check_unused
+
     folder = folder_of(options, suffix)
-    if (folder / "result.json").exists() and not (options["overwrite"] or options.get("resume")):
-        raise OutputError(f"{folder}: already holds a result; use --overwrite or another --out")
+    check_unused(folder, options.get("resume", False), options["overwrite"])
     return folder
 
 

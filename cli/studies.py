@@ -14,11 +14,9 @@ import click
 
 from ..errors import InputError, Note
 from ..errors import lines as note_lines
-from ..project.project import chosen_cards
 from ..runs import compare as laws
 from ..runs import validation, weights
 from ..runs.bootstrap import bootstrap
-from ..runs.folder import KeptAnalyses
 from ..runs.plan import plan
 from ..runs.poisson import NU12, vary_nu12
 from ..runs.profile import profile
@@ -32,8 +30,7 @@ from .terminal import Decorator, command, group, resumable, show, written_to
 def _finish(
     study: Any, folder: Path, options: Mapping[str, Any], notes: Sequence[Note] = ()
 ) -> None:
-    """Write the folder of a study and print its lines, or result.json with --json."""
-    study.write(folder)
+    """Print the lines of a study, or result.json with --json."""
     lines = [*study.lines(), *note_lines(notes), written_to(folder)]
     show(study.result, lines, options["as_json"])
 
@@ -81,11 +78,12 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
     """
     project = given.read_to_refit(options)
     asked = _strains_by_modulus(moduli, strain)
-    folder = given.result_folder(options, "profile")
+    folder = given.folder_of(options, "profile")
     with NamedProgress("sides", given.quiet(options)) as progress:
         found = profile(
-            project, asked, options["card"], options["tests"] or None, progress=progress.saw
-        )
+            project, asked, options["card"], options["tests"] or None, out=folder,
+            overwrite=options["overwrite"], progress=progress.saw,
+        )  # fmt: skip
     _finish(found, folder, options)
 
 
@@ -176,13 +174,13 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
     """
     project = given.read_with_solver(options)
-    folder = given.result_folder(options, "plan")
+    folder = given.folder_of(options, "plan")
     with NamedProgress("tests", given.quiet(options)) as progress:
         made = plan(
             project, options["card"], options["tests"] or None,
             strain=None if strain is None else given.numbers(strain, "--strain"),
             rank=options["rank"], specimens=options["specimens"], noise=dict(map(_noise, noises)),
-            progress=progress.saw,
+            out=folder, overwrite=options["overwrite"], progress=progress.saw,
         )  # fmt: skip
     _finish(made, folder, options)
 
@@ -223,9 +221,10 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
     project = given.read_with_solver(options)
     starts = options["starts"] or laws.STARTS
     with StudyProgress(starts, given.quiet(options), "{} moduli") as progress:
-        comparison = laws.compare_laws(
+        comparison = laws.compare(
             settings_given(project, options), options["tests"] or None, forms, folds=folds,
-            starts=starts, fold_starts=fold_starts, out=folder, resume=options["resume"],
+            starts=starts, fold_starts=fold_starts, trust=options["trust"], out=folder,
+            resume=options["resume"],
             overwrite=options["overwrite"], progress=progress.saw,
             command_line=given.command_line(),
         )  # fmt: skip
@@ -270,26 +269,20 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     name = "validated" if counted is None else "weights"
     folder = given.folder_of(options, name)
     tests, project = options["tests"] or None, given.read_with_solver(options)
-    trusted = [*project.fit.trust, *options["trust"]]
-    project = settings_given(project, options).with_fit(trust=trusted)
-    if cards:
-        folder = given.result_folder({**options, "resume": False}, name)
-        judged = validation.judge_cards(project, chosen_cards(project, cards), tests)
-        _finish(judged, folder, options, judged.notes)
-        return
+    project = settings_given(project, options)
     starts = options["starts"] or (validation if counted is None else weights).STARTS
     study: Any
     with resumable(folder), StudyProgress(starts, given.quiet(options)) as progress:
         common: dict[str, Any] = {
-            "starts": starts, "out": folder, "resume": options["resume"],
-            "overwrite": options["overwrite"], "progress": progress.saw,
-            "command_line": given.command_line(),
+            "starts": starts, "trust": options["trust"], "out": folder,
+            "resume": options["resume"], "overwrite": options["overwrite"],
+            "progress": progress.saw, "command_line": given.command_line(),
         }  # fmt: skip
         if counted is not None:
-            study = weights.weight_study(project, counted, tests, **common)
+            study = weights.weights(project, counted, tests, **common)
         else:
-            leave = leave or validation.TESTS
-            study = validation.validate(project, tests, forms, leave=leave, **common)
+            common |= {"cards": cards, "leave": leave or validation.TESTS}
+            study = validation.validate(project, tests, forms, **common)
     _finish(study, folder, options, study.notes)
 
 
@@ -332,10 +325,12 @@ card_options = given.with_checks(
 def run_study(name: str, study: Callable[..., Any], options: dict[str, Any]) -> None:
     """Read the project, run the study of a card, write its folder and print its lines."""
     project = given.read_with_solver(options, need_data=False)
-    folder = given.result_folder(options, name)
-    kept, tests = KeptAnalyses(folder, options["resume"]), options["tests"]
+    folder = given.folder_of(options, name)
     with resumable(folder), SeriesProgress(options["as_json"]) as progress:
-        done = study(project, options["card"], tests=tests, progress=progress.saw, kept=kept)
+        done = study(
+            project, options["card"], tests=options["tests"], out=folder, resume=options["resume"],
+            overwrite=options["overwrite"], progress=progress.saw,
+        )  # fmt: skip
     _finish(done, folder, options)
 
 

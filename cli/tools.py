@@ -21,7 +21,7 @@ from ..materials.exports.base import Export, Option, options_of, write_export
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
-from ..runs.verification import SUBJECTS, Number, numbers
+from ..runs.verification import SUBJECTS, Number, verify
 from ..solvers.base import Diagnosis
 from ..solvers.registry import FORMATS, command_line, diagnose, solver_names
 from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
@@ -220,26 +220,27 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
     Exit code 1 when a number is further off than its model, mesh or figure allows. CalculiX takes
     part where `bubblefit doctor` finds a usable one.
     """
-    found: list[tuple[str, Number]] = []
-    for subject, some in numbers(subjects or SUBJECTS, data):
-        if not (as_json or found):
-            click.echo(COLUMNS)
-        found += [(subject, one) for one in some]
-        if as_json:
-            continue
-        for one in some:
-            click.echo(_number_line(one))
+
+    heads = iter([COLUMNS])
+
+    def saw(subject: str, some: Sequence[Number]) -> None:
+        for head in heads:  # once
+            click.echo(head)
         if not some:
             click.echo(f"{subject}: not here (bubblefit doctor says why), nothing compared")
-    missed = [one for _, one in found if not one.met]
+        for one in some:
+            click.echo(_number_line(one))
+
     if as_json:
-        rows = [{"subject": subject, **one.row} for subject, one in found]
-        click.echo(json.dumps({"ok": not missed, "numbers": rows}, indent=1))
+        found = verify(subjects or None, data=data)
+        click.echo(json.dumps(found.result, indent=1))
     else:
+        found = verify(subjects or None, data=data, saw=saw)
+        count, missed = len(found.result["numbers"]), found.missed
         names = "; ".join(one.what for one in missed)
-        said = f"{len(missed)} of {len(found)} missed: {names}"
-        click.echo(said if missed else f"all {len(found)} numbers are met")
-    if missed:
+        said = f"{len(missed)} of {count} missed: {names}"
+        click.echo(said if missed else f"all {count} numbers are met")
+    if found.missed:
         sys.exit(WORSE)
 
 

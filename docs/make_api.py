@@ -29,11 +29,11 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "studies": (
         "Studies",
         ("runs.refinement:refine,Refinement,convergence,Convergence",
-         "runs.poisson:vary_nu12,Nu12Study,Ratios", "runs.compare:compare_laws,LawComparison",
+         "runs.poisson:vary_nu12,Nu12Study,Ratios", "runs.compare:compare,LawComparison",
          "runs.plan:plan,Plan,Prospect", "runs.profile:profile,Profiles,Profile",
          "runs.bootstrap:bootstrap,Bootstrap",
          "runs.validation:validate,judge_cards,Validation",
-         "runs.weights:weight_study,WeightStudy"),
+         "runs.weights:weights,WeightStudy"),
     ),
     "tests": ("Kinds of test", ("experiments.own:OwnTest", "experiments.kinds",
                                 "experiments.registry",

@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -106,9 +107,16 @@ def notebook(content: dict[str, Any]) -> Iterator[str]:
         text = "".join(cell["source"])
         yield text if cell["cell_type"] == "markdown" else f"\n```python\n{text}\n```\n"
         for output in cell.get("outputs", ()):
-            data = output.get("data", {})
+            data = {kind: "".join(own) for kind, own in output.get("data", {}).items()}
             if "image/png" in data:
-                yield f"\n![drawn](data:image/png;base64,{''.join(data['image/png']).strip()})\n"
+                yield f"\n![drawn](data:image/png;base64,{data['image/png'].strip()})\n"
+                continue
+            if "image/svg+xml" in data:
+                drawing = b64encode(data["image/svg+xml"].encode()).decode()
+                yield f"\n![drawn](data:image/svg+xml;base64,{drawing})\n"
+                continue
+            if data.get("text/html", "").startswith("<table>"):  # of ours, in plain tags
+                yield f"\n{data['text/html']}\n"
                 continue
             said = "".join(output.get("text") or data.get("text/plain") or "").rstrip()
             if said:

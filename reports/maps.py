@@ -237,11 +237,9 @@ def solid_data(solid: Solid) -> dict[str, Any]:
     }  # fmt: skip
 
 
-#: What a history is drawn of: unit, factor and names of its components.
-DRAWN = {
-    "strain": ("%", 100.0, ("log strain along the warp", "along the fill", "in shear")),
-    "stress": ("MPa", 1.0, ("stress along the warp", "along the fill", "in shear")),
-}
+#: What a history is drawn of, with its unit and a factor, and the names of the components.
+DRAWN = {"strain": ("log strain", "%", 100.0), "stress": ("stress", "MPa", 1.0)}
+WAYS = ("along the warp", "along the fill", "in shear")
 #: Height over width at rest up to which a mesh is a sheet, and not a tube.
 FLAT = 0.2
 
@@ -256,7 +254,7 @@ def draw_history(name: str, history: History, quantity: str, component: int, fra
     ):
         if not good:
             raise InputError(None, field, f"expected {expected}")
-    unit, factor, names = DRAWN[quantity]
+    what, unit, factor = DRAWN[quantity]
     every = history.strain() if quantity == "strain" else history.stress()
     values, rest = factor * every[frame, :, component], history.mesh.points
     now, size = rest + history.displacement[frame], np.ptp(rest, axis=0)
@@ -269,7 +267,7 @@ def draw_history(name: str, history: History, quantity: str, component: int, fra
         flat, depth, axes = now[:, :2], now[:, 2], (labels[0], labels[1])
     order = np.argsort(depth[history.mesh.quads].mean(axis=1))
     body = faces("", flat[history.mesh.quads[order]], values[order])
-    said = f"{names[component]}, {unit}"
+    said = f"{what} {WAYS[component]}, {unit}"
     chart = Chart(name, *axes, [body], f"{name}: {said}", equal=True, scale=said,
                   shades=shades_of(values))  # fmt: skip
     return Drawing(Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}"))

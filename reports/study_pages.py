@@ -1,11 +1,11 @@
 """Write the folder of a study: tables, figures, notes.csv, report.html and, last, result.json.
 
-A function a study, found by the type of its result (`runs.folder`); all end in `write_folder`.
+A function a study returns its content, by the type of its result; `write_folder` writes it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,7 @@ from .studies import (
     profile_charts,
     weights_charts,
 )
-from .vega import save
+from .vega import Drawing, save
 
 #: Files of every study, after its own.
 FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
@@ -60,6 +60,10 @@ LIKELIHOODS = (
 )
 UNCERTAINTIES = "1 sigma of the moduli with one more test, root mean square along each"
 ERRORS = "Error of the fit, and at specimens left out of it; the line is the data's own noise"
+
+
+#: Page, tables and figures by file name, and digits of the tables.
+Content = tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]
 
 
 def write_folder(
@@ -82,11 +86,24 @@ def write_folder(
     return written
 
 
-def write_plain(
-    folder: Path, study: Any, title: str, name: str, charts: Sequence[Charts],
-    figure: Charts | None = None, digits: int | None = None,
-) -> Path:  # fmt: skip
-    """Write a study whose page is its lines, charts and table: NAME.csv, with a figure NAME.png."""
+def write_study(study: Any, folder: Path) -> Path:
+    """Write the folder of a study of any type."""
+    return write_folder(folder, study, *CONTENT[type(study).__name__](study))
+
+
+def draw_study(study: Any) -> Drawing:
+    """Return the figure of a study for a notebook."""
+    page, _, figures, _ = CONTENT[type(study).__name__](study)
+    on_page = (part for section in page.sections for part in section.parts)
+    every = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
+    return Drawing(every[0])
+
+
+def plain(
+    study: Any, title: str, name: str, charts: Sequence[Charts], figure: Charts | None = None,
+    digits: int | None = None,
+) -> Content:  # fmt: skip
+    """Return the content of a page of lines, charts and table: NAME.csv, with a figure NAME.png."""
     table, lines = study.table(), study.lines()
     text = tuple(k for k, kind in enumerate(table.dtypes) if not is_numeric_dtype(kind))
     rows = table.to_numpy(object).tolist()
@@ -102,14 +119,14 @@ def write_plain(
         files=[(file, "the table"), *([(picture, "picture of the charts")] if figure else [])],
     )
     figures = {} if figure is None else {picture: figure}
-    return write_folder(folder, study, page, {file: table}, figures, digits)
+    return page, {file: table}, figures, digits
 
 
-def write_refinement(study: Refinement, folder: Path) -> Path:
-    """Write the folder of a study of meshes or increments."""
+def _refinement(study: Refinement) -> Content:
+    """Return the content of a study of meshes or increments."""
     title = f"{study.project.name}: finer and finer {study.what}"
     charts = convergence_charts(panels(study), study.what, title)
-    return write_plain(folder, study, title, "convergence", [charts], charts)
+    return plain(study, title, "convergence", [charts], charts)
 
 
 def panels(study: Refinement) -> list[ConvergencePanel]:
@@ -131,28 +148,28 @@ def panels(study: Refinement) -> list[ConvergencePanel]:
     return drawn
 
 
-def write_nu12(study: Nu12Study, folder: Path) -> Path:
-    """Write the folder of a study of nu12."""
+def _nu12(study: Nu12Study) -> Content:
+    """Return the content of a study of nu12."""
     shown = {
         name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
         for name, part in study.parts.items()
     }
     title = f"{study.project.name}: what nu12 changes"
     charts = nu12_charts(shown, study.base, study.response, title)
-    return write_plain(folder, study, title, "nu12", [charts], charts)
+    return plain(study, title, "nu12", [charts], charts)
 
 
-def write_validation(study: Validation, folder: Path) -> Path:
-    """Write the folder of a validation."""
+def _validation(study: Validation) -> Content:
+    """Return the content of a validation."""
     title = f"{study.title}: errors at data left out of the fit"
     charts = held_out_charts(
         *study.errors(), "Errors at data left out of the fit (predicted), and given to it (fitted)"
     )
-    return write_plain(folder, study, title, "validation", [charts], digits=9)
+    return plain(study, title, "validation", [charts], digits=9)
 
 
-def write_weights(study: weights.WeightStudy, folder: Path) -> Path:
-    """Write the folder of a study of weights."""
+def _weights(study: weights.WeightStudy) -> Content:
+    """Return the content of a study of weights."""
     ended = study.ended
     moduli = {
         name: {
@@ -168,11 +185,11 @@ def write_weights(study: weights.WeightStudy, folder: Path) -> Path:
     )  # fmt: skip
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.title}: the weight of {study.counted}"
-    return write_plain(folder, study, title, "weights", parts, figure, 9)
+    return plain(study, title, "weights", parts, figure, 9)
 
 
-def write_bootstrap(study: bootstrap.Bootstrap, folder: Path) -> Path:
-    """Write the folder of a bootstrap."""
+def _bootstrap(study: bootstrap.Bootstrap) -> Content:
+    """Return the content of a bootstrap."""
     found, law = study.found, study.found.best.law
     best = {name: law.modulus(name, strain) for name, strain in study.strains.items()}
     charts = bootstrap_charts(study.strains, best, study.bands, study.of_fit, BANDS)
@@ -204,11 +221,11 @@ def write_bootstrap(study: bootstrap.Bootstrap, folder: Path) -> Path:
         ],
     )
     tables = {"bootstrap.csv": study.table(), "coefficients.csv": coefficients}
-    return write_folder(folder, study, page, tables, {"bootstrap.png": charts}, 9)
+    return page, tables, {"bootstrap.png": charts}, 9
 
 
-def write_profiles(study: profile.Profiles, folder: Path) -> Path:
-    """Write the folder of profile likelihoods."""
+def _profiles(study: profile.Profiles) -> Content:
+    """Return the content of profile likelihoods."""
     shown = [
         ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
         for one in study.each
@@ -235,8 +252,7 @@ def write_profiles(study: profile.Profiles, folder: Path) -> Path:
         ],
         files=[("profile.csv", "the curves"), ("profile.png", "picture of the profiles")],
     )
-    tables, figures = {"profile.csv": study.table()}, {"profile.png": charts}
-    return write_folder(folder, study, page, tables, figures, 9)
+    return page, {"profile.csv": study.table()}, {"profile.png": charts}, 9
 
 
 def _interval(one: profile.Profile) -> list[object]:
@@ -248,8 +264,8 @@ def _interval(one: profile.Profile) -> list[object]:
     return [one.name, one.best, low, high, *one.band, skew, one.analyses]
 
 
-def write_plan(study: plan.Plan, folder: Path) -> Path:
-    """Write the folder of a plan."""
+def _plan(study: plan.Plan) -> Content:
+    """Return the content of a plan."""
     words, now, first = plan.words, study.now, study.candidates[0]
     every = [("the present tests alone", now)]
     every += [(f"{k}. {p.title}", p) for k, p in enumerate(study.candidates, start=1)]
@@ -288,11 +304,11 @@ def write_plan(study: plan.Plan, folder: Path) -> Path:
         ],
         files=[("plan.csv", "the tables"), ("plan.png", "picture of the chart")],
     )  # fmt: skip
-    return write_folder(folder, study, page, {"plan.csv": study.table()}, {"plan.png": charts}, 6)
+    return page, {"plan.csv": study.table()}, {"plan.png": charts}, 6
 
 
-def write_comparison(study: LawComparison, folder: Path) -> Path:
-    """Write the folder of a comparison of forms."""
+def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
+    """Return the content of a comparison of forms; with a folder also what each test draws."""
     error, total = study.result["objective_is"], sum(noise(study.forms[0]).values())
     rows = [
         LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out()) for f in study.forms
@@ -301,7 +317,8 @@ def write_comparison(study: LawComparison, folder: Path) -> Path:
     note = "fitted: to all points; left out: at what the fits of the folds were not given"
     cells = table.to_numpy(dtype=object).tolist()
     tests = study.forms[0].fit.setup.tests
-    responses = [shown for test in tests for shown in _responses(study, test, folder)]
+    chosen = tests if folder is not None else ()
+    responses = [shown for test in chosen for shown in _responses(study, test, folder or Path())]
     page = Report(
         title=f"{study.project.title}: forms of the moduli",
         summary="; ".join(study.conclusion),
@@ -312,8 +329,20 @@ def write_comparison(study: LawComparison, folder: Path) -> Path:
         ],
         files=[("comparison.csv", "the table"), ("laws.png", "picture of the errors")],
     )
-    tables, figures = {"comparison.csv": table}, {"laws.png": charts}
-    return write_folder(folder, study, page, tables, figures, 9)
+    return page, {"comparison.csv": table}, {"laws.png": charts}, 9
+
+
+def write_comparison(study: LawComparison, folder: Path) -> Path:
+    """Write the folder of a comparison of forms."""
+    return write_folder(folder, study, *_comparison(study, folder))
+
+
+#: Content of the folder of each study, by its type.
+CONTENT: Mapping[str, Callable[[Any], Content]] = {
+    "Bootstrap": _bootstrap, "LawComparison": _comparison, "Nu12Study": _nu12, "Plan": _plan,
+    "Profiles": _profiles, "Refinement": _refinement, "Validation": _validation,
+    "WeightStudy": _weights,
+}  # fmt: skip
 
 
 def _responses(study: LawComparison, test: PreparedTest, folder: Path) -> Sequence[Shown]:

@@ -124,9 +124,9 @@ class Drawing:
         return save(path, self.charts)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
-        png = base64.b64encode(rendered(self.charts, ".png")).decode()
+        svg = rendered(self.charts, ".svg").decode()
         said = "; ".join(chart.alt or chart.title for chart in self.charts.charts)
-        return {VEGA: self.spec, "image/png": png, "text/plain": self.charts.caption or said}
+        return {VEGA: self.spec, "image/svg+xml": svg, "text/plain": self.charts.caption or said}
 
 
 class _Converter:

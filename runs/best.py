@@ -36,7 +36,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
-from .simulation import GivenCard, card_of, card_words, fitted_card
+from .simulation import GivenCard, card_of, card_words
 from .starts import StartRecord
 
 #: Kinds of notes that are made here.
@@ -361,7 +361,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         said = f"run by {SURROGATE}, which leads {named}: that gives no derivatives"
         notes.append(Note(SOLVER, said))
         project = project.with_solver(SURROGATE, {})
-    material = card_of(project, card if card is not None else fitted_card(project))
+    material = card_of(project, card)
     setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
     problem = setup.problem()
     point = evaluate_law(problem, _unknowns(setup, problem, material), with_jacobian=True)
@@ -381,7 +381,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     if far:
         words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
         notes.append(Note(NOT_THE_CARD, words))
-    words = "of the fit" if card is None else card_words(card)
+    words = card_words(card)
     return Optimum(setup, problem, best, words, analyses + 1, moved, tuple(notes))
 
 

@@ -32,7 +32,8 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .folder import Presented, Store, check_asked
+from .folder import Presented, Store, check_asked, finished
+from .progress import listener
 from .setup import fingerprints
 from .simulation import StudyRecord
 from .validation import TESTS, name_of, parts_of
@@ -236,7 +237,7 @@ def bootstrap(
     project: Project, over: str, samples: int = COUNT, card: Card = None,
     tests: str | Sequence[str] | None = None, *, seed: int | None = None,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Bootstrap:  # fmt: skip
     """Draw parts of the data with replacement and fit every draw.
 
@@ -244,7 +245,8 @@ def bootstrap(
     is drawn twice counts twice. over : "tests" (among those of their kind), or a sort of parts of
     the tests: "frames", "specimens", "directions", "ratios". samples : number of draws. card : the
     one that the project's fit left in its usual folder unless given. tests : as for `fit`. seed :
-    of the draws, the project's unless given. out : folder in which every sample is kept as it ends;
+    of the draws, the project's unless given. out : folder of the study, in which every sample is
+    kept as it ends;
     resume : read what it holds. Raises InputError: in the project or its data; fewer than two
     units; OutputError: the folder is used or cannot be written; SolverFailure: the tests cannot be
     run with the card.
@@ -262,7 +264,7 @@ def bootstrap(
     depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
     done = {n: sample for n, sample in record.rows.items() if n < samples}
-    tell = progress or (lambda done, total, what: None)
+    tell = listener(progress)
     tell(len(done), samples, "")
     missing = [n for n in range(samples) if n not in done]
     prepare = functools.partial(_task, found, groups, project.fit.seed)
@@ -273,7 +275,7 @@ def bootstrap(
         tell(len(done), samples, "")
     # Every process runs the optimum once more.
     before = found.analyses + min(project.fit.jobs or cores(), len(missing))
-    return Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before)
+    return finished(Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before), out)
 
 
 def groups_of(found: Optimum, over: str) -> list[Group]:

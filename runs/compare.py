@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, NoFeasibleStart, Note, NoteKind, rows
+from ..errors import InputError, NoFeasibleStart, Note, NoteKind, checked, rows
 from ..experiments.kinds import FittableTest, Masks
 from ..files import __version__
 from ..inference.problem import FitProblem, folds_of
@@ -22,7 +22,8 @@ from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import executor_of
 from .fit import FitEvent, stored_fit
-from .folder import Presented
+from .folder import Presented, check_asked, finished
+from .progress import listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
@@ -339,24 +340,29 @@ class LawComparison(Presented):
         ]
 
 
-def compare_laws(
+@checked
+def compare(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
     *, folds: int = FOLDS, starts: int = STARTS, fold_starts: int = FOLD_STARTS,
-    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | None = None, command_line: Sequence[str] | None = None,
+    trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
+    overwrite: bool = False, progress: Progress | bool | None = None,
+    command_line: Sequence[str] | None = None,
 ) -> LawComparison:  # fmt: skip
     """Fit every form to the tests, then without some specimens, and judge it at those.
 
     Tests without known specimens stay whole in every fold. tests : by name or kind; every test that
     can be fitted unless given. forms : as for `candidates`. folds : at most; fold_starts : random
-    starts of the fit of each. starts : random starts of the fit of each form. out : folder with a
-    folder for each form, written as the fits end. command_line : as for `fit`. Raises InputError:
+    starts of the fit of each. starts : random starts of the fit of each form. out : folder of the
+    study, with a folder for each form, written as the fits end. trust, progress, command_line : as
+    for `fit`. Raises InputError:
     in the project or its data, no test with specimens, nothing to resume; OutputError,
     NoFeasibleStart, SolverFailure: as `fit`.
     """
-    tell = progress or (lambda event: None)
+    check_asked(out, resume, overwrite)
+    tell = listener(progress)
+    project = project.with_fit(trust=[*project.fit.trust, *trust])
     # All of them first: a mistake in the project shows before the first fit.
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
@@ -385,7 +391,7 @@ def compare_laws(
         )  # fmt: skip
         errors = errors_of_folds(setups[name], found, folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
-    return LawComparison(tuple(done), fold_starts)
+    return finished(LawComparison(tuple(done), fold_starts), out)
 
 
 def _form(form: FormFit) -> dict[str, Any]:

@@ -40,9 +40,11 @@ from .folder import (
     Store,
     check_asked,
     failure_page,
+    finished,
     solver_facts,
     write_report,
 )
+from .progress import listener
 from .result import Fit
 from .setup import UNCOUNTED, FitSetup, Saw, coarse_problem, fingerprints, prepare_fit
 from .starts import (
@@ -241,7 +243,7 @@ def fit(
     out: Path | str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     command_line: Sequence[str] | None = None,
     **settings: Any,
 ) -> Fit:
@@ -257,8 +259,8 @@ def fit(
         the folder `earlier`.
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
-        content. progress : receives every `FitEvent`, None now and then. command_line : for the
-        record. settings : any other key of [fit].
+        content. progress : receives every `FitEvent`, None now and then; unless given a bar in
+        notebooks, False for none. command_line : for the record. settings : any other key of [fit].
     InputError : in the project or its data, or nothing to resume. OutputError. NoFeasibleStart : of
         all starts. SolverFailure : the solver is not there, failed in every start, or the best fit
         does not run again or gives another objective: then the page in `out` says so.
@@ -283,7 +285,7 @@ def fit(
     ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
-    tell = progress or (lambda record: None)
+    tell = listener(progress)
     tell(Stage("tests to read", len(chosen)))
     with timed("tests and their data made ready"):
         setup = prepare_fit(project, chosen)
@@ -425,7 +427,7 @@ def _choices(files: Sequence[DataFile]) -> list[str]:
 NOTHING = "nothing doubtful"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Check:
     """A look at the data of tests, with their doubts."""
 
@@ -477,6 +479,9 @@ class Check:
             for test, severity, name, text in self.rows()
         ]
 
+    def __repr__(self) -> str:
+        return "\n".join(self.lines())
+
     def _repr_html_(self) -> str:
         return html_table(self.setup.project.title, ["test", "", "doubt", ""], self.rows())
 
@@ -488,25 +493,28 @@ class Check:
 @checked
 def check(
     project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = (),
-    *, progress: Callable[[int, int, str], None] | None = None,
+    *, out: Path | str | None = None,
+    progress: Callable[[int, int, str], None] | bool | None = None,
 ) -> Check:  # fmt: skip
     """Look at the data of tests, by default of all that can be fitted.
 
-    trust : names of doubts to ignore, beside those of the project. progress : receives steps done,
-    their number, and the one that begins. InputError : unreadable data, an unknown doubt.
+    trust : names of doubts to ignore, beside those of the project. out : folder of the report.
+    progress : receives steps done, their number, and the one that begins, as of `fit`.
+    InputError : unreadable data, an unknown doubt.
     SolverFailure : a known solution does not run.
     """
     project = project.with_fit(trust=[*project.fit.trust, *trust])
     chosen, done = cast(Sequence[FittableTest], project.chosen(tests, fitted=True)), count()
+    tell = listener(progress)
 
     def saw(words: str) -> None:
-        if progress is not None:
-            progress(next(done), 2 * len(chosen) + 1, words)
+        tell(next(done), 2 * len(chosen) + 1, words)
 
     setup = prepare_fit(project, chosen, saw)
     found = Check(setup, judge(setup, saw))
     saw("writing the page")
-    return found
+    with timed("tables and figures"):
+        return finished(found, out)
 
 
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

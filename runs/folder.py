@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -43,6 +43,7 @@ from ..solvers.run_cache import RunCache
 if TYPE_CHECKING:
     import pandas as pd
 
+R = TypeVar("R")
 #: Digits of a checksum that are shown.
 DIGITS = 12
 #: Differences of lists that are listed one by one; length of texts.
@@ -330,17 +331,17 @@ class KeptAnalyses(RunCache):
 
 #: Module of `reports` and its function, by the type of the result.
 PRESENTERS = {
-    "Bootstrap": ("study_pages", "write_bootstrap"),
+    "Bootstrap": ("study_pages", "write_study"),
     "Check": ("run_pages", "write_check"),
     "Fit": ("fit_page", "write_fit"),
     "LawComparison": ("study_pages", "write_comparison"),
-    "Nu12Study": ("study_pages", "write_nu12"),
-    "Plan": ("study_pages", "write_plan"),
+    "Nu12Study": ("study_pages", "write_study"),
+    "Plan": ("study_pages", "write_study"),
     "Predictions": ("run_pages", "write_predictions"),
-    "Profiles": ("study_pages", "write_profiles"),
-    "Refinement": ("study_pages", "write_refinement"),
-    "Validation": ("study_pages", "write_validation"),
-    "WeightStudy": ("study_pages", "write_weights"),
+    "Profiles": ("study_pages", "write_study"),
+    "Refinement": ("study_pages", "write_study"),
+    "Validation": ("study_pages", "write_study"),
+    "WeightStudy": ("study_pages", "write_study"),
 }
 
 
@@ -361,12 +362,30 @@ def draw(module: str, what: str, *given: Any) -> Any:
     return getattr(import_module(f"bubblefit.reports.{module}"), f"draw_{what}")(*given)
 
 
+def finished(result: R, out: Path | str | None) -> R:
+    """Return a result, written into its folder if there is one; raises OutputError."""
+    if out is not None:
+        write_report(result, out)
+    return result
+
+
+def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
+    """Raise OutputError for a folder with a result that is neither resumed nor replaced."""
+    check_asked(out, resume, overwrite)
+    if out is not None and (Path(out) / RESULT).exists() and not (overwrite or resume):
+        raise OutputError(f"{out}: already holds a result; use --overwrite or another --out")
+
+
 class Presented:
     """A result that its presenter writes."""
 
     def write(self, folder: Path | str) -> None:
         """Write all files and the page into a folder; raises OutputError."""
         write_report(self, folder)
+
+    def plot(self) -> Any:
+        """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""
+        return draw("study_pages", "study", self)
 
 
 @contextmanager

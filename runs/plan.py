@@ -36,9 +36,10 @@ from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from .folder import Presented
+from .folder import Presented, check_unused, finished
+from .progress import listener
 from .setup import FitSetup, prepare_fit
-from .simulation import FAILED, card_of, card_words, fitted_card, thickness_notes
+from .simulation import FAILED, card_of, card_words, thickness_notes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -267,7 +268,8 @@ def plan(
     project: Project, card: MaterialCard | Path | str | None = None,
     tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,
     rank: str = WORST, specimens: int | None = None, noise: Mapping[str, float] | None = None,
-    progress: Progress | None = None,
+    out: Path | str | None = None, overwrite: bool = False,
+    progress: Progress | bool | None = None,
 ) -> Plan:  # fmt: skip
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
 
@@ -279,9 +281,12 @@ def plan(
     largest (warp, fill, shear) of the moduli; the card's valid range unless given. rank : "worst"
     for the least certain modulus, or "E1", "E2", "G12". specimens : of every candidate; the usual
     number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
-    of the project's own tests. Raises InputError: in the project or its data, no card, no
-    candidates; SolverFailure: the present tests cannot be run with the card.
+    of the project's own tests. out : folder of the study. progress : as for `fit`. Raises
+    InputError: in the project or its data, no card, no candidates; OutputError: the folder is used;
+    SolverFailure: the present tests cannot be run with the card.
     """
+    check_unused(out, False, overwrite)
+    tell = listener(progress)
     if rank not in (WORST, *COMPONENTS):
         expected = f"{WORST}, {', '.join(COMPONENTS)}"
         raise InputError(None, "--rank", f"expected one of {expected}, got {rank!r}")
@@ -290,7 +295,7 @@ def plan(
         if name not in known or not value > 0:
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(known)}"
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
-    material = card_of(project, card if card is not None else fitted_card(project))
+    material = card_of(project, card)
     chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
     setup = prepare_fit(project, chosen)
     present = present_tests(setup, material)
@@ -308,8 +313,7 @@ def plan(
     found: list[tuple[Prospect, Array]] = []
     notes = thickness_notes(project, material)
     for done, (name, candidate) in enumerate(offered):
-        if progress is not None:
-            progress(done, len(offered), candidate.name)
+        tell(done, len(offered), candidate.name)
         count = candidate.specimens if specimens is None else specimens
         try:
             more, words, added = _added(candidate, present, make)
@@ -323,14 +327,15 @@ def plan(
     if not found:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
     found.sort(key=lambda pair: pair[0].value(rank))
-    return Plan(
+    made = Plan(
         project.title,
         project.path,
-        "of the fit" if card is None else card_words(card),
+        card_words(card),
         [test.name for test in chosen], asked.ends, rank,
         Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
         _following(asked, before, found, rank), notes,
     )  # fmt: skip
+    return finished(made, out)
 
 
 def _ends(

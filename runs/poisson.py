@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, Note, SolverFailure, rows
 from ..errors import lines as note_lines
-from ..materials.card import MaterialCard
 from ..project.project import Project
 from ..solvers.base import History
-from ..solvers.run_cache import RunCache
-from .folder import Presented
+from .folder import Presented, check_unused, finished
 from .simulation import (
     FAILED,
+    GivenCard,
     Part,
     Progress,
     Series,
@@ -157,23 +156,25 @@ class Nu12Study(Presented):
 
 
 def vary_nu12(
-    project: Project, card: MaterialCard | Path | str, values: Sequence[float] = NU12,
-    tests: str | Sequence[str] | None = None, progress: Progress | None = None,
-    kept: RunCache | None = None,
+    project: Project, card: GivenCard | None = None, values: Sequence[float] = NU12,
+    tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Progress | bool | None = None,
 ) -> Nu12Study:  # fmt: skip
-    """Run tests with a card whose nu12 is changed; raises InputError, SolverFailure."""
+    """Run tests with a card whose nu12 is changed; arguments and errors as of `refine`."""
+    check_unused(out, resume, overwrite)
     for value in values:
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
     material, several = card_of(project, card), tuple(sorted(set(values)))
-    series = Series(project, material, progress, kept)
+    series = Series(project, material, progress, out, resume)
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     series.total = len(parts) * (1 + len(several))
-    return Nu12Study(
+    study = Nu12Study(
         project.path, card_words(card), series.solver.name, material.law.nu12,
         {name: _part(series, part, several) for name, part in parts.items()},
         tuple(thickness_notes(project, material)),
     )  # fmt: skip
+    return finished(study, out)
 
 
 def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:

@@ -43,6 +43,7 @@ from .folder import (
     versions,
     write_report,
 )
+from .progress import listener
 from .starts import log_run
 
 if TYPE_CHECKING:
@@ -228,7 +229,7 @@ def predict(
     out: Path | str | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     command_line: Sequence[str] | None = None,
 ) -> Predictions:
     """Run every chosen test that is predicted with every chosen card.
@@ -273,7 +274,7 @@ def predict(
         some = 0 if samples is None and solver.external else samples
         others = _around(project, pairs, some)
         every = [*pairs, *(run for _, run in others)]
-        ended = _run(project, every, records, jobs, progress or (lambda event: None))
+        ended = _run(project, every, records, jobs, listener(progress))
         runs = _with_others(ended, [number for number, _ in others])
         if all(run.record.failure for run in runs):
             said += [f"{r.title}: failed: {r.record.failure}" for r in runs]

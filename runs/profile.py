@@ -27,7 +27,8 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
-from .folder import Presented
+from .folder import Presented, check_unused, finished
+from .progress import listener
 from .setup import FitSetup
 
 if TYPE_CHECKING:
@@ -220,23 +221,26 @@ class Profiles(Presented):
 @checked
 def profile(
     project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
-    tests: str | Sequence[str] | None = None, *, progress: Progress | None = None,
+    tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
+    overwrite: bool = False, progress: Progress | bool | None = None,
 ) -> Profiles:  # fmt: skip
     """Hold moduli away from their best and refit everything else, until the data contradict.
 
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
     where a modulus has no strains. card : the one that the project's fit left in its usual folder
-    unless given. tests : as for `fit`. Raises InputError: in the project or its data; no such
-    modulus, or a strain beyond the law's; SolverFailure: the tests cannot be run with the card.
+    unless given. tests, progress : as for `fit`. out : folder of the study. Raises InputError: in
+    the project or its data; no such modulus, or a strain beyond the law's; OutputError: the folder
+    is used; SolverFailure: the tests cannot be run with the card.
     """
+    check_unused(out, False, overwrite)
     asked = _asked(moduli)
     found = find_optimum(project, card, tests)
     places = _places(found, asked)
     numbers = list(range(len(SIGNS) * len(places)))
     prepare = functools.partial(_task, found, places)
     sides: dict[int, Side] = {}
-    tell = progress or (lambda done, total, what: None)
+    tell = listener(progress)
     for record in executor_of(project).run_tasks(prepare, numbers, "profiles"):
         if isinstance(record, tuple):
             sides[record[0]] = record[1]
@@ -252,10 +256,10 @@ def profile(
         + min(project.fit.jobs or cores(), len(numbers))
         + sum(p.analyses for p in each)
     )
-    return Profiles(
-        project.title, project.path, found.card, tuple(t.test.name for t in found.setup.tests),
-        each, analyses, (*found.notes, *(note for one in each for note in one.notes)),
-    )  # fmt: skip
+    tested, notes = tuple(t.test.name for t in found.setup.tests), [*found.notes]
+    notes += [note for one in each for note in one.notes]
+    done = Profiles(project.title, project.path, found.card, tested, each, analyses, tuple(notes))
+    return finished(done, out)
 
 
 def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:

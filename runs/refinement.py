@@ -19,16 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from ..errors import InputError, Note, SolverFailure, as_note, rows
+from ..errors import InputError, Note, SolverFailure, as_note, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import Refined
-from ..materials.card import MaterialCard
 from ..meshes.mesh import Mesh
 from ..project.project import Project
-from ..solvers.run_cache import RunCache
-from .folder import Presented
+from .folder import Presented, check_unused, finished
 from .simulation import (
     FAILED,
+    GivenCard,
     Part,
     Progress,
     Series,
@@ -352,26 +351,31 @@ def edge_length(mesh: Mesh) -> float:
     return float(np.sqrt(area.mean()))
 
 
+@checked
 def refine(
-    project: Project, card: MaterialCard | Path | str, tests: str | Sequence[str] | None = None,
-    what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None,
-    progress: Progress | None = None, kept: RunCache | None = None,
+    project: Project, card: GivenCard | None = None, tests: str | Sequence[str] | None = None,
+    what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None, *,
+    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    progress: Progress | bool | None = None,
 ) -> Refinement:  # fmt: skip
     """Run tests with a card on finer and finer meshes, or with more and more increments.
 
-    card : itself, its file, or its name in the project. tests : names or kinds, all unless given.
+    card : itself, its file, or its name in the project; the one that the project's fit left in its
+    usual folder unless given. tests : names or kinds, all unless given.
     levels : number of refinements of `what`. factor : edges, or increments, are divided by it from
     one level to the next. coarser : levels coarser than the project's own; 1 of elements and 0 of
-    increments unless given. progress : called with every `Step`. kept : cache of the analyses that
-    ended, from which an interrupted study resumes. Raises InputError: a level that cannot be
-    meshed, or equals another; SolverFailure: nothing can be compared, because fewer than two levels
+    increments unless given. progress : called with every `Step`, as for `fit`. out : folder of the
+    study, which keeps the analyses that ended, from which an interrupted study resumes. Raises
+    InputError: a level that cannot be meshed, or equals another; OutputError: the folder is used;
+    SolverFailure: nothing can be compared, because fewer than two levels
     ended well anywhere.
     """
+    check_unused(out, resume, overwrite)
     below = (1 if what == "elements" else 0) if coarser is None else coarser
     if below >= levels:
         raise InputError(None, "--coarser", f"expected fewer than the {levels} levels, got {below}")
     material = card_of(project, card)
-    series = Series(project, material, progress, kept)
+    series = Series(project, material, progress, out, resume)
     chosen = studied_tests(project, tests)
     # All before the first run: a level that cannot be meshed is a mistake in the options.
     every = [
@@ -395,16 +399,10 @@ def refine(
     if all(len(ended(several)) < 2 for several in runs.values()):
         reason = next(r.failure for several in runs.values() for r in several if r.failure)
         raise SolverFailure(f"fewer than two levels ended well: {reason}", series.solver.name)
-    return Refinement(
-        project.path,
-        card_words(card),
-        series.solver.name,
-        what,
-        runs,
-        # Result files of other programs have 6 digits.
-        1e-5 if series.solver.external else 1e-7,
-        tuple(thickness_notes(project, material)),
-    )
+    # Result files of other programs have 6 digits.
+    noise, notes = 1e-5 if series.solver.external else 1e-7, thickness_notes(project, material)
+    named = project.path, card_words(card), series.solver.name
+    return finished(Refinement(*named, what, runs, noise, tuple(notes)), out)
 
 
 def _runs(series: Series, levels: Sequence[Level]) -> list[LevelRun]:

@@ -61,7 +61,7 @@ COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
 PLACES = 61
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """The result of a fit; best : of the starts, run once more from the unloaded state."""
 
@@ -255,6 +255,9 @@ class Fit:
     def plot_history(self, name: str | None = None, **look: Any) -> Any:
         """Return a drawing of one of `history`, as `Histories.plot`."""
         return self.history().plot(name, **look)
+
+    def __repr__(self) -> str:
+        return f"<Fit of {', '.join(self.tests)}: objective {self.objective:.4g}>"
 
     def _repr_html_(self) -> str:
         rows = [

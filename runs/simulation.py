@@ -30,7 +30,8 @@ from ..project.schema import FITTED, usual_folder
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import Once, RunCache, run_cache
-from .folder import RESULT, Store, draw
+from .folder import RESULT, KeptAnalyses, Store, draw
+from .progress import listener
 from .starts import timed
 
 #: A remark on a run that has no result.
@@ -65,8 +66,9 @@ class Analyses:
     """
 
     def __init__(
-        self, project: Project, progress: Progress | None = None, kept: RunCache | None = None
-    ) -> None:
+        self, project: Project, progress: Progress | bool | None = None,
+        kept: RunCache | None = None,
+    ) -> None:  # fmt: skip
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
@@ -74,7 +76,7 @@ class Analyses:
         if kept is not None:
             self._runs = Once(self.solver, kept, counted(name, options))
         self.total = self.count = 0
-        self._progress = progress
+        self._progress = listener(progress)
 
     def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
         """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
@@ -82,8 +84,6 @@ class Analyses:
         self.count += 1
         tell, count = self._progress, self.count
         with timed(f"analysis {count}, {part}, by {self.solver.name}"):
-            if tell is None:
-                return self._runs.run(model, law)
 
             def say(done: float) -> None:
                 tell(Step(part, count, self.total, done, increments))
@@ -135,7 +135,7 @@ def simulate_cards(
     cards: Mapping[str, MaterialCard],
     folder: Path,
     within_range: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     command: str = "simulate test",
     kept: RunCache | None = None,
 ) -> Simulation:
@@ -231,15 +231,17 @@ class Part:
 
 
 class Series(Analyses):
-    """The analyses of a study, all with one card; raises as `Analyses`."""
+    """The analyses of a study, all with one card, kept in the folder `out`; as `Analyses`."""
 
     def __init__(
         self,
         project: Project,
         card: MaterialCard,
-        progress: Progress | None = None,
-        kept: RunCache | None = None,
+        progress: Progress | bool | None = None,
+        out: Path | str | None = None,
+        resume: bool = False,
     ) -> None:
+        kept = None if out is None else KeptAnalyses(Path(out), resume)
         super().__init__(project, progress, kept)
         self.card = card
 
@@ -292,8 +294,12 @@ def part_name(test: Test, part: str, parts: int, tests: int) -> str:
     return part if tests == 1 else f"{test.name}: {part}"
 
 
-def card_of(project: Project, card: GivenCard) -> MaterialCard:
-    """Return a card that is given as itself, its file, or its name in the project; InputError."""
+def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
+    """Return a card that is given as itself, its file, or its name in the project; InputError.
+
+    None : the one that the project's fit left in its usual folder.
+    """
+    card = fitted_card(project) if card is None else card
     if isinstance(card, MaterialCard):
         return card
     (chosen,) = chosen_cards(project, [card]).values()
@@ -309,8 +315,10 @@ def fitted_card(project: Project) -> Path:
     return path
 
 
-def card_words(card: GivenCard) -> str:
+def card_words(card: GivenCard | None) -> str:
     """Return the name of a card in results."""
+    if card is None:
+        return "of the fit"
     return card.name if isinstance(card, MaterialCard) else str(card)
 
 

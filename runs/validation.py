@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, rows
+from ..errors import InputError, Note, NoteKind, checked, rows
 from ..experiments.kinds import (
     BEYOND_CARD,
     Divisible,
@@ -36,12 +36,13 @@ from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
-from ..project.project import Project
+from ..project.project import Project, chosen_cards
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
 from .fit import FitEvent, stored_fit
-from .folder import Presented
+from .folder import Presented, check_asked, check_unused, finished
+from .progress import listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
 from .simulation import FAILED, begin_study, mark_of, read_marked, write_marked
@@ -369,12 +370,14 @@ def _judged(row: Mapping[str, Any]) -> HeldOut:
     return HeldOut(row["part"], row["error"], row["rms"], row["units"], notes)
 
 
+@checked
 def validate(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *, leave: str = TESTS, starts: int = STARTS, out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Progress | None = None,
+    *, cards: Sequence[str] | Mapping[str, MaterialCard] = (), leave: str = TESTS,
+    starts: int = STARTS, trust: Sequence[str] = (), out: Path | str | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Progress | bool | None = None,
     command_line: Sequence[str] | None = None,
 ) -> Validation:  # fmt: skip
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
@@ -383,13 +386,19 @@ def validate(
     a part of a test (a frame) they are those of the fit to the rest of the test. tests : by name or
     kind; every test that can be fitted unless given. forms : of the moduli, as for `compare_laws`;
     the project's own unless given. leave : "tests", or a sort of parts that the tests have:
-    "frames" of a bubble, "specimens" or "directions" of strips. out : folder with a folder for each
-    fit, written as the fits end. Raises InputError: in the project or its data, fewer than two
-    tests or parts, nothing to resume; OutputError, NoFeasibleStart, SolverFailure: as
-    `bubblefit.fit`.
+    "frames" of a bubble, "specimens" or "directions" of strips. cards : judged at every test
+    instead, without a fit: by name, or names and files as for the command. out : folder of the
+    study, with a folder for each fit, written as the fits end. trust, progress, command_line : as
+    for `fit`. Raises InputError: in the project or its data, fewer than two tests or parts, nothing
+    to resume; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
     """
-    tell = progress or (lambda event: None)
-    project = project.with_fit(starts=starts)
+    if cards:
+        check_unused(out, False, overwrite)
+        given = cards if isinstance(cards, Mapping) else chosen_cards(project, cards)
+        return finished(judge_cards(project, given, tests), out)
+    check_asked(out, resume, overwrite)
+    tell = listener(progress)
+    project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
     chosen = project.chosen(tests, fitted=True)
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
@@ -432,7 +441,7 @@ def validate(
             words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
             found = fitted(own, words, others, place)
             judged.append(Judged(form, _judge(found, test), _judge(together, test)))
-    return Validation(project.title, tuple(judged), leave)
+    return finished(Validation(project.title, tuple(judged), leave), out)
 
 
 def judge_cards(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, Note, rows
+from ..errors import InputError, Note, checked, rows
 from ..files import __version__
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
@@ -17,7 +17,8 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .compare import errors
 from .fit import FitEvent, stored_fit
-from .folder import Presented
+from .folder import Presented, check_asked, finished
+from .progress import listener
 from .result import Fit
 from .setup import FitSetup, fingerprints
 from .simulation import FAILED, StudyRecord, begin_study
@@ -159,22 +160,25 @@ class WeightStudy(Presented):
         return lines
 
 
-def weight_study(
+@checked
+def weights(
     project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
-    starts: int = STARTS, counts: Sequence[float] = COUNTS, out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Progress | None = None,
-    command_line: Sequence[str] | None = None,
+    starts: int = STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),
+    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    progress: Progress | bool | None = None, command_line: Sequence[str] | None = None,
 ) -> WeightStudy:  # fmt: skip
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
 
     counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
     starts : of the fit at the project's weights; the others begin at the optimum beside them.
-    counts : factors of the weight in the project. out : folder in which every fit is written as it
-    ends. Raises InputError: in the project or its data; no test of that kind or name, or no other
-    one; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
+    counts : factors of the weight in the project. out : folder of the study, in which every fit is
+    written as it ends. trust, progress, command_line : as for `fit`. Raises InputError: in the
+    project or its data; no test of that kind or name, or no other one; OutputError,
+    NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
     """
-    tell = progress or (lambda event: None)
-    project = project.with_fit(starts=starts)
+    check_asked(out, resume, overwrite)
+    tell = listener(progress)
+    project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
     chosen = project.chosen(tests, fitted=True)
     names = [test.name for test in chosen if counted in (test.kind, test.name)]
     if not names or len(names) == len(chosen):
@@ -197,7 +201,7 @@ def weight_study(
     depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
     record = StudyRecord(folder, RUNS, "runs", WeightedFit, "count", depends, resume)
     runs = sorted(_runs(found, names, sorted(counts), record, tell), key=lambda run: run.count)
-    return WeightStudy(project.title, counted, tuple(names), found, tuple(runs))
+    return finished(WeightStudy(project.title, counted, tuple(names), found, tuple(runs)), out)
 
 
 def _runs(

@@ -1,21 +1,23 @@
 """Compare published and closed-form numbers with those of the program as it is installed.
 
-from . import numbers
-for subject, several in numbers(): print(subject, [(n.what, n.ours, n.theirs) for n in several])
+bf.verify().table() lists them all, bf.verify(["bars"]) those of a subject.
 
 Here are published results of Marc, Abaqus and the thesis: bars, bubbles, strips, Poisson's ratio.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ...errors import InputError
+from ...errors import InputError, checked
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import disk_mesh
@@ -25,6 +27,7 @@ from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import Solver
 from ...solvers.calculix.solver import CalculixSolver, diagnose
 from ...solvers.membrane.solver import MembraneSolver
+from ..progress import listener
 from .closed_forms import Number, bent_tubes, hencky_membranes, thin_walls
 
 SOURCE = "MSC Marc; Jekel et al., Composite Structures 161 (2017)"
@@ -239,15 +242,54 @@ SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
 }  # fmt: skip
 
 
-def numbers(
-    subjects: Iterable[str] = SUBJECTS, data: Path | None = None
-) -> Iterator[tuple[str, list[Number]]]:
-    """Yield each subject's numbers, none without its program, then those of the measured data."""
-    for subject in (chosen := list(subjects)):
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Numbers beside published ones by subject, none where the program for it is not here."""
+
+    subjects: Mapping[str, Sequence[Number]]
+
+    @property
+    def missed(self) -> list[Number]:
+        """Numbers that are further off than is allowed."""
+        return [one for several in self.subjects.values() for one in several if not one.met]
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """All numbers in plain values, as the command prints them with --json."""
+        rows = [
+            {"subject": s, **one.row} for s, several in self.subjects.items() for one in several
+        ]
+        return {"ok": not self.missed, "numbers": rows}
+
+    def table(self) -> pd.DataFrame:
+        """Return a row a number."""
+        return pd.DataFrame(self.result["numbers"])
+
+
+@checked
+def verify(
+    subjects: Sequence[str] | None = None, *, data: Path | str | None = None,
+    progress: Callable[[int, int, str], None] | bool | None = None,
+    saw: Callable[[str, Sequence[Number]], None] = lambda subject, found: None,
+) -> Verification:  # fmt: skip
+    """Compare this installation with published numbers and closed forms; takes a few minutes.
+
+    subjects : by name, all unless given. data : folder of the measured strips, compared at last.
+    progress : receives subjects done, all, and the one that begins. saw : receives the numbers of
+    each subject as it ends. InputError : no such subject.
+    """
+    chosen = list(SUBJECTS if subjects is None else subjects)
+    for subject in chosen:
         if subject not in SUBJECTS:
             problem = f"{subject!r} is not one of: {', '.join(SUBJECTS)}"
             raise InputError(None, "--subject", problem)
-    for subject in chosen:
-        yield subject, list(SUBJECTS[subject]())
+    every: dict[str, Callable[[], Iterable[Number]]] = {name: SUBJECTS[name] for name in chosen}
     if data is not None:
-        yield "measured strips", list(measured_strips(data))
+        every["measured strips"] = functools.partial(measured_strips, Path(data))
+    tell, found = listener(progress), dict[str, Sequence[Number]]()
+    for done, (subject, compare) in enumerate(every.items()):
+        tell(done, len(every), subject)
+        found[subject] = list(compare())
+        saw(subject, found[subject])
+    tell(len(every), len(every), "")
+    return Verification(found)

@@ -29,7 +29,7 @@ from bubblefit.runs.poisson import by_response, ratios, vary_nu12
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
-from bubblefit.runs.weights import COUNTS, weight_study
+from bubblefit.runs.weights import COUNTS, weights
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import minimize_scalar
 
@@ -463,13 +463,13 @@ def test_a_study_of_weights_goes_on_where_it_was(project, tmp_path, monkeypatch)
     monkeypatch.setattr(study_of, "refit", counting)
     given = {"starts": 1, "counts": (0.5, 1, 2, 4), "out": tmp_path / "out"}
     with pytest.raises(KeyboardInterrupt):
-        weight_study(project, "two", **given)
-    study = weight_study(project, "two", **given, resume=True)
+        weights(project, "two", **given)
+    study = weights(project, "two", **given, resume=True)
     assert asked == [2, 4, 4, 0.5]
     assert [run.count for run in study.runs] == [0.5, 1, 2, 4]
     assert all(run.analyses < 20 for run in study.runs)  # from the optimum beside it
     with pytest.raises(InputError, match=r"run\.json: parts: .*another counted"):
-        weight_study(project, "one", **given, resume=True)
+        weights(project, "one", **given, resume=True)
 
 
 OTHER_FORM = MaterialCard(HypoelasticLaw(np.ones(12)), 0.8, "cubic")
@@ -489,8 +489,8 @@ BAD = [
     (plan, {"card": CARD, "strain": (0.1, 0.0, 0.1)}, "--strain: "),
     (plan, {"card": None}, "fit first"), (vary_nu12, {"card": CARD, "values": [-1e-9]}, "--nu12"),
     (vary_nu12, {"card": CARD, "values": [1.0]}, "--nu12"),
-    (weight_study, {"counted": "strips"}, r"--weights: .* strips, one, two; got"),
-    (weight_study, {"counted": "three"}, r"--weights: .* strips, one, two; got"),
+    (weights, {"counted": "strips"}, r"--weights: .* strips, one, two; got"),
+    (weights, {"counted": "three"}, r"--weights: .* strips, one, two; got"),
 ]  # fmt: skip
 
 

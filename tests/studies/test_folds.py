@@ -21,7 +21,7 @@ from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import FAILED
 from bubblefit.runs.validation import fit_without, held_out, parts_of
-from bubblefit.runs.verification import SUBJECTS, Number, numbers
+from bubblefit.runs.verification import SUBJECTS, Number, verify
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -351,7 +351,7 @@ COUNTS = {
 
 @cache
 def ours():
-    return dict(numbers([subject for subject in SUBJECTS if subject != "calculix"]))
+    return verify([name for name in SUBJECTS if name != "calculix"]).subjects
 
 
 def test_every_number_is_met():
@@ -376,22 +376,22 @@ def test_theirs_are_the_published_ones(tmp_path):
     apex = [theirs[f"apex of Table 4.2, {1e3 * p:g} kPa"] for p in verification.PRESSURES]
     assert apex == pytest.approx([14.2, 20.05, 24.4, 28.1, 32.6, 36.5, 38.8], abs=0.2)
     with pytest.raises(InputError, match=r"--subject: 'hinge' is not one of: bars, hencky"):
-        list(numbers(["hinge"]))
+        verify(["hinge"])
     with pytest.raises(InputError, match=r"valmex7318_load_gauge\.csv"):
-        list(numbers([], tmp_path))
+        verify([], data=tmp_path)
     assert verification.TABLE.is_file()
 
 
 @pytest.mark.slow
 def test_with_calculix(ccx):
-    ((_, found),) = numbers(["calculix"])
+    (found,) = verify(["calculix"]).subjects.values()
     assert len(found) == 6
     assert [one.row for one in found if not one.met] == []
     assert all(one.what.startswith("CalculiX: ") for one in found)
 
 
 def test_measured_strips(shared_data):
-    *_, (subject, found) = numbers([], shared_data / "uniaxial")
+    ((subject, found),) = verify([], data=shared_data / "uniaxial").subjects.items()
     assert subject == "measured strips"
     squares = {"warp": 0.998, "fill": 0.959, "bias": 0.987}
     expected = {f"R^2 of the {name} polynomial": r for name, r in squares.items()}

@@ -11,8 +11,8 @@ import pytest
 from bubblefit.errors import Note, OutputError, rows
 from bubblefit.materials.forms.polynomial import Polynomial
 from bubblefit.reports import study_pages
-from bubblefit.runs import compare
-from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare_laws
+from bubblefit.runs import compare as study
+from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison, compare
 from bubblefit.runs.simulation import StudyRecord, mark_of
 from bubblefit.solvers.base import SNAP
 
@@ -33,7 +33,7 @@ class Run:
     def compare(self, **options):
         self.events.clear()
         options = {"progress": self.events.append, **options}
-        return compare_laws(
+        return compare(
             bf.read_project(self.path), ["one"], ("constant", "linear"), folds=5, starts=1,
             fold_starts=1, out=self.out, **options,
         )  # fmt: skip
@@ -160,7 +160,7 @@ def form(name, coefficients, *folds):
 
 def test_the_simplest_form_that_is_as_good(monkeypatch):
     every = {"warp": 0.5, "fill": 0.25, "b": 7.0}
-    monkeypatch.setattr(compare, "noise_of", lambda problem: every)
+    monkeypatch.setattr(study, "noise_of", lambda problem: every)
     forms = (
         form("cubic", 12, 99.0, 101.0), form("linear", 6, 104.0, 105.8),
         form("constant", 3, 105.0, 105.2), form("quadratic", 9, 1.0, None),
