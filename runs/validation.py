@@ -384,7 +384,7 @@ def validate(
 
     Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
     a part of a test (a frame) they are those of the fit to the rest of the test. tests : by name or
-    kind; every test that can be fitted unless given. forms : of the moduli, as for `compare_laws`;
+    kind; every test that can be fitted unless given. forms : of the moduli, as for `compare`;
     the project's own unless given. leave : "tests", or a sort of parts that the tests have:
     "frames" of a bubble, "specimens" or "directions" of strips. cards : judged at every test
     instead, without a fit: by name, or names and files as for the command. out : folder of the
