@@ -134,12 +134,15 @@ def posteriors_of(
     than its noise allows has the norm of the noise; a direction without data is as uncertain as
     `PRIOR`."""
     linear = Linear.of(problem, best, noise, second)
-    weights, sizes, moved = linear.weights, linear.sizes, linear.moved
+    sizes, moved = linear.sizes, linear.moved
     scaled = moved @ moved.T + PRIOR**2 * linear.flat @ linear.flat.T
     covariance = np.asarray(scaled * sizes[:, None] * sizes)
 
+    # The noise makes no other optimum: what pulls at the best fit is weighted as in the objective.
+    exact = Linear.of(problem, best, replace(noise, least=np.zeros_like(noise.least)), second)
+
     def centre(residual: Array) -> Array:
-        return np.asarray(best.unknowns - sizes * (linear.estimator @ (weights * residual)))
+        return np.asarray(best.unknowns - sizes * (exact.estimator @ (exact.weights * residual)))
 
     own = Posterior(problem.unknowns, best.unknowns, centre(best.residual), covariance)
     if limit is None:
@@ -385,10 +388,13 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     assert best.jacobian is not None
     error = (finer - best.residual) * factor**2 / (factor**2 - 1.0)
     blocks = problem.blocks
-    norms = np.maximum(blocks.norms(best.residual), blocks.norms(error))
+    # Those of the objective, as the posterior has them; of an exact fit there are none.
+    norms = blocks.norms(best.residual)
+    if not (norms > 0).any():
+        norms = blocks.norms(error)
     if not (norms > 0).any():
         return Limit(np.zeros_like(best.unknowns), best.residual, error)
-    weights = 1.0 / np.maximum(norms, 1e-9 * norms.max())[blocks.of]
+    weights = 1.0 / np.maximum(norms, SMALLEST * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     a, c = problem.unknowns.inequalities
     curvature = weighted @ best.jacobian

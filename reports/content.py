@@ -142,7 +142,8 @@ class Exhibit:
 
     figures, files : a file below the output folder, and its caption or content.
     parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
-    record : tables of how it was measured, for the record at the end of the page.
+    record : tables of how it was measured, for the record at the end of the page. standards :
+    tables as a standard's report has them.
     summary : the result in a sentence.
     """
 
@@ -152,6 +153,7 @@ class Exhibit:
     files: Sequence[tuple[str, str]] = ()
     parts: Sequence[Part] = ()
     record: Sequence[Table] = ()
+    standards: Sequence[Table] = ()
     summary: str = ""
 
     def all_parts(self, title: str = "") -> list[Part]:

@@ -391,6 +391,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         for t in fit.setup.tests
     }
     record = [] if fit.record is None else record_tables(fit.record)
+    standards = [table for exhibit in exhibits.values() for table in exhibit.standards]
     files = [
         *FILES,
         *([] if fit.record is None else fit.record.files),
@@ -422,6 +423,7 @@ def _page(fit: Fit, folder: Path) -> Report:
                 Facts(found_by(fit)), _saved(optima(fit), folder / OPTIMA), starts_table(fit),
                 bounds_table(fit), *coefficients_table(fit),
             ]),
+            *([Section("Reports by standards", standards)] if standards else []),
             Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
             Section("How to cite", citation()),
         ],

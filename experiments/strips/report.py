@@ -384,14 +384,14 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
     if draw_orders([s.strip for s in strips], out.path("orders.png")):
         caption = "Error of load polynomials by order, and with a specimen left out"
         figures.append((out.name("orders.png"), caption))
-    record, more = show_standard(test, out)
+    standards, more = show_standard(test, out)
     return Exhibit(
         facts=[("matched", MATCHED[test.match_by])],
         figures=figures,
         tables=[misfit_table(strips)],
         files=[*files, *more],
         parts=[charts],
-        record=record,
+        standards=standards,
     )
 
 

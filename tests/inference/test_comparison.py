@@ -24,6 +24,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.interpolate import BSpline
 from scipy.stats import ttest_1samp
 
 from ..complaints import complaint
@@ -378,6 +379,34 @@ def test_what_is_small_beside_the_load_is_no_warning():
     assert small.share < 1e-3 and not small.significant
     assert not notes_of_discrepancies({"warp": small})
     assert large.share > 0.02 and large.significant
+
+
+def test_what_a_spline_leaves_is_small_beside_scatter_and_load():
+    """0.3 N alike in all among 14 N of scatter: F is above 100, and no warning comes."""
+    random, count = np.random.default_rng(2), np.repeat(np.arange(6), len(PLACES))
+    x, own = np.tile(PLACES, 6), PLACES / PLACES.max()
+    basis = BSpline.design_matrix(own, np.r_[[0] * 3, np.linspace(0, 1, 4), [1] * 3], 3).toarray()
+    curve = own**4
+    far = curve - basis @ np.linalg.lstsq(basis, curve, rcond=None)[0]
+    far *= 0.3 / np.sqrt(np.mean(far**2))  # beside all that the spline can follow
+    load = 500 * PLACES
+    slack, left = random.standard_normal((2, 6, 1))
+    scatter = (17.0 * slack * own + (0.4 * left) * far).ravel()
+    scatter += 0.02 * random.standard_normal(len(scatter))
+    measured = np.tile(load + far, 6) + scatter
+    knots = np.linspace(0.25, 3.5, 14)
+    objective = LoadObjective(knots, x, measured, specimens=count)
+    slopes = np.tile(basis, (6, 1)) / objective.scale[:, None]
+    model = SimpleNamespace(load=500 * knots)
+    problem = SimpleNamespace(
+        comparisons=[SimpleNamespace(name="warp", objective=objective)],
+        rows=lambda _: slice(None), scale=objective.scale,
+    )  # fmt: skip
+    best = SimpleNamespace(jacobian=slopes, histories=[model])
+    one = differences_of_all(problem, objective.residual(model), best, lambda step: 0.0)["warp"]
+    assert np.sqrt(np.mean(scatter**2)) == pytest.approx(14.0, rel=0.3)
+    assert one.systematic and one.ratio > 100 and one.rms == pytest.approx(0.3, rel=0.3)
+    assert not one.significant and not notes_of_discrepancies({"warp": one})
 
 
 def test_what_the_law_can_follow_is_no_wrong_form():

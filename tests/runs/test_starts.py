@@ -463,6 +463,18 @@ def test_the_default_is_nearer_to_the_truth_than_its_mesh(off):
             assert least < wrong < most, name
 
 
+def test_what_is_taken_out_lies_well_within_its_band(off):
+    """Value and band weigh the data alike, whatever the noise beside what is left."""
+    fitted = corrected(off)
+    sure = fitted.best.certainty
+    assert (np.abs(sure.fine.centre - sure.fine.best) < 0.06 * sure.fine.sigma).all()
+    for name, strain in sure.strain.items():
+        value = fitted.law.modulus(name, strain)
+        low, high = sure.ends(name, strain, value)
+        room = np.minimum(value - low, high - value) / (high - low)
+        assert room.min() > 0.3, name
+
+
 @pytest.mark.parametrize("change", [lambda fitted: fitted, corrected], ids=["told", "taken out"])
 def test_one_band_in_every_place(off, change, tmp_path):
     """Card and export, moduli.csv and terminal: the same ends, and the value between them."""
