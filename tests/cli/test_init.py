@@ -9,7 +9,7 @@ import pytest
 from bubblefit.cli import start
 from bubblefit.cli.start import KINDS
 from bubblefit.project.project import read_project
-from bubblefit.project.schema import SHIPPED, parse, project_schema
+from bubblefit.project.schema import SHIPPED, project_schema, read_content, validated
 from click.testing import CliRunner
 
 from ..commands import in_process, one_line
@@ -112,7 +112,7 @@ def test_what_is_commented_may_be_wanted(tmp_path, schema):
     one_by_one = [{n, max((h for h in headers if h <= n), default=n)} for n in numbers]
     for wanted in [*one_by_one, set(numbers)]:
         path.write_text(uncommented(lines, wanted))
-        parse(path)
+        validated(read_content(path), path)
         schema.validate(tomllib.loads(path.read_text()))
 
 
