@@ -1,8 +1,5 @@
 """Measure what increments, the load ratio, exports and constants lose."""
 
-import contextlib
-import multiprocessing
-import resource
 import sys
 import tempfile
 from itertools import pairwise
@@ -10,7 +7,6 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
-from bubblefit.cli.main import main as bubblefit_command
 from bubblefit.errors import InputError
 from bubblefit.materials.designers import RATIOS, constants_of_law, shares, spread_of
 from bubblefit.materials.exports import base as curves
@@ -25,9 +21,8 @@ from bubblefit.materials.responses import (
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs.validation import validate
-from bubblefit.solvers.membrane import factorisation, newton
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from common import BENDING, EXAMPLES, LAW_4_2, PRESSURES, THICKNESS, start_on
+from common import BENDING, LAW_4_2, PRESSURES, THICKNESS, start_on
 
 #: %, of the apex with seven increments; with the modulus at their midpoints it was 0.21.
 GOAL = 0.002
@@ -70,10 +65,10 @@ def in_parts(parts, more=()):
     return np.unique([*levels, *more])
 
 
-def increments(*, starts=5):
-    """Compare apex heights of Table 4.2's bubble with those of 350 increments; count Newton's work.
+def increments():
+    """Compare apex heights of Table 4.2's bubble with those of 350 increments.
 
-    Exit code 1 where seven increments miss the goal. STARTS of the example's counted; 0 for none.
+    Exit code 1 where seven increments miss the goal.
     """
     solver, mesh = MembraneSolver(1e-10), disk_mesh(100.0, 400, "quarter")
     apex, exact, errors = mesh.node_sets["apex"][0], None, {}
@@ -84,44 +79,8 @@ def increments(*, starts=5):
         errors[len(steps)] = 100 * float(np.abs(height / exact - 1).max())
     for count, error in list(errors.items())[1:]:
         print(f"{count} increments: apex within {error:.2g} % of 350", flush=True)
-    if starts:
-        work, spent = work_of_starts(starts)
-        factors, assemblies = (
-            work[name] / work["increments"] for name in ("factors", "assemblies")
-        )
-        print(f"{starts} starts: {factors:.1f} factorisations and {assemblies:.1f} assemblies an "
-              f"increment, {spent:.1f} s of processor")  # fmt: skip
     if errors[7] > GOAL:
         sys.exit(f"goal missed: {errors[7]:.2g} % > {GOAL} %")
-
-
-def work_of_starts(starts):
-    """Count Newton's work in starts of the example, whose process is a fork of this one."""
-    count = {name: multiprocessing.Value("q") for name in ("increments", "assemblies", "factors")}
-
-    def count_calls(kind, method, name):
-        original = getattr(kind, method)
-
-        def counting(*given, **named):
-            count[name].value += 1
-            return original(*given, **named)
-
-        setattr(kind, method, counting)
-
-    count_calls(newton.Membrane, "equilibrium", "increments")
-    count_calls(newton.Membrane, "unbalance", "assemblies")
-    for kind in vars(factorisation).values():
-        if isinstance(kind, type) and kind.__module__ == factorisation.__name__:
-            if hasattr(kind, "factor") and kind is not factorisation.Tangent:
-                count_calls(kind, "factor", "factors")
-    with tempfile.TemporaryDirectory() as folder:
-        words = ["bubble", str(EXAMPLES / "bubble-known-solution" / "project.toml"), "--quiet"]
-        words += ["--starts", str(starts), "--jobs", "1", "--out", str(Path(folder) / "out")]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        with contextlib.redirect_stdout(sys.stderr):
-            bubblefit_command(words, standalone_mode=False)
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    return {name: value.value for name, value in count.items()}, spent
 
 
 def ratio_law(beta):
