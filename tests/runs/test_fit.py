@@ -365,7 +365,7 @@ def test_a_fit_with_the_thickness_unknown(together, tmp_path):
     assert said["value"] == pytest.approx(0.8, abs=1e-3)
     assert said["sigma"] == pytest.approx(0.04, rel=0.01) and not said["determined"]
     assert "unknowns" not in fixed
-    assert f"thickness: {said['verdict']}" in done.output.splitlines()
+    assert f"thickness: {said['verdict']}" in " ".join(done.output.split())
     page = (tmp_path / "free" / "report.html").read_text()
     assert said["verdict"] in page and "thickness (fitted)" in page and "nu12 (fixed)" in page
     kinds = [n["kind"] for n in free["notes"] if n["note"].startswith("thickness is")]
