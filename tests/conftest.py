@@ -84,9 +84,10 @@ def packages(tmp_path, monkeypatch):
 @pytest.fixture
 def bars(monkeypatch):
     """A solver and a kind of test, both named bars; the solver is the one that runs."""
-    solver, known = BarSolver(), dict(experiments.kinds())
+    solver, known = BarSolver(), {**experiments.kinds(), "bars": BarKind()}
+    monkeypatch.setattr("bubblefit.project.project.kinds", lambda: known)
     for module in ("runs.simulation", "project.project"):
-        monkeypatch.setattr(f"bubblefit.{module}.kinds", lambda: {**known, "bars": BarKind()})
+        monkeypatch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
     reports = experiments.report_of
     monkeypatch.setattr(
         "bubblefit.runs.simulation.report_of",

@@ -239,7 +239,7 @@ def mixed(tmp_path, monkeypatch):
     def kind_named(name):
         return kind if name == "strut" else ours(name)
 
-    for module in (predictions_module, kinds_of_test):
+    for module in (predictions_module, kinds_of_test, project_module):
         monkeypatch.setattr(module, "kind_named", kind_named)
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
     read = read_project(write_project(tmp_path))
