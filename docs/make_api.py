@@ -21,7 +21,9 @@ API = HERE / "reference" / "api"
 PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
-        ("project.project:read_project,Project", "runs.fit:fit", "runs.result:Fit",
+        ("project.project:read_project,Project",
+         "project.objects:Bubble,Strips,Law,Sheet,Registration", "runs.fit:fit,check",
+         "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
          "experiments.strips.cycles:cycles,Cycles,EvaluatedHistory,CycleValues",
          "materials.card:MaterialCard,read_card,write_card,thickness_difference"),
