@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
     from .runs.compare import compare
+    from .runs.estimate import estimate
     from .runs.fit import check, fit
     from .runs.plan import plan
     from .runs.predictions import predict
@@ -46,9 +47,9 @@ if TYPE_CHECKING:
     from .runs.weights import weights
 
 __all__ = ["Bubble", "Fabric", "Fit", "Form", "Law", "MaterialCard", "OwnTest", "Project",
-           "Registration", "Sheet", "Strips", "bootstrap", "check", "compare", "cycles", "fit",
-           "plan", "predict", "profile", "read_card", "read_project", "refine", "simulate",
-           "validate", "verify", "weights"]  # fmt: skip
+           "Registration", "Sheet", "Strips", "bootstrap", "check", "compare", "cycles",
+           "estimate", "fit", "plan", "predict", "profile", "read_card", "read_project",
+           "refine", "simulate", "validate", "verify", "weights"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
@@ -68,6 +69,7 @@ _PLACES = {
     "check": "runs.fit",
     "compare": "runs.compare",
     "cycles": "experiments.strips.cycles",
+    "estimate": "runs.estimate",
     "fit": "runs.fit",
     "plan": "runs.plan",
     "predict": "runs.predictions",

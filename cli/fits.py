@@ -20,7 +20,7 @@ from .terminal import FILE, WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
     from ..project.project import Project
-    from ..runs.result import Fit
+    from ..runs.result import Answered, Fit
 
 #: Words for the modulus in the table of the terminal.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
@@ -97,6 +97,30 @@ def uniaxial_command(**options: Any) -> None:
     run_fit(options, "strips")
 
 
+@command(
+    "estimate",
+    "bubblefit estimate project.toml",
+    "bubblefit estimate project.toml --test bubble --json",
+)
+@given.with_options(given.PROJECT, given.TESTS, given.DATA)
+@click.option("--json", "as_json", is_flag=True, help="Print the estimate as JSON.")
+def estimate_command(**options: Any) -> None:
+    """Estimate the moduli of PROJECT.toml by virtual work, in less than a second.
+
+    The measured shapes of a bubble are put into the equations of equilibrium, which are not solved:
+    strains are measured, and the moduli are those with which internal and external virtual work
+    agree best. Chi is one where only noise is left. `bubblefit check` maps where equilibrium is not
+    satisfied. A start and a doubt, not a result: a fit also knows the sheet's first shape.
+    """
+    from ..project.project import read_project
+    from ..runs.estimate import estimate
+
+    project = read_project(options["project"], given.data_folders(options["data"]))
+    found = estimate(project, options["tests"] or None)
+    lines = [*modulus_lines(found), *found.lines(), *note_lines(found.notes)]
+    show(found.result, lines, options["as_json"])
+
+
 def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
     """Return the project with starts, optimiser and workers as the command line has them."""
     chosen = {name: options[name] for name in ("seed", "method", "jobs", "starts_from")}
@@ -159,7 +183,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     ]
 
 
-def modulus_lines(fit: Fit) -> list[str]:
+def modulus_lines(fit: Answered) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
     from ..inference.posterior import LEVEL
     from ..reports.fit_page import sigma_words

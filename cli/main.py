@@ -28,6 +28,7 @@ COMMANDS = {
     "biaxial": ("data", "Evaluate designers' linear constants from biaxial tests."),
     "cycles": ("data", "Evaluate load cycles: permanent strain, stiffness, energy lost."),
     "check": ("data", "Check the data before a fit."),
+    "estimate": ("fits", "Estimate moduli by virtual work, without a fit."),
     "bend": ("predict", "Inflate and bend cylinders with material cards."),
     "validate": ("studies", "Cross-validate a fit: predict each test from the others."),
     "profile": ("studies", "Compute profile-likelihood intervals of moduli."),

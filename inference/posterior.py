@@ -6,14 +6,15 @@ allowed and likely, to a place drawn on that line between its ends (hit and run)
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import quadprog
 from scipy.linalg import solve_triangular
-from scipy.special import log_ndtr, ndtri_exp
 
+from ..files import compiled
 from ..materials.forms.base import Array, modulus_rows
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
@@ -29,6 +30,9 @@ NONE = 1e-14  # of the largest variance: less is none
 #: less is inside.
 CLOSE, ROUNDING = 1e-9, 1e-9
 FAR = 1e6  # standard deviations from the mean beyond which a place is no longer drawn
+TAIL = -30.0  # standard deviations; and the least probability above a place
+LEAST_CHANCE = 1e-17
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
 def truncated_draws(
@@ -97,31 +101,80 @@ def _walked(
     # Most inequalities are so far away that no walk meets them.
     near = rows @ centre - least < np.linalg.norm(start - centre) + BEYOND
     rows, least = rows[near], least[near]
-    place = np.tile(start, (count, 1))
-    for _ in range(STEPS + STEPS_A_DIMENSION * len(centre)):
-        way = random.standard_normal(place.shape) @ root.T
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        room, slope = np.minimum(least - place @ rows.T, 0.0), way @ rows.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = room / slope
-        ahead = np.where(slope < 0, reach, FAR).min(axis=1, initial=FAR)
-        behind = np.where(slope > 0, reach, -FAR).max(axis=1, initial=-FAR)
-        nearest = np.einsum("ij,ij->i", way, centre - place)
-        place += _between(behind - nearest, ahead - nearest, random)[:, None] * way
-        place += nearest[:, None] * way
-    return place
+    steps = STEPS + STEPS_A_DIMENSION * len(centre)
+    # A step of all walks has one direction, and each walk a place of its own on that line.
+    ways = random.standard_normal((steps, len(centre))) @ root.T
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    slopes = ways @ rows.T
+    slopes[np.abs(slopes) < NONE] = NONE
+    away = np.tile(start - centre, (count, 1))
+    room = np.minimum(least - rows @ start, 0.0)
+    _walk(away, room, ways, slopes, random.random((count, steps)))
+    return np.asarray(centre + away)
 
 
-def _between(lower: Array, upper: Array, random: np.random.Generator) -> Array:
-    """Return standard normal numbers between ends (n,), drawn by their distribution function."""
-    flip = lower > 0  # the lower tail has the digits
-    low, high = np.where(flip, -upper, lower), np.where(flip, -lower, upper)
-    share = random.random(len(low))
-    below, above = log_ndtr(low), log_ndtr(high)
-    # log((1 - share) P(low) + share P(high))
-    mixed = above + np.log(share + (1 - share) * np.exp(np.minimum(below - above, 0.0)))
-    drawn = np.clip(ndtri_exp(mixed), low, high)
-    return np.where(flip, -drawn, drawn)
+@compiled(fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _walk(away, begin, ways, slopes, share):  # type: ignore[no-untyped-def]
+    """Walk from `away` (count, n), in place, along ways (steps, n) of unit length.
+
+    begin : (m,) least less rows @ place, at most zero. slopes : (steps, m) rows @ way. share :
+    (count, steps) between 0 and 1, of the probability on each line.
+    """
+    steps, n = ways.shape
+    inverse, room = 1.0 / slopes, np.empty(len(begin))
+    for d in range(len(away)):
+        room[:] = begin
+        for s in range(steps):
+            ahead, behind = FAR, -FAR
+            for i in range(len(room)):
+                reach = room[i] * inverse[s, i]
+                ahead = min(ahead, reach if inverse[s, i] < 0.0 else FAR)
+                behind = max(behind, reach if inverse[s, i] > 0.0 else -FAR)
+            nearest = 0.0
+            for j in range(n):
+                nearest -= ways[s, j] * away[d, j]
+            move = nearest + _between(behind - nearest, ahead - nearest, share[d, s])
+            for j in range(n):
+                away[d, j] += move * ways[s, j]
+            for i in range(len(room)):
+                room[i] = min(room[i] - move * slopes[s, i], 0.0)
+
+
+@compiled()
+def _between(low: float, high: float, share: float) -> float:
+    """Return a standard normal number between two ends, at a share of the probability."""
+    flip = low > 0.0  # the lower tail has the digits
+    if flip:
+        low, high = -high, -low
+    if high < TAIL:
+        # There the density is that of an exponential distribution.
+        found = high - math.log(share + (1.0 - share) * math.exp((high - low) * high)) / high
+    else:
+        chance = (1.0 - share) * _below(low) + share * _below(high)
+        found = _quantile(chance) if chance < 0.5 else -_quantile(max(1.0 - chance, LEAST_CHANCE))
+    found = min(max(found, low), high)
+    return -found if flip else found
+
+
+@compiled()
+def _below(x: float) -> float:
+    return 0.5 * math.erfc(-x * math.sqrt(0.5))
+
+
+@compiled()
+def _quantile(chance: float) -> float:
+    """Return x with the probability `chance`, at most a half, below it.
+
+    Newton's method on its logarithm, which is concave, from a bound below the root.
+    """
+    x, wanted = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0)), math.log(chance)
+    for _ in range(NEWTON):
+        below = _below(x)
+        step = (wanted - math.log(below)) * below * ROOT_TWO_PI * math.exp(0.5 * x * x)
+        x += step
+        if abs(step) < 1e-9:
+            break
+    return x
 
 
 def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:

@@ -199,6 +199,11 @@ class WeightedProblem(FitProblem):
 
     factors: Array = field(default_factory=lambda: np.empty(0))
 
+    @property
+    def scale(self) -> Array:
+        """Return (m,) units of the data per unit of the multiplied residual."""
+        return super().scale / np.where(self.factors > 0, self.factors, 1.0)
+
     @classmethod
     def of(cls, problem: FitProblem, factors: Array) -> WeightedProblem:
         """Return the fit to a problem's data, weighted anew, with the problem's warm start."""

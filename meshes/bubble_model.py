@@ -172,6 +172,26 @@ class BubbleModel:
         return np.unique(np.concatenate(dofs)).astype(np.intp)
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredShape(BubbleModel):
+    """A bubble at measured displacements, which is nowhere in equilibrium: a solver tells how far.
+
+    moved : (pressures, nodes, 3) mm. fields : (3 nodes, k), virtual displacements, orthonormal,
+    zero at held unknowns.
+    """
+
+    moved: Array = None  # type: ignore[assignment]
+    fields: Array = None  # type: ignore[assignment]
+
+    @classmethod
+    def of(cls, model: BubbleModel, moved: Array, fields: Array) -> Self:
+        """Return the shape of a model; its pressures are the steps of the law."""
+        return cls(
+            model.mesh, model.thickness, model.pressures, (), model.supports, model.modes,
+            model.slack, moved[:, model.mesh.node_sets["rim"]], moved, fields,
+        )  # fmt: skip
+
+
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
     """Return the pressures with small first steps, which help Newton from a flat sheet."""
     first = pressures[0]

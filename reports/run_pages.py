@@ -9,6 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial import ConvexHull
+
 from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
@@ -17,7 +20,9 @@ from ..files import __version__, json_text, replacing, write_notes, write_text
 from ..runs.fit import Check
 from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Record, Store
 from ..runs.predictions import Predictions
+from ..runs.result import answers
 from ..runs.starts import HISTORY, STARTS, RunningFiles
+from .bubbles import disk_charts
 from .content import (
     PAGE_DATA,
     Exhibit,
@@ -31,6 +36,7 @@ from .content import (
 )
 from .fit_page import about_of, citation, record_tables
 from .html import percent, write_report
+from .vega import save
 
 RUNS_TABLE = "runs.csv"
 
@@ -139,6 +145,7 @@ def write_check(check: Check, folder: Path) -> Path:
         for name, exhibit in exhibits
         for label, value in exhibit.facts
     ]
+    shown = _estimate(check, folder, several)
     report = Report(
         title=f"{check.setup.project.title}: a look at the data", summary=_check_summary(check),
         about=about_of(check.setup.project, None),
@@ -157,6 +164,7 @@ def write_check(check: Check, folder: Path) -> Path:
                 "What was seen",
                 [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
             ),
+            Section("An estimate by virtual work", shown),
         ],
         files=[
             ("check.json", "the doubts in plain values"), *(f for _, e in exhibits for f in e.files)
@@ -164,6 +172,47 @@ def write_check(check: Check, folder: Path) -> Path:
         versions={"bubblefit": __version__},
     )  # fmt: skip
     return write_report(folder, report)
+
+
+ESTIMATED = (
+    "No equilibrium is solved for: the measured shapes are put into its equations. Chi is the "
+    "distance of shape and equilibrium over that by the noise. A start and a doubt, not a result."
+)
+OFF = (
+    "{}: displacement from the measured shape at the highest pressure to equilibrium with the "
+    "estimated law, to first order; where it is large equilibrium is not satisfied"
+)
+
+
+def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
+    """Write maps of the distance from equilibrium; return the page of the estimate."""
+    found = check.estimate
+    if found is None:
+        return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
+    rows: list[list[object]] = [
+        [one.modulus, 100 * one.strain, one.value, *(one.band or ("", ""))]
+        for one in answers(found)
+    ]
+    header = ["modulus", "strain, %", "MPa", "95 % from", "to"]
+    gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in found.gaps]
+    figures = []
+    for gap in found.gaps:
+        if gap.places is None or gap.field is None:
+            continue
+        edge = ConvexHull(gap.places).vertices
+        edge = gap.places[np.append(edge, edge[0])]
+        fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.field.T, strict=True)
+        out = Output.of(folder, gap.name, several)
+        save(
+            out.path("equilibrium.png"),
+            disk_charts([(t, gap.places, v) for t, v in fields], edge),
+        )
+        figures.append((out.name("equilibrium.png"), OFF.format(gap.name)))
+    tables = [
+        Table("Estimated moduli", header, rows, ESTIMATED),
+        Table("Distance from equilibrium", ["test", "chi", ""], gaps, text=(2,)),
+    ]
+    return Exhibit(figures=figures, tables=tables).all_parts()
 
 
 def _check_summary(check: Check) -> str:

@@ -33,6 +33,7 @@ from ..project.objects import Definition, Law, plain
 from ..project.project import Project, settings_of
 from ..solvers.base import Solver
 from .best import BestFit, best_fit, with_certainty
+from .estimate import Estimate, estimate_of
 from .executor import Task, executor_of
 from .folder import (
     NAMES,
@@ -429,10 +430,15 @@ NOTHING = "nothing doubtful"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Check:
-    """A look at the data of tests, with their doubts."""
+    """A look at the data of tests, with their doubts.
+
+    estimate : by virtual work; None where there is none, and `not_estimated` why.
+    """
 
     setup: FitSetup
     judgements: tuple[Judgement, ...]
+    estimate: Estimate | None = None
+    not_estimated: str = ""
 
     @property
     def sound(self) -> bool:
@@ -451,7 +457,8 @@ class Check:
             for j in self.judgements
         }  # fmt: skip
         return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests,
-                "choices": self.choices}  # fmt: skip
+                "choices": self.choices,
+                "estimate": None if self.estimate is None else self.estimate.result}  # fmt: skip
 
     @property
     def choices(self) -> dict[str, list[str]]:
@@ -508,10 +515,16 @@ def check(
     tell = listener(progress)
 
     def saw(words: str) -> None:
-        tell(next(done), 2 * len(chosen) + 1, words)
+        tell(next(done), 2 * len(chosen) + 2, words)
 
     setup = prepare_fit(project, chosen, saw)
     found = Check(setup, judge(setup, saw))
+    if found.sound:
+        saw("estimating moduli by virtual work")
+        try:
+            found = replace(found, estimate=estimate_of(setup))
+        except (InputError, SolverFailure) as error:
+            found = replace(found, not_estimated=str(error).splitlines()[0])
     saw("writing the page")
     with timed("tables and figures"):
         return finished(found, out)

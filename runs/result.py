@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -359,7 +359,23 @@ class Answer:
     end: bool = False
 
 
-def answers(fit: Fit) -> list[Answer]:
+class Answered(Protocol):
+    """A fit, or an estimate: its law, and how certain it is."""
+
+    @property
+    def project(self) -> Project: ...
+
+    @property
+    def law(self) -> HypoelasticLaw: ...
+
+    @property
+    def thickness(self) -> float: ...
+
+    @property
+    def best(self) -> BestFit: ...
+
+
+def answers(fit: Answered) -> list[Answer]:
     """Return E1, E2 and G12 at a few strains up to the end of the valid ones."""
     found = []
     for name, component in COMPONENTS.items():
@@ -369,7 +385,7 @@ def answers(fit: Fit) -> list[Answer]:
     return found
 
 
-def answer_at(fit: Fit, name: str, strain: float, end: bool = False) -> Answer:
+def answer_at(fit: Answered, name: str, strain: float, end: bool = False) -> Answer:
     """Return one modulus (E1, E2 or G12) at one strain."""
     value, sure = float(fit.law.modulus(name, strain)), fit.best.certainty
     per_width = value * fit.thickness

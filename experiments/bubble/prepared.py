@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...inference.comparison import Comparison, Nuisance
+from ...inference.virtual_work import GapObjective, smoothed
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
@@ -40,6 +41,8 @@ MOST_SHIFT, MOST_PRESSURE, LEAST_SHARE = 20.0, 50.0, -0.9
 PRESSURE = "pressure_offset"
 #: Quads of the full disk: with fewer it is no disk any more.
 LEAST_QUADS = 48
+#: Quads on which a smoothed shape is balanced, at most: measured fields know no more.
+SHAPED = 150
 #: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
 INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 
@@ -148,6 +151,30 @@ class PreparedBubble:
         """Return the same places on a finer mesh with finer increments, or on a coarser mesh."""
         (own,) = self.comparisons(make_solver, weighting)
         return (own if self.by_this_model and factor > 1 else self._refined(own, factor),)
+
+    def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
+        """Return the comparison of the measured shapes with equilibrium, on few quads.
+
+        A constant field is not taken out. InputError for displacements that count from a pressure,
+        at which the shape is not known; for too few points.
+        """
+        test, sheet = self.test, self.test.sheet
+        if sheet.since is not None:
+            raise test.place.error("sheet.from_pressure", "leaves the shapes of the sheet unknown")
+        (own,) = self.comparisons(make_solver, Weighting())
+        if self.known is None and len(own.model.mesh.quads) > SHAPED:
+            own = self._refined(own, (SHAPED / len(own.model.mesh.quads)) ** 0.5)
+        assert isinstance(own.objective, FieldObjective)
+        nodes = own.model.mesh.points[:, :2]
+        base = np.zeros((len(test.pressures), len(nodes), 3))
+        if self.sheet.rim:
+            base = np.array([rim.at(nodes) for rim in self.sheet.rim])
+        unit, shifted = test.outline.unit(nodes), test.displacement_offset
+        try:
+            shape, roots = smoothed(own.model, own.objective.targets, unit, base, shifted)
+        except InputError as error:
+            raise test.place.error(f"data.{error.field}", error.problem) from None
+        return (replace(own, model=shape, objective=GapObjective(shape, roots, own.objective)),)
 
     def _refined(self, own: Comparison, factor: float) -> Comparison:
         """Return a comparison of quads and increments divided by a factor, read as the fit reads.

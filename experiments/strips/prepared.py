@@ -212,6 +212,8 @@ OBJECTIVES = {
     "N": "sum of the strips' RMS errors, N",
     "relative": "sum of the strips' RMS errors over their largest load",
 }
+#: Increments of an estimate, and edges of the usual quads over its quads' edges.
+FEW, COARSER = 20, 0.25
 #: Strips along the yarns lead in: they are homogeneous and hardly ever fail; a bias strip can at
 #: its first increment.
 STRAIGHT, BIAS = 0, 1
@@ -324,6 +326,11 @@ class PreparedStrips:
             replace(comparison, model=models[direction])
             for comparison, direction in zip(own, self.test.matched, strict=True)
         )
+
+    def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
+        """Return comparisons with few quads and increments: a strip is nearly homogeneous."""
+        few = replace(self.test, increments=min(self.test.increments, FEW))
+        return replace(self, test=few).finer(make_solver, Weighting(), COARSER)
 
     def _objective(
         self, model: UniaxialModel, direction: str, relative: bool, share: float, masks: Masks

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
-from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel
+from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, MeasuredShape
 from ...meshes.disk import rim_form, rim_share
 from ..base import BandEnd, History
 from .factorisation import tangent_for
@@ -138,6 +138,34 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
         unstable=named(1e3 * levels[unstable], "kPa"),
     )  # fmt: skip
     return history, rates[keep]
+
+
+def balance(membrane: Membrane, model: MeasuredShape, asked: Asked) -> tuple[History, Array]:
+    """Return the motion from a measured shape to equilibrium, to first order, and its derivatives.
+
+    It is a sum of the shape's fields in which their virtual work vanishes: Newton's step, of a
+    frame at a time. SolverFailure : no valid stress, or no stiffness, in a frame.
+    """
+    of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
+    by_sheet = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
+    derivatives = Derivatives(membrane, asked.parameters, model.stress_free, by_sheet)
+    still = np.zeros((membrane.reference.size, len(asked.parameters)))
+    record, inner = Record(membrane, len(model.moved)), model.fields[membrane.free]
+    steps = np.zeros((*model.moved.shape, 1 + len(asked.parameters)))
+    for i, (u, pressure) in enumerate(zip(model.moved, model.pressures, strict=True)):
+        if not np.isfinite(membrane.unbalance(u, pressure, with_tangent=True)):
+            raise SolverFailure(f"no valid stress in the shape at {pressure * 1e3:.4g} kPa")
+        slopes = derivatives.at_fixed_displacement(u, pressure)
+        work = model.fields.T @ np.column_stack([membrane.residual, slopes])
+        try:
+            step = np.linalg.solve(inner.T @ membrane.tangent.times(inner), -work)
+        except np.linalg.LinAlgError:
+            raise SolverFailure(f"no stiffness at {pressure * 1e3:.4g} kPa") from None
+        steps[i] = (model.fields @ step).reshape(steps[i].shape)
+        derivatives.advance(still)
+        record.accept(i, u)
+    load = np.array(model.pressures)
+    return History(load, steps[..., 0], record.low, record.high), steps[..., 1:]
 
 
 class Inflation(Loading):

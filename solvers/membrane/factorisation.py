@@ -4,6 +4,7 @@ Small problems: LAPACK's banded LU on the reverse Cuthill-McKee order, which is 
 (benchmarks/bench_cost.py growth); large ones: SuperLU. Both unsymmetric, as the tangent is.
 """
 
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -70,6 +71,9 @@ class Tangent(Protocol):
     def solve(self, rhs: Array) -> Array:
         """Solve for free degrees of freedom, rhs (free,) or (free, k)."""
 
+    def times(self, columns: Array) -> Array:
+        """Return `data` times columns (free, k)."""
+
 
 def tangent_for(
     quads: NDArray[np.intp], size: int, free: NDArray[np.intp], points: Array | None = None
@@ -130,6 +134,19 @@ class BandedTangent:
         x, _ = lapack.dgbtrs(self.lu, self.width, self.width, ordered, self.pivots, overwrite_b=1)
         return np.asarray(x[self.rank])
 
+    def times(self, columns: Array) -> Array:
+        place, rows, starts = self._pattern
+        matrix = sp.csc_matrix((self.data[place], rows, starts), (self.size, self.size))
+        return np.asarray((matrix @ columns[self.order])[self.rank])
+
+    @cached_property
+    def _pattern(self) -> tuple[Numbers, Numbers, Numbers]:
+        """Return the places of all entries in `data`, their rows, and where columns start."""
+        place = np.unique(self.slot[self.slot >= 0])
+        column, row = np.divmod(place, self.depth)
+        starts = np.searchsorted(column, np.arange(self.size + 1))
+        return place, row - 2 * self.width + column, starts
+
 
 class SparseTangent:
     """SuperLU with a symmetric-pattern ordering."""
@@ -173,6 +190,10 @@ class SparseTangent:
     def solve(self, rhs: Array) -> Array:
         return np.asarray(self.lu.solve(rhs))
 
+    def times(self, columns: Array) -> Array:
+        self.matrix.data[:] = self.data
+        return np.asarray(self.matrix @ columns)
+
 
 class BorderedTangent:
     """A sparse tangent plus c v v' (a gas: dp/du = -c dV/du), by Sherman and Morrison's formula."""
@@ -195,3 +216,7 @@ class BorderedTangent:
         share = self.stiffness / (1.0 + self.stiffness * float(self.border @ self.answer))
         across = np.tensordot(self.border, x, axes=1)
         return np.asarray(x - share * np.multiply.outer(self.answer, across))
+
+    def times(self, columns: Array) -> Array:
+        added = self.stiffness * np.outer(self.border, self.border @ columns)
+        return np.asarray(self.inner.times(columns) + added)

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import bar
-from ...meshes.bubble_model import BubbleModel
+from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.strip_models import PatchModel, UniaxialModel
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
@@ -35,6 +35,7 @@ class Analysis(NamedTuple):
 #: By class of a model; the wall is None where none was given.
 ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
+    MeasuredShape: Analysis(bubble.prepare, bubble.balance),
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
     InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
     CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),

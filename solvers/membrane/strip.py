@@ -64,6 +64,9 @@ class DrivenTangent:
     def solve(self, rhs: Array) -> Array:
         return self.inner.solve(rhs)
 
+    def times(self, columns: Array) -> Array:
+        return self.inner.times(columns)
+
     def edge(self) -> sp.csr_matrix:
         """Return (size, size): the driven rows and columns of the tangent as last assembled."""
         return sp.csr_matrix((self._tail, self._at), shape=self._shape)

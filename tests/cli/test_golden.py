@@ -19,6 +19,7 @@ COMMANDS = {
         "bootstrap", "project.toml", "--over", "specimens", "--samples", 3, "--jobs", 1, *TWO
     ),
     "plan": ("plan", "project.toml", "--rank", "E1", *TWO),
+    "estimate": ("estimate", "project.toml", "--test", "two"),
     "validate": ("validate", "project.toml", *TWO),
     "simulate-test": ("simulate", "test", "project.toml", *CARD, "--test", "two"),
     "export": ("export", "out/material.toml", "--format", "constants"),

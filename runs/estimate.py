@@ -1,0 +1,196 @@
+"""Estimate moduli by virtual work on the measured shapes, and start fits there."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
+from ..experiments.kinds import FittableTest, PreparedTest, Weighting, strains_of
+from ..files import __version__, one_blas_thread
+from ..inference.assessment import certainty
+from ..inference.comparison import Comparison
+from ..inference.descent import bounded_step, descend
+from ..inference.noise import misfits
+from ..inference.problem import Evaluation, FitProblem, WeightedProblem
+from ..materials.law import HypoelasticLaw
+from ..meshes.bubble_model import MeasuredShape
+from ..project.project import Project
+from .best import LEAST_STRAIN, BestFit
+from .result import answers
+from .setup import FitSetup, prepare_fit
+
+Array = NDArray[np.float64]
+METHOD = "virtual work"
+#: Kinds of notes that are made here.
+NOT_ESTIMATED = NoteKind("not estimated")
+GAP = NoteKind("not in equilibrium", weight=11)
+
+#: Analyses, tolerance, and relative decrease of the squares that is not worth an analysis.
+MOST, TOLERANCE, NEGLIGIBLE = 40, 1e-9, 1e-4
+#: Chi beyond which shape and law are at odds, by more than noise.
+LARGE = 2.0
+UNBALANCED = (
+    "no law within the bounds keeps the measured shape in equilibrium (chi {:.3g}): rim, reference "
+    "surface or noise are not as the project says (its unknowns are taken as zero here), or the "
+    "form of the law is wrong"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """The distance of one comparison from equilibrium with the estimated law.
+
+    chi : it over the noise, one where nothing but noise is left. rms : in `unit`s, of rows that err
+    independently. places (n, 2) mm and field (n, 3) mm, the displacement from the measured shape to
+    equilibrium in the last frame, to first order; None where no shape was measured.
+    """
+
+    name: str
+    chi: float
+    rms: float
+    unit: str
+    places: Array | None = None
+    field: Array | None = None
+
+    @property
+    def words(self) -> str:
+        if self.field is None:
+            return f"{self.rms:.3g} {self.unit} RMS are left, chi {self.chi:.3g}"
+        most = float(np.linalg.norm(self.field, axis=1).max())
+        return f"the measured shape is up to {most:.2g} mm off equilibrium, chi {self.chi:.3g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Moduli by virtual work, as `Fit` has those of a fit; unknowns beside the moduli are as said.
+
+    seconds : of processor time, without reading the data.
+    """
+
+    setup: FitSetup
+    problem: FitProblem
+    best: BestFit
+    gaps: tuple[Gap, ...]
+    seconds: float
+    notes: tuple[Note, ...]
+
+    @property
+    def project(self) -> Project:
+        return self.setup.project
+
+    @property
+    def law(self) -> HypoelasticLaw:
+        """Return the estimated law, within the bounds of the fit."""
+        return self.best.law
+
+    @property
+    def thickness(self) -> float:
+        """Return the thickness before the test, mm."""
+        return self.project.fabric.thickness
+
+    @property
+    def result(self) -> dict[str, Any]:
+        """Return everything in plain values."""
+        moduli: dict[str, list[dict[str, Any]]] = {}
+        for one in answers(self):
+            entry = {"strain": one.strain, "MPa": one.value, "sigma": one.sigma, "band": one.band}
+            moduli.setdefault(one.modulus, []).append(entry)
+        return {
+            "command": "estimate", "version": __version__, "method": METHOD, "moduli": moduli,
+            "chi": {gap.name: gap.chi for gap in self.gaps}, "cpu_s": self.seconds,
+            "notes": rows(self.notes),
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """Return chi of every comparison in words."""
+        return [f"{gap.name}: {gap.words}" for gap in self.gaps]
+
+
+@checked
+def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Estimate:
+    """Estimate the moduli of a project by virtual work: no equilibrium of a bubble is solved for.
+
+    tests : names or a kind, by default all that can be fitted. InputError : in the project or its
+    data, or no test that can be estimated from. SolverFailure : no law within the bounds fits.
+    """
+    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    return estimate_of(prepare_fit(project, chosen))
+
+
+def estimate_of(setup: FitSetup) -> Estimate:
+    """Return the estimate of prepared tests; raises as `estimate`."""
+    begun = time.process_time()
+    comparisons: list[Comparison] = []
+    notes: list[Note] = []
+    with one_blas_thread():
+        for test in setup.tests:
+            try:
+                comparisons += _comparisons(setup, test)
+            except InputError as error:
+                notes.append(Note(NOT_ESTIMATED, f"{error.field} {error.problem}", test.test.name))
+        if not comparisons:
+            raise InputError(setup.project.path, "tests", f"no estimate: {notes[0]}")
+        alone = [replace(one, nuisance=()) for one in comparisons]
+        problem, point = _fitted(setup, alone, {})
+        if len(alone) > 1:  # what each leaves is its noise, so that none outvotes the others
+            left = misfits(problem, point.residual).items()
+            problem, point = _fitted(setup, alone, {k: max(m.rms, m.noise) for k, m in left})
+        law = problem.unknowns.law(problem.law, point.unknowns)
+        strains = [strains_of(history) for history in point.histories]
+        reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
+        best = BestFit(point, point, law, (), (), reached)
+        sure = certainty(problem, point, law, best.valid)
+    gaps = tuple(_gaps(problem, best))
+    for gap in gaps:
+        if gap.chi > LARGE and gap.field is not None:
+            notes.append(Note(GAP, UNBALANCED.format(gap.chi), gap.name))
+    seconds = time.process_time() - begun
+    return Estimate(setup, problem, replace(best, certainty=sure), gaps, seconds, tuple(notes))
+
+
+def _comparisons(setup: FitSetup, test: PreparedTest) -> Sequence[Comparison]:
+    """Return a test's comparisons for an estimate, else those of a fit."""
+    own = getattr(test, "virtual_work", None)
+    if own is None:
+        return test.comparisons(setup.make_leading, Weighting())
+    return cast(Sequence[Comparison], own(setup.make_leading))
+
+
+def _fitted(
+    setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
+) -> tuple[FitProblem, Evaluation]:
+    """Return the fit weighed by noise and its best, from the middle of the bounds; SolverFailure.
+
+    levels : noise by name of a comparison, instead of its data's least.
+    """
+    own, factors = setup.problem_of(comparisons), []
+    for one in own.comparisons:
+        objective = one.objective
+        level = getattr(objective, "alike", 1.0) * levels.get(one.name, objective.least_noise)
+        factors.append(objective.scale * np.repeat(objective.sizes, objective.sizes) ** 0.5 / level)
+    problem = WeightedProblem.of(own, np.concatenate(factors))
+    # Nearest to moduli in the middle of their bounds that keep all bounds.
+    y = np.ones(problem.unknowns.count)
+    step = bounded_step(np.eye(len(y)), np.zeros(len(y)), *problem.unknowns.inequalities, y)
+    first = problem.evaluate(y if step is None else y + step, True)
+    if first is None:
+        raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
+    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, negligible=NEGLIGIBLE)
+    return problem, best
+
+
+def _gaps(problem: FitProblem, best: BestFit) -> Iterator[Gap]:
+    free = 1.0 - problem.unknowns.count / len(best.point.residual)
+    every = misfits(problem, best.point.residual)
+    for comparison, history in zip(problem.comparisons, best.point.histories, strict=True):
+        m, model = every[comparison.name], comparison.model
+        gap = Gap(comparison.name, m.ratio / max(free, 0.1) ** 0.5, m.rms, m.unit)
+        if isinstance(model, MeasuredShape):
+            gap = replace(gap, places=model.mesh.points[:, :2], field=history.displacement[-1])
+        yield gap

@@ -1,0 +1,187 @@
+"""Estimates by virtual work: first-order equilibrium, moduli and bands under noise, real tests."""
+
+import json
+from dataclasses import replace
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.inference.virtual_work import disk_fields
+from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, MeasuredShape
+from bubblefit.meshes.disk import disk_mesh, disk_modes
+from bubblefit.runs.estimate import GAP, estimate_of
+from bubblefit.runs.fit import check
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.solvers.membrane import factorisation
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..commands import in_process
+from ..places import EXAMPLES, KNOWN
+from ..projects import edited, project_file
+
+LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
+PRESSURES = (0.05, 0.1)
+
+
+@pytest.fixture(scope="module")
+def model():
+    mesh = disk_mesh(100.0, 60, "quarter")
+    modes = disk_modes(mesh.points[:, :2], 100.0, 1)
+    return BubbleModel(mesh, 0.8, PRESSURES, modes=modes)
+
+
+def shape_of(model, moved, fields=None):
+    if fields is None:  # everything that is not held
+        fields = np.delete(np.eye(model.mesh.points.size), model.fixed, axis=1)
+    return MeasuredShape.of(model, moved, fields)
+
+
+@pytest.mark.parametrize("band", [factorisation.LARGEST_BAND, 0])
+def test_the_step_to_equilibrium_is_that_of_newton(model, band, monkeypatch):
+    monkeypatch.setattr(factorisation, "LARGEST_BAND", band)
+    here, slope = MembraneSolver(1e-12).run_with_sensitivity(model, LAW)
+    solver, shape = MembraneSolver(), shape_of(model, here.displacement)
+    history, by = solver.run_with_sensitivity(shape, LAW)
+    assert np.abs(history.displacement).max() < 1e-7
+    # At the equilibrium of the first frame the derivatives are those of the solution; later ones
+    # have in the solution what the law remembers, which is nothing where moduli are constant.
+    np.testing.assert_allclose(by[0], slope[0], atol=1e-6 * np.abs(slope[0]).max())
+    np.testing.assert_allclose(by[1], slope[1], atol=2e-3 * np.abs(slope[1]).max())
+    softer = replace(LAW, beta=LAW.beta * 0.999)
+    moved = MembraneSolver(1e-12).run(model, softer).displacement - here.displacement
+    step = solver.run(shape, softer).displacement
+    np.testing.assert_allclose(step, moved, atol=3e-3 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize("name, by", [
+    ("beta_3", 1e-3), ("beta_11", 0.1), ("nu12", 1e-4), ("pressure_offset", 1e-6), ("z0_1", 1e-3)
+])  # fmt: skip
+def test_derivatives_of_the_step_follow_differences_at_equilibrium(model, name, by):
+    solver = MembraneSolver(1e-12)
+    shape = shape_of(model, solver.run(model, LAW).displacement)
+    _, slope = solver.run_with_sensitivity(shape, LAW, [name])
+    ends = []
+    for step in (by, -by):
+        law, place = LAW, shape
+        if name.startswith("beta"):
+            law = replace(LAW, beta=LAW.beta + step * np.eye(12)[int(name[5:])])
+        elif name == "nu12":
+            law = replace(LAW, nu12=LAW.nu12 + step)
+        else:
+            place = shape.with_parameters({name: step})
+        ends.append(solver.run(place, law).displacement)
+    difference = (ends[0] - ends[1]) / (2 * by)
+    np.testing.assert_allclose(slope[..., 0], difference, atol=1e-4 * np.abs(difference).max())
+
+
+def test_fields_vanish_on_the_rim_and_are_symmetric():
+    turn = np.linspace(0, 2 * np.pi, 7)
+    rim = np.column_stack([np.cos(turn), np.sin(turn)])
+    assert all(np.abs(shape).max() < 1e-12 for shape in disk_fields(rim))
+    inside = 0.7 * rim + 0.01
+    for axis in (0, 1):
+        mirror = inside * np.where(np.arange(2) == axis, -1.0, 1.0)
+        for k, (own, other) in enumerate(
+            zip(disk_fields(inside), disk_fields(mirror), strict=True)
+        ):
+            np.testing.assert_allclose(own * (-1.0 if k == axis else 1.0), other, atol=1e-12)
+    assert [shape.shape[1] for shape in disk_fields(inside)] == [10, 10, 10]
+
+
+@pytest.fixture(scope="module")
+def known():
+    project = bf.read_project(KNOWN)
+    return prepare_fit(project, project.chosen(None, fitted=True))
+
+
+def noisy(setup, sigma, seed):
+    """The known solution with white noise that the test says."""
+    random, (prepared,) = np.random.default_rng(seed), setup.tests
+    fields = tuple(
+        replace(f, displacement=f.displacement + sigma * random.standard_normal((len(f.points), 3)))
+        for f in prepared.fields
+    )
+    test = replace(prepared.test, noise=sigma)
+    return replace(setup, tests=(replace(prepared, fields=fields, test=test),))
+
+
+def errors(found, truth):
+    """Relative errors along the strains reached, by modulus, and whether bands have the truth."""
+    off, inside = {}, {}
+    for name, component in COMPONENTS.items():
+        strain = np.linspace(0.0, found.best.valid[component], 31)
+        true, own = truth.modulus(name, strain), found.law.modulus(name, strain)
+        low, high = found.best.certainty.ends(name, strain, own)
+        off[name] = np.abs(own / true - 1.0)
+        inside[name] = np.mean((low <= true) & (true <= high))
+    return off, inside
+
+
+def test_the_known_solution_without_noise(known):
+    found = estimate_of(known)
+    off, _ = errors(found, known.tests[0].known)
+    assert off["E1"].max() < 1e-3 and off["E2"].max() < 2e-3 and np.median(off["G12"]) < 0.01
+    assert found.problem.analyses < 20 and found.gaps[0].chi < 0.2
+
+
+def test_noise_and_bands(known):
+    every = [noisy(known, 0.03, seed) for seed in range(12)]
+    found = [estimate_of(setup) for setup in every]
+    offs, insides = zip(*(errors(f, known.tests[0].known) for f in found), strict=True)
+    for name, most in (("E1", 0.006), ("E2", 0.012), ("G12", 0.15)):
+        assert np.median([np.median(off[name]) for off in offs]) < most
+        assert np.mean([inside[name] for inside in insides]) > 0.8
+    assert 0.9 < np.mean([f.gaps[0].chi for f in found]) < 1.1
+
+
+def test_a_wrong_pressure_is_seen_in_chi_and_in_a_note(known):
+    setup = noisy(known, 0.03, 1)
+    (prepared,) = setup.tests
+    pressures = tuple(p + 0.004 for p in prepared.test.pressures)
+    test = replace(prepared.test, pressures=pressures, increments=pressures)
+    fields = tuple(replace(f, pressure=p) for f, p in zip(prepared.fields, pressures, strict=True))
+    wrong = estimate_of(replace(setup, tests=(replace(prepared, test=test, fields=fields),)))
+    assert wrong.gaps[0].chi > 2 and GAP in [note.kind for note in wrong.notes]
+    assert not estimate_of(setup).notes
+
+
+def test_biaxial_paths_and_strips_are_estimated_from(strips_project):
+    path = EXAMPLES / "biaxial-computed" / "project.toml"
+    found = bf.estimate(bf.read_project(path))
+    off, _ = errors(found, bf.fit(bf.read_project(path), starts=1, jobs=1).law)
+    assert np.median(off["E1"]) < 0.05 and np.median(off["E2"]) < 0.02
+    fitted = bf.fit(strips_project, starts=1, jobs=1).law
+    law = bf.estimate(strips_project).law
+    for name in ("E1", "E2"):
+        assert law.modulus(name, 0.01) == pytest.approx(fitted.modulus(name, 0.01), rel=0.1)
+
+
+def test_the_command_and_the_page_of_check(tmp_path):
+    path = project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 240"))
+    result = json.loads(in_process("estimate", str(path), "--json", cwd=tmp_path).stdout)
+    assert {"E1", "E2", "G12"} == set(result["moduli"]) and result["chi"]["bubble"] < 1
+    assert "chi" in in_process("estimate", str(path), cwd=tmp_path).stdout
+    found = check(bf.read_project(path))
+    page = found.report(tmp_path / "out").read_text()
+    assert "An estimate by virtual work" in page and (tmp_path / "out/equilibrium.png").exists()
+    assert found.result["estimate"]["chi"] == pytest.approx(result["chi"])
+
+
+def test_no_shape_is_known_under_a_first_pressure(tmp_path):
+    project = edited(
+        tmp_path, "[bubble.nuisance]", "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
+    )
+    with pytest.raises(InputError, match="from_pressure"):
+        bf.estimate(project)
+
+
+def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
+    text = (EXAMPLES / "bubble-valmex7318" / "test1-linear.toml").read_text()
+    path = project_file(tmp_path, text)
+    found = bf.estimate(bf.read_project(path, shared_data / "bubble"))
+    (gap,) = found.gaps
+    assert 10 < gap.chi < 500 and 0.3 < np.linalg.norm(gap.field, axis=1).max() < 10
+    assert found.problem.analyses < 40 and GAP in [note.kind for note in found.notes]
