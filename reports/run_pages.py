@@ -17,6 +17,7 @@ from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
 from ..files import __version__, json_text, replacing, write_notes, write_text
+from ..inference.posterior import LEVEL
 from ..runs.fit import Check
 from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Record, Store
 from ..runs.predictions import Predictions
@@ -193,7 +194,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
         [one.modulus, 100 * one.strain, one.value, *(one.band or ("", ""))]
         for one in answers(found)
     ]
-    header = ["modulus", "strain, %", "MPa", "95 % from", "to"]
+    header = ["modulus", "strain, %", "MPa", f"{percent(LEVEL)} from", "to"]
     gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in found.gaps]
     figures = []
     for gap in found.gaps:
