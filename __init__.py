@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from .experiments.strips.cycles import cycles
     from .materials.card import MaterialCard, read_card
     from .materials.forms.spline import Form
-    from .project.objects import Bubble, Law, Registration, Sheet, Strips
+    from .project.measured import read, register
+    from .project.objects import Biaxial, Bubble, Cylinder, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
     from .runs.compare import compare
@@ -46,15 +47,18 @@ if TYPE_CHECKING:
     from .runs.verification import verify
     from .runs.weights import weights
 
-__all__ = ["Bubble", "Fabric", "Fit", "Form", "Law", "MaterialCard", "OwnTest", "Project",
-           "Registration", "Sheet", "Strips", "bootstrap", "check", "compare", "cycles",
-           "estimate", "fit", "plan", "predict", "profile", "read_card", "read_project",
-           "refine", "simulate", "validate", "verify", "weights"]  # fmt: skip
+__all__ = ["Biaxial", "Bubble", "Cylinder", "Fabric", "Fit", "Form", "Law", "MaterialCard",
+           "OwnTest", "Project", "Registration", "Sheet", "Strips", "bootstrap", "check",
+           "compare", "cycles", "estimate", "fit", "plan", "predict", "profile", "read",
+           "read_card", "read_project", "refine", "register", "simulate", "validate", "verify",
+           "weights"]  # fmt: skip
 
 #: Where the public names are: imported when they are asked for, so that `import bubblefit` is
 #: quick.
 _PLACES = {
+    "Biaxial": "project.objects",
     "Bubble": "project.objects",
+    "Cylinder": "project.objects",
     "Fabric": "experiments.kinds",
     "Fit": "runs.result",
     "Form": "materials.forms.spline",
@@ -74,9 +78,11 @@ _PLACES = {
     "plan": "runs.plan",
     "predict": "runs.predictions",
     "profile": "runs.profile",
+    "read": "project.measured",
     "read_card": "materials.card",
     "read_project": "project.project",
     "refine": "runs.refinement",
+    "register": "project.measured",
     "simulate": "runs.simulation",
     "validate": "runs.validation",
     "verify": "runs.verification",

@@ -224,8 +224,8 @@ class Definition:
 
 def definition_of(kind: str, section: Mapping[str, Any]) -> Definition:
     """Return the definition of a section in mm, N and MPa, of its kind's own class."""
-    ours = {own.of_kind: own for own in (Bubble, Strips)}
-    own = ours.get(kind)
+    ours: Sequence[type[Definition]] = (Bubble, Strips, Biaxial, Cylinder)
+    own = next((one for one in ours if one.of_kind == kind), None)
     return Definition(kind, section) if own is None else own.of(**section)
 
 
@@ -285,7 +285,7 @@ class Bubble(Definition):
         """
         if pressures is not None:
             keys["pressures"] = _pressures(pressures, None)
-        return cls._made(_sorted("bubble", {**keys, "files": _paths(files)}))
+        return cls._made(_sorted("bubble", {**keys, "files": file_names(files)}))
 
 
 class Strips(Definition):
@@ -325,29 +325,96 @@ class Strips(Definition):
         **keys: Any,
     ) -> Self:
         """Return the test of files of load curves, or of files by direction; keys : as above."""
-        if isinstance(files, Mapping):
-            listed: Any = {d: _paths(own) for d, own in files.items()}
-            here: Iterable[str] = listed
-        else:
-            listed, here = _paths(files), [d for d in DIRECTIONS if d in keys]
-            if not here and isinstance(gauge, (int, float)):
-                names = ("columns", "load_unit", "length_unit", "comment", "decimal", "format",
-                         "width", "sheet")  # fmt: skip
-                how = {name: keys[name] for name in names if name in keys}
-                known = dict.fromkeys(DIRECTIONS, gauge)
-                every = [read_load_curves(one, gauge_length=known, **how) for one in listed]
-                here = {curve.direction for own in every for curve in own}
+        listed, here = _listed(files), set(files if isinstance(files, Mapping) else keys)
+        here &= {*DIRECTIONS}
+        if isinstance(listed, list) and not here and isinstance(gauge, (int, float)):
+            names = ("columns", "load_unit", "length_unit", "comment", "decimal", "format", "width",
+                     "sheet")  # fmt: skip
+            how = {name: keys[name] for name in names if name in keys}
+            known = dict.fromkeys(DIRECTIONS, gauge)
+            every = [read_load_curves(one, gauge_length=known, **how) for one in listed]
+            here = {curve.direction for own in every for curve in own}
         return cls._made(_sorted("strips", {**keys, **_gauges(gauge, keys, here), "files": listed}))
+
+
+class Biaxial(Definition):
+    """A cruciform loaded along warp and fill in several ratios."""
+
+    of_kind = "biaxial"
+    columns = ("warp_load", "fill_load", "warp_strain", "fill_strain")
+
+    def __init__(
+        self, paths: Mapping[str, Any] | Table, *, name: str = "biaxial", **keys: Any
+    ) -> None:
+        """Make the test from loads and strains.
+
+        paths : by ratio ("1:1") an array (n, 4) or a DataFrame: loads along warp and fill in N/mm,
+        strains along warp and fill as shares; or one DataFrame of all, perhaps with a column ratio.
+        keys : of [[biaxial]] and of [biaxial.data]. InputError names the argument.
+        """
+        tables = {"": paths} if hasattr(paths, "columns") else paths
+        if not isinstance(tables, Mapping):
+            problem = f"expected arrays by ratio, or a table, got {type(paths).__name__}"
+            raise InputError(None, "paths", problem)
+        names = ("warp load (N/mm)", "fill load (N/mm)", "warp strain (mm/mm)",
+                 "fill strain (mm/mm)")  # fmt: skip
+        files, listed = {}, {}
+        for k, (ratio, table) in enumerate(tables.items(), start=1):
+            at = f"paths[{ratio!r}]" if ratio else "paths"
+            columns = dict(zip(names, _values(at, table, self.columns).tolist(), strict=True))
+            if hasattr(table, "columns") and "ratio" in table.columns:
+                columns["ratio"] = table["ratio"].tolist()
+            files[f"path-{k}.csv"] = Held(at, columns)
+            listed[ratio] = [f"path-{k}.csv"]
+        said = {"name": name, "files": listed.get("", listed)}
+        super().__init__("biaxial", _sorted("biaxial", {**keys, **said}), files)
+
+    @classmethod
+    def read(cls, files: Files | Mapping[str, Files], **keys: Any) -> Self:
+        """Return the test of files, or of files by ratio; keys : as of `Biaxial`."""
+        return cls._made(_sorted("biaxial", {**keys, "files": _listed(files)}))
+
+
+class Cylinder(Definition):
+    """An inflated cylinder in three-point bending, to be predicted."""
+
+    of_kind = "cylinder"
+
+    def __init__(
+        self,
+        diameter: float,
+        pressure: float,
+        *,
+        curves: Sequence[Any] = (),
+        name: str = "cylinder",
+        **keys: Any,
+    ) -> None:
+        """Make the test; diameter in mm, pressure in MPa.
+
+        curves : one a measured repetition, (deflection mm, load N), (n, 2) or a DataFrame. keys :
+        of [[cylinder]] and of [cylinder.measured]. InputError names the argument.
+        """
+        check_pressure("pressure", float(numbers("pressure", pressure)))
+        files = {}
+        for k, curve in enumerate(curves):
+            found = _values(f"curves[{k}]", curve, ("deflection", "load")).tolist()
+            columns = dict(zip(("deflection (mm)", "load (N)"), found, strict=True))
+            files[f"curve-{k + 1}.csv"] = Held(f"curves[{k}]", columns)
+        said = {"diameter": diameter, "pressure": pressure, "name": name}
+        data = {"files": list(files)} if files else {}
+        super().__init__("cylinder", _sorted("cylinder", {**keys, **said, **data}), files)
+
+    @classmethod
+    def read(cls, files: Files, **keys: Any) -> Self:
+        """Return the test with measured repetitions in files; keys : as of `Cylinder`."""
+        check_pressure("pressure", float(numbers("pressure", keys.get("pressure", 0))))
+        return cls._made(_sorted("cylinder", {**keys, "files": _listed(files)}))
 
 
 def _frames_of(table: Table, pressures: Numbers) -> tuple[list[Array], list[Array], Numbers]:
     """Return places, displacements and pressures of a DataFrame, frame by frame."""
-    missing = [q for q in QUANTITIES if q not in table.columns and q != "z"]
-    by = next((name for name in ("frame", "pressure") if name in table.columns), None)
-    if missing or by is None:
-        lacks = ", ".join(missing) or "frame or pressure"
-        there = ", ".join(map(str, table.columns))
-        raise InputError(None, "points", f"expected a column {lacks}; the table has: {there}")
+    by = "pressure" if "frame" not in table.columns else "frame"
+    _check_columns("points", table, [by, *(q for q in QUANTITIES if q != "z")])
     groups = [own for _, own in table.groupby(by, sort=by == "pressure")]
     if pressures is None and "pressure" in table.columns:
         pressures = [own["pressure"].iloc[0] for own in groups]
@@ -421,14 +488,9 @@ def check_pressure(argument: str, largest: float) -> None:
 def _curve_rows(curves: Any, groups: Sequence[str], *names: str) -> list[tuple[Any, ...]]:
     """Return rows (group, specimen, a value of each name) of curves by group, or of a table."""
     if hasattr(curves, "columns"):
-        first = "direction"
-        missing = [n for n in (first, *names) if n not in curves.columns]
-        if missing:
-            there = ", ".join(map(str, curves.columns))
-            problem = f"expected a column {missing[0]}; the table has: {there}"
-            raise InputError(None, "curves", problem)
-        which = "specimen" if "specimen" in curves.columns else first
-        return [tuple(row) for row in curves[[first, which, *names]].to_numpy().tolist()]
+        _check_columns("curves", curves, ("direction", *names))
+        which = "specimen" if "specimen" in curves.columns else "direction"
+        return [tuple(row) for row in curves[["direction", which, *names]].to_numpy().tolist()]
     if not isinstance(curves, Mapping):
         problem = f"expected curves by {', '.join(groups)}, or a table, got {type(curves).__name__}"
         raise InputError(None, "curves", problem)
@@ -437,18 +499,28 @@ def _curve_rows(curves: Any, groups: Sequence[str], *names: str) -> list[tuple[A
     for group, given in curves.items():
         for k, curve in enumerate(_specimens(given, len(names))):
             at = f"curves.{group}[{k}]"
-            if hasattr(curve, "columns"):
-                if lost := [n for n in names if n not in curve.columns]:
-                    raise InputError(None, at, f"expected a column {lost[0]}")
-                curve = curve[list(names)].to_numpy()
-            found = numbers(at, curve)
-            # An array has a row a reading; a pair of arrays is elongation and load.
-            found = found.T if isinstance(curve, np.ndarray) else found
-            if found.ndim != 2 or len(found) != len(names) or not np.isfinite(found).all():
-                expected = f"finite numbers ({', '.join(names)}), each (n,)"
-                raise InputError(None, at, f"expected {expected}, got shape {found.shape}")
-            rows += [(group, f"{group} {k + 1}", *values) for values in found.T.tolist()]
+            found = _values(at, curve, names).T.tolist()
+            rows += [(group, f"{group} {k + 1}", *values) for values in found]
     return rows
+
+
+def _values(at: str, table: Table, names: Sequence[str]) -> Array:
+    """Return (names, n) finite numbers of an array (n, names), a DataFrame, or arrays in a row."""
+    if hasattr(table, "columns"):
+        _check_columns(at, table, names)
+        table = table[list(names)].to_numpy()
+    found = numbers(at, table)
+    found = found.T if isinstance(table, np.ndarray) else found
+    if found.ndim != 2 or len(found) != len(names) or not np.isfinite(found).all():
+        expected = f"finite numbers ({', '.join(names)}), each (n,)"
+        raise InputError(None, at, f"expected {expected}, got shape {found.shape}")
+    return found
+
+
+def _check_columns(at: str, table: Table, names: Iterable[str]) -> None:
+    if lost := [name for name in names if name not in table.columns]:
+        there = ", ".join(map(str, table.columns))
+        raise InputError(None, at, f"expected a column {lost[0]}; the table has: {there}")
 
 
 def _specimens(given: Any, width: int) -> list[Any]:
@@ -479,7 +551,14 @@ def _gauges(
     return {d: {"gauge_length": own, **(keys.get(d) or {})} for d, own in lengths.items()}
 
 
-def _paths(files: Files) -> list[str]:
+def _listed(files: Files | Mapping[str, Files]) -> Any:
+    """Return full paths of files, by name where they are given by name."""
+    if isinstance(files, Mapping):
+        return {name: file_names(own) for name, own in files.items()}
+    return file_names(files)
+
+
+def file_names(files: Files) -> list[str]:
     """Return full paths of files or patterns; InputError where there is none."""
     given = [files] if isinstance(files, (str, Path)) else list(files)
     full = [os.path.abspath(os.path.expanduser(one)) for one in given]

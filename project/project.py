@@ -124,17 +124,24 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     settings: Settings = {
         **written.common,
         "law": plain(project.law.model_dump()),
-        "fit": plain(project.fit.model_dump()),
+        "fit": _fit_in_full(project, project.fit.model_dump()),
     }
-    for key in ("cache", "earlier"):
-        if isinstance(folder := settings["fit"].get(key), str):
-            settings["fit"][key] = os.path.abspath(beside(project.path.parent, folder))
     if options := _solver_options(project, project.fit.solver):
         settings["solver"] = {project.fit.solver: options}
     for name in tests:
         if name in written.tests:  # the others were made from Python, beside the file
             settings.setdefault(written.kinds[name], []).append(written.tests[name])
     return settings
+
+
+def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
+    """Return [fit] with the folders that it names in full."""
+    folders = {
+        key: os.path.abspath(beside(project.path.parent, said))
+        for key in ("cache", "earlier")
+        if isinstance(said := fit.get(key), str)
+    }
+    return {**plain(fit), **folders}
 
 
 def settings_of_predictions(
@@ -275,7 +282,8 @@ class Project:
     @property
     def objects(self) -> dict[str, Any]:
         """Return the arguments with which `Project.of` makes the same project."""
-        law, fit = (plain(own.model_dump(exclude_unset=True)) for own in (self.law, self.fit))
+        law = plain(self.law.model_dump(exclude_unset=True))
+        fit = _fit_in_full(self, self.fit.model_dump(exclude_unset=True))
         cards = [] if self.written is None else _cards(self)
         given = Law.of(in_base_units(LawSection, law, self.scales))
         given.own_form = self.form

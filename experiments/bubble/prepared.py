@@ -310,7 +310,7 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
         surfaces = _surfaces(test, fields, computed=True)
         prepared = PreparedBubble(test, fields, surfaces, known, by_this_model=own)
     else:
-        fields, registration = _measured(test, test.data)
+        fields, registration = read_measured(test)
         surfaces = _surfaces(test, fields, computed=False)
         prepared = PreparedBubble(test, fields, surfaces, None, registration)
     try:
@@ -376,10 +376,12 @@ def _surfaces(
         raise test.place.error("match.degree", f"{error.field}: {error.problem}") from None
 
 
-def _measured(
-    test: BubbleTest, data: PointFiles
+def read_measured(
+    test: BubbleTest,
 ) -> tuple[tuple[DisplacementField, ...], Registration | None]:
-    """Read the fields, and register them where the section asks for it."""
+    """Read the fields of measured files, and register them where the section asks for it."""
+    data = test.data
+    assert isinstance(data, PointFiles)
     fields = measured_fields(test.place, data, test.pressures)
     if test.of_clamp:
         words = f"the radius of {test.radius:.4g} mm is that of the clamp, whose points stand still"

@@ -1,15 +1,22 @@
 """Tests, laws and sheets as objects: from arrays, to a fit, to a project file and back."""
 
 import runpy
+from dataclasses import fields, is_dataclass
+from itertools import islice
 
 import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
+import tomli_w
 from bubblefit.errors import InputError
+from bubblefit.project.objects import plain
+from bubblefit.project.schema import project_schema
+from bubblefit.readers.frames import QUANTITIES
+from bubblefit.readers.sections import in_base_units
 from bubblefit.runs.setup import prepare_fit
 
-from ..places import ROOT
+from ..places import EXAMPLES, ROOT
 from ..projects import constant_strips
 
 FABRIC = bf.Fabric("made", thickness=0.8)
@@ -24,13 +31,6 @@ def prepared(project):
     return prepare_fit(project, project.chosen(None, fitted=True))
 
 
-def objective(project):
-    """The objective in the middle of the first start's neighbourhood: every residual counts."""
-    problem = prepared(project).problem()
-    low, high = problem.unknowns.box
-    return problem.evaluate(0.6 * low + 0.4 * high).objective
-
-
 def project_of(*tests, form="constant", **more):
     return bf.Project.of(tests, bf.Law(form), fabric=FABRIC, **more)
 
@@ -38,14 +38,10 @@ def project_of(*tests, form="constant", **more):
 @pytest.fixture(scope="session")
 def camera(tmp_path_factory):
     """20 frames of a known law as a camera's software saves them: mm, and MPa."""
-    computed = bf.Bubble.of(
-        radius=100.0, pressures=PRESSURES, elements=48, symmetry="quarter",
-        data={"known_solution": {"beta": KNOWN_LAW}},
-    )  # fmt: skip
-    (test,) = prepared(project_of(computed)).tests
+    fields = fields_of(pressures=PRESSURES, elements=48, symmetry="quarter")
     path = tmp_path_factory.mktemp("camera") / "camera.npz"
-    points = np.column_stack([test.fields[0].points, np.zeros(len(test.fields[0].points))])
-    moved = np.array([field.displacement for field in test.fields])
+    points = np.column_stack([fields[0].points, np.zeros(len(fields[0].points))])
+    moved = np.array([field.displacement for field in fields])
     np.savez(path, points=points, displacements=moved, pressures=PRESSURES)
     return path
 
@@ -191,3 +187,288 @@ def test_strips_from_arrays_are_those_of_files(tmp_path):
         bf.Strips({"wrap": curves["warp"]})
     with pytest.raises(InputError, match="there is no file"):
         bf.Strips.read(tmp_path / "none.csv")
+
+
+def objective(project):
+    """The objective at the first point drawn that can be run: every residual counts."""
+    problem = prepared(project).problem()
+    for drawn in islice(problem.starts.candidates(problem.unknowns, 1, 0), 20):
+        point = problem.evaluate(problem.unknowns.at(drawn), False)
+        if point is not None:
+            return point.value
+    raise AssertionError("no point can be run")
+
+
+def round_trip(project, folder, **how):
+    """The project through objects, and these through a project file."""
+    made = bf.Project.of(**project.objects, **how)
+    path = made.to_toml(folder / "again.toml")
+    again = bf.read_project(path, **how)
+    assert again.to_toml(folder / "thrice.toml").read_text() == path.read_text()
+    return made, again
+
+
+ALONE = sorted(
+    str(file.relative_to(EXAMPLES))
+    for file in EXAMPLES.glob("*/*.toml")
+    if file.name != "pyproject.toml" and file.parent.name != "plug-in"
+)
+
+
+@pytest.mark.parametrize("example", ALONE)
+def test_examples_are_the_same_through_objects_and_toml(example, tmp_path, request):
+    data = None
+    if "--data FOLDER" in (EXAMPLES / example).read_text():
+        data = request.getfixturevalue("shared_data")
+        data = data / "uniaxial" if example.startswith("uniaxial") else {"bubble": data / "bubble"}
+    project = bf.read_project(EXAMPLES / example, data)
+    others = round_trip(project, tmp_path)
+    if not project.chosen(None)[0].kind == "cylinder":
+        assert [objective(other) for other in others] == [objective(project)] * 2
+    for other in others:
+        for name, test in project.tests.items():
+            assert other.tests[name].settings() == test.settings()
+        for name, card in project.cards.items():
+            same = other.cards[name].card
+            np.testing.assert_array_equal(same.law.beta, card.card.law.beta)
+            assert same.thickness == card.card.thickness
+
+
+SCHEMA = project_schema(with_plug_ins=False)
+UNITS = {"modulus": "GPa", "pressure": "kPa", "length": "m"}
+#: What each kind of test needs.
+LEAST = {
+    "bubble": {"radius": 0.1, "pressures": [20.0, 40.0], "data": {"points": {"files": ["a", "b"]}}},
+    "strips": {"warp": {"gauge_length": 0.02, "final_length": 0.023}, "data": {"files": ["c"]}},
+    "biaxial": {"data": {"files": ["d"]}},
+    "cylinder": {"diameter": 0.15, "pressure": 100.0},
+}
+
+
+def resolved(part):
+    return SCHEMA["$defs"][part["$ref"].rsplit("/", 1)[1]] if "$ref" in part else part
+
+
+def keys(part, at=()):
+    """Every key below a part of the schema, with one valid value of each sort that it has."""
+    part = resolved(part)
+    for choice in map(resolved, part.get("anyOf", [part])):
+        inner = resolved(choice.get("items", {})) if choice.get("type") == "array" else choice
+        if inner.get("properties"):
+            for key, own in inner["properties"].items():
+                yield from keys(own, (*at, key))
+        else:
+            yield at, value(choice)
+
+
+def value(part):
+    part = resolved(part)
+    if "anyOf" in part:
+        return value(part["anyOf"][0])
+    if "enum" in part or "const" in part:
+        return part.get("enum", [part.get("const")])[-1]
+    if part["type"] == "array":
+        return [value(part["items"])] * part.get("minItems", 1)
+    if part["type"] in ("number", "integer"):
+        low = max(part.get("minimum", part.get("exclusiveMinimum", 0)), -2)
+        high = part.get("maximum", part.get("exclusiveMaximum", 1e9))
+        chosen = min(low + 1, (low + high) / 2)
+        return int(chosen) if part["type"] == "integer" else chosen / 3
+    return {"boolean": True, "string": "text", "object": {}}[part["type"]]
+
+
+def nested(path, own):
+    return {path[0]: nested(path[1:], own)} if path else own
+
+
+def merged(one, other):
+    both = {k: merged(one[k], other[k]) for k in one.keys() & other.keys()
+            if isinstance(one[k], dict) and isinstance(other[k], dict)}  # fmt: skip
+    return {k: v for k, v in {**one, **other, **both}.items() if v is not None}
+
+
+def content(part):
+    """All that a test is, in plain values, but its place."""
+    if is_dataclass(part):
+        every = {f.name: getattr(part, f.name) for f in fields(part)}
+        return {k: content(v) for k, v in every.items() if k not in ("place", "section")}
+    if isinstance(part, (list, tuple)):
+        return [content(own) for own in part]
+    if isinstance(part, dict):
+        return {k: content(v) for k, v in part.items()}
+    return part.tolist() if isinstance(part, np.ndarray) else str(part) if part is None else part
+
+
+KNOWN = {"data": {"points": None, "known_solution": {"beta": [0.1] * 12}}}
+#: What stands beside a key, or in place of its value, so that the whole makes sense.
+COMPANIONS = {
+    "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
+    "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},
+    "bubble.pressures": {"data": {"points": {"files": ["a"]}}},
+    "bubble.increments": {"increments": [30.0]},
+    "bubble.sheet.prior": {"sheet": {"modes": 3}},
+    "bubble.sheet.misfit": {"sheet": {"modes": 3}},
+    "bubble.sheet.slack_prior": {"sheet": {"slack": True}},
+    "bubble.sheet.from_pressure": {"sheet": {"from_pressure": 20.0}},
+    "bubble.data.known_solution": KNOWN,
+    "bubble.data.known_solution.increments": {
+        "data": {"points": None, "known_solution": {"beta": [0.1] * 12, "increments": [30.0]}}
+    },
+    "bubble.data.points.pattern": {
+        "data": {"points": {"files": None, "pattern": "{index}", "indices": [1, 2]}}
+    },
+    "bubble.data.points.indices": {
+        "data": {"points": {"files": None, "pattern": "{index}", "indices": [1, 2]}}
+    },
+    "bubble.data.points.format": {"data": {"points": {"format": "csv"}}},
+    "bubble.data.points.filter": {"data": {"points": {"filter": {"facet": 0.002}}}},
+    "bubble.data.points.pressure.log": {"data": {"points": {"pressure": {"log": {"file": "log"}}}}},
+    "strips.warp": {"warp": {"gauge_length": 0.1, "final_length": 0.12}},
+    "strips.fill": {"fill": {"gauge_length": 0.1, "final_length": 0.12}},
+    "strips.bias": {"bias": {"gauge_length": 0.03, "final_length": 0.04}},
+    "strips.grip_distance": {"grip_distance": 0.1},
+    "strips.data.polynomials": {"data": {"files": None}},
+    "strips.data.format": {"data": {"format": None}},
+    "cylinder.diameter": {"diameter": 0.2},
+    "cylinder.length": {"length": 2.5},
+    "cylinder.element_size": {"element_size": 0.03},
+    "cylinder.seam_width": {"seam_width": 0.03},
+    "cylinder.collar": {"collar": {"inner_diameter": 0.24, "length": 0.15, "fillet": 0.01}},
+}
+
+
+def companion(path):
+    """What belongs to a key, else to the table that it is in."""
+    whole = next((".".join(path[:k]) for k in range(len(path), 0, -1)
+                  if ".".join(path[:k]) in COMPANIONS), "")  # fmt: skip
+    return COMPANIONS.get(whole, {})
+
+
+@pytest.mark.parametrize("kind", LEAST)
+def test_every_key_of_a_test_is_the_same_through_objects_and_toml(kind, tmp_path):
+    count = 0
+    for path, own in keys(SCHEMA["properties"][kind], (kind,)):
+        section = merged(merged(LEAST[kind], nested(path[1:], own)), companion(path))
+        file = tmp_path / "project.toml"
+        said = {"fabric": {"thickness": 8e-4}, "units": UNITS, kind: [section]}
+        file.write_text(tomli_w.dumps(said))
+        project = bf.read_project(file, need_data=False)
+        ours = content(list(project.tests.values()))
+        for other in round_trip(project, tmp_path, need_data=False):
+            assert content(list(other.tests.values())) == ours, path
+            (mine, theirs) = (list(one.definitions.values()) for one in (project, other))
+            assert mine[0].section == theirs[0].section, path
+        count += 1
+    assert count > 20
+
+
+#: Settings that go with each other, or name something that is there.
+VALUES = {
+    "law.form": "spline", "fit.method": "slsqp", "fit.constraints": "margin",
+    "fit.trust": ["radius"], "fit.solver": "calculix", "fit.unknowns.nu12.bounds": [0.1, 0.4],
+    "fit.unknowns.thickness.bounds": [6e-4, 9e-4], "card.beta": [0.1] * 12, "card.form": "cubic",
+    "fit.earlier": "/earlier", "fit.cache": "/runs",
+    "solver.marc.version": "2023.1",
+}  # fmt: skip
+
+
+def test_every_other_key_is_the_same_through_objects_and_toml(tmp_path):
+    count = 0
+    bend = bf.read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
+    bend.cards["bubble 1"].card.write(tmp_path / "a.toml")
+    for table in ("fabric", "law", "fit", "card", "solver"):
+        for path, own in keys(SCHEMA["properties"][table], (table,)):
+            said = {"fabric": {"thickness": 8e-4}, "units": UNITS, "cylinder": [LEAST["cylinder"]]}
+            if table == "card":
+                said["card"] = {"name": "a", "beta": [0.2] * 12}
+            if "margin" in path:
+                said["law"] = {"margin": {"E": 5e-3, "G12": 5e-4}}
+            else:
+                said = merged(said, nested(path, VALUES.get(".".join(path), own)))
+            if table == "card":
+                said["card"] = [{"file": "a.toml"} if path[-1] == "file" else said["card"]]
+            file = tmp_path / "project.toml"
+            file.write_text(tomli_w.dumps(said))
+            project = bf.read_project(file, need_data=False)
+            whole = plain_objects(project)
+            for other in round_trip(project, tmp_path, need_data=False):
+                assert plain_objects(other) == whole, path
+            count += 1
+    assert count > 80
+
+
+def plain_objects(project):
+    """All but the tests, in mm, N and MPa, with every default."""
+    law, fit = (
+        in_base_units(type(own), plain(own.model_dump()), project.scales)
+        for own in (project.law, project.fit)
+    )
+    options = {k: v for k, v in project.objects["solver_options"].items() if v}
+    return [law, fit, options, content(project.cards), content(project.fabric)]
+
+
+def test_biaxial_and_cylinder_from_arrays(tmp_path):
+    example = bf.read_project(EXAMPLES / "biaxial-computed" / "project.toml")
+    (own,) = example.tests.values()
+    table = bf.read(EXAMPLES / "biaxial-computed" / "test.csv")
+    assert list(table.columns) == [*bf.Biaxial.columns, "ratio"]
+    keys = {k: v for k, v in example.definitions["biaxial"].section.items() if k != "data"}
+    by_ratio = {r: rows.drop(columns="ratio").to_numpy() for r, rows in table.groupby("ratio")}
+    for given in (table, by_ratio):
+        project = project_of(bf.Biaxial(given, **keys), form="linear")
+        for mine, theirs in zip(project.tests["biaxial"].data.paths, own.data.paths, strict=True):
+            assert mine.ratio == theirs.ratio
+            np.testing.assert_allclose(mine.load, theirs.load, rtol=1e-14)
+            np.testing.assert_allclose(mine.strain, theirs.strain, rtol=1e-14)
+    with pytest.raises(InputError, match=r"^paths\['1:1'\]"):
+        bf.Biaxial({"1:1": by_ratio["1:1"][:, :3]})
+
+    way = np.linspace(0.0, 90.0, 10)
+    cylinder = bf.Cylinder(150.0, 0.09, curves=[(way, 2 * way), (way, 2.1 * way)], span=2000.0)
+    (test,) = project_of(cylinder).tests.values()
+    assert (test.diameter, test.pressure, test.supports.span) == (150.0, 0.09, 2000.0)
+    assert [curve.load[-1] for curve in test.measured] == [180.0, 189.0]
+    file = tmp_path / "bend.csv"
+    file.write_text("deflection (mm),load (N)\n0,0\n90,180\n")
+    read = project_of(bf.Cylinder.read(file, diameter=150.0, pressure=0.09)).tests["cylinder"]
+    assert read.measured[0].load.tolist() == [0.0, 180.0]
+    assert bf.read(file)["load"].tolist() == [0.0, 180.0]
+    with pytest.raises(InputError, match=r"^pressure: .*kPa"):
+        bf.Cylinder(150.0, 90.0)
+
+
+def fields_of(**keys):
+    """Fields of the known law, computed."""
+    data = {"known_solution": {"beta": KNOWN_LAW}}
+    return prepared(project_of(bf.Bubble.of(radius=100.0, data=data, **keys))).tests[0].fields
+
+
+def test_read_and_register_what_two_cameras_export(tmp_path):
+    fields = fields_of(pressures=[0.03, 0.06, 0.1], elements=800)
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    loads = [field.pressure for field in fields]
+    for k, field in enumerate(fields):
+        places = np.column_stack([field.points, np.zeros(len(field.points))])
+        seen = np.column_stack([places @ turn.T + [5.0, 2.0, 300.0], field.displacement @ turn.T])
+        one = pd.DataFrame(seen / 1000, columns=[f"{q} [m]" for q in QUANTITIES])
+        one.to_csv(tmp_path / f"vic_{k + 8}.csv", index=False)  # 8, 9, 10
+        seen = pd.DataFrame(seen).map(lambda x: f"{x:.6f}".replace(".", ","))
+        names = [f"{name} [mm]" for name in "XYZUVW"]
+        seen.to_csv(tmp_path / f"davis_{k}.txt", sep=";", header=names, index=False)
+    tables = bf.read(tmp_path / "vic_*.csv"), bf.read(tmp_path / "davis_*.txt")
+    for table in tables:
+        assert list(table.columns) == ["frame", *QUANTITIES] and table["frame"].max() == 2
+        np.testing.assert_allclose(table, tables[0], atol=1e-6)
+    found = bf.register(bf.Bubble.read(tmp_path / "vic_*.csv", loads, radius=100.0))
+    same = bf.register(tables[0], None, loads, radius=100.0)
+    assert str(found) == str(same) and found.numbers == same.numbers
+    centre, _, _ = found.registration.placement.origin
+    assert centre == pytest.approx(5.0, abs=0.1)
+    assert abs(found.registration.warp_angle) == pytest.approx(20.0, abs=1.0)
+    (test,) = prepared(project_of(found.bubble)).tests
+    for mine, theirs in zip(test.fields, fields, strict=True):
+        np.testing.assert_allclose(mine.points, theirs.points, atol=2.0)
+    assert bf.register(found.bubble).registration.warp_angle == pytest.approx(0.0, abs=1.0)
+    with pytest.raises(InputError, match=r"as strips: .* as biaxial: "):
+        bf.read(EXAMPLES / "batch" / "README.md")
