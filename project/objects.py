@@ -240,7 +240,7 @@ class Bubble(Definition):
         displacements: Numbers = None,
         pressures: Numbers = None,
         *,
-        radius: float | None = None,
+        radius: float | str | None = None,
         ellipse: Mapping[str, float] | None = None,
         sheet: Sheet | Mapping[str, Any] | None = None,
         registration: Registration | Mapping[str, Any] | None = None,
@@ -251,7 +251,8 @@ class Bubble(Definition):
 
         points : (m, 3), or (frames, m, 3), or an array a frame, mm, without load. displacements :
         (frames, m, 3), or an array a frame, mm. pressures : (frames,) MPa, rising. Or a DataFrame
-        with columns x y z dx dy dz and frame or pressure. radius : mm of the clamped edge. keys :
+        with columns x y z dx dy dz and frame or pressure. radius : mm of the clamped edge, or
+        "clamp" where its points are seen. keys :
         of [[bubble]] and of [bubble.data.points]. InputError names the argument.
         """
         if hasattr(points, "columns"):

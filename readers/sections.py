@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +48,10 @@ Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 StrainTriple = Annotated[list[Strain], Field(min_length=3, max_length=3)]
 
 
+#: What pydantic calls one of several sorts of values that a key may have.
+ONE_OF = re.compile(r"constrained-\w+$|literal\[")
+
+
 class Section(BaseModel):
     """A table of a project file: no unknown keys, no text for numbers, no NaN."""
 
@@ -77,7 +82,7 @@ def first_error(
     problem = _problem(errors[0], file)
     if len(errors) > 1:
         problem += f" ({len(errors) - 1} more)"
-    key = dotted(errors[0]["loc"])
+    key = dotted([p for p in errors[0]["loc"] if not ONE_OF.match(str(p))])
     return InputError(path, f"{at}.{key}" if at and key else at or key, problem)
 
 

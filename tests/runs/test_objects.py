@@ -305,6 +305,7 @@ COMPANIONS = {
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
     "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},
     "bubble.pressures": {"data": {"points": {"files": ["a"]}}},
+    "bubble.radius": {"radius": 0.2},
     "bubble.increments": {"increments": [30.0]},
     "bubble.sheet.prior": {"sheet": {"modes": 3}},
     "bubble.sheet.misfit": {"sheet": {"modes": 3}},
