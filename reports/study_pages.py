@@ -30,7 +30,7 @@ from ..runs.validation import Validation
 from ..solvers.base import History
 from .charts import Charts
 from .content import Listing, Picture, Report, Section, Table
-from .fit_page import citation, correlation_table
+from .fit_page import about_of, citation, correlation_table
 from .html import write_report
 from .moduli import bootstrap_charts
 from .studies import (
@@ -204,6 +204,7 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
     )  # fmt: skip
     page = Report(
         title=f"{found.setup.project.title}: bootstrap over {study.over}",
+        about=about_of(found.setup.project, None),
         summary=f"1 sigma over {len(study.samples)} samples: {sigma}.",
         facts=[
             ("card", found.card),
@@ -321,6 +322,7 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     responses = [shown for test in chosen for shown in _responses(study, test, folder or Path())]
     page = Report(
         title=f"{study.project.title}: forms of the moduli",
+        about=about_of(study.project, None),
         summary="; ".join(study.conclusion),
         facts=[("error", error), ("the data's own noise", total)],
         sections=[

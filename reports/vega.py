@@ -380,7 +380,7 @@ def _scale(name: str, domain: str, log: bool) -> Spec:
 
 def _axis(orient: str, scale: str, title: str, length: float, log: bool) -> Spec:
     axis: Spec = {"orient": orient, "scale": scale, "title": title, "labelOverlap": "greedy"}
-    axis |= {"tickCount": max(2, round(length / 55)), "format": "~g" if log else "~r"}
+    axis |= {"tickCount": max(2, round(length / 55)), "format": "~g" if log else ".12~g"}
     if log:
         shown = {"opacity": {"signal": f"{ROUND} ? 1 : 0"}}
         text = {"text": {"signal": f"{ROUND} ? datum.label : ''"}}

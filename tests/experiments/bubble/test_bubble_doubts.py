@@ -10,7 +10,11 @@ import pytest
 from bubblefit.experiments.bubble import doubts
 from bubblefit.experiments.bubble.doubts import Apex, View, apex_of, doubts_of
 from bubblefit.experiments.bubble.objective import mirrored
-from bubblefit.experiments.bubble.registration import RegistrationOptions, clamp_radius
+from bubblefit.experiments.bubble.registration import (
+    RegistrationOptions,
+    clamp_radius,
+    register_fields,
+)
 from bubblefit.experiments.kinds import Expected
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
@@ -440,6 +444,17 @@ def test_the_radius_of_the_clamp_needs_no_first_guess(good, off):
     assert radius == pytest.approx(100.0, rel=3e-3) and edge.still > 200
     seen = in_camera(TURN("x", 12.0), (30.0, 20.0, 500.0))(fields)
     assert clamp_radius(seen, RegistrationOptions())[0] == pytest.approx(radius, rel=1e-4)
+    # Points of the clamp just beyond the rim, on one side, do not draw its centre there.
+    near = np.hypot(*fields[0].points.T) > 100.0
+    kept = ~near | (fields[0].points[:, 1] < 0.0) | (np.hypot(*fields[0].points.T) > 102.0)
+    some = tuple(
+        replace(f, points=f.points[kept], z=f.z[kept], displacement=f.displacement[kept])
+        for f in fields
+    )
+    seen = in_camera(TURN("z", 0.0), (3.0, -4.0, 600.0))(some)
+    _, found = register_fields(seen, CIRCLE, RegistrationOptions())
+    assert np.abs(found.rim.error) < 0.05
+    assert found.placement.origin[:2] == pytest.approx((3.0, -4.0), abs=0.1)
     complaint_with(["radius", "stand still"], clamp_radius, good)
 
 
