@@ -97,6 +97,70 @@ class Gas:
         return ClosedGas((gauge + self.ambient) * volume, self.ambient)
 
 
+@dataclass(frozen=True, eq=False)
+class ForceTable:
+    """Force (N) of a cord by its engineering strain, both (n,) and rising; straight in between.
+
+    Beyond either end its outer slope goes on; without force below the first strain where a cord
+    carries tension only.
+    """
+
+    strain: Array
+    force: Array
+
+    def __post_init__(self) -> None:
+        for name in ("strain", "force"):
+            values = np.array(getattr(self, name), dtype=float)
+            if values.ndim != 1 or len(values) < 2 or not (np.diff(values) > 0).all():
+                raise InputError(None, name, "expected two or more numbers, each above the last")
+            object.__setattr__(self, name, values)
+        if len(self.strain) != len(self.force):
+            problem = f"expected as many as strains, {len(self.strain)}, got {len(self.force)}"
+            raise InputError(None, "force", problem)
+
+    def pull(self, strain: ArrayLike, tension_only: bool = True) -> tuple[Array, Array]:
+        """Return force (N) and its derivative by strain (N), as the shape of `strain`."""
+        e = np.asarray(strain, dtype=float)
+        i = np.clip(np.searchsorted(self.strain, e) - 1, 0, len(self.strain) - 2)
+        slope = np.diff(self.force)[i] / np.diff(self.strain)[i]
+        force = self.force[i] + slope * (e - self.strain[i])
+        if tension_only:
+            slack = force < 0
+            force, slope = np.where(slack, 0.0, force), np.where(slack, 0.0, slope)
+        return force, slope
+
+    def strain_at(self, force: float) -> float:
+        """Return the strain at a force, N."""
+        i = int(np.clip(np.searchsorted(self.force, force) - 1, 0, len(self.force) - 2))
+        share = (force - self.force[i]) / (self.force[i + 1] - self.force[i])
+        return float(self.strain[i] + share * (self.strain[i + 1] - self.strain[i]))
+
+
+@dataclass(frozen=True, eq=False)
+class Cord:
+    """A cord that is bonded along a cylinder, from end to end.
+
+    angle : degrees from the top. initial_force : N once the cylinder is inflated (it rises with the
+    pressure, and strain counts from there); None: the cord is stretched by the inflation, with
+    `prestrain` beside the strain of the wall.
+    """
+
+    angle: float
+    table: ForceTable
+    initial_force: float | None = None
+    prestrain: float = 0.0
+    tension_only: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.angle < 360:
+            raise InputError(None, "angle", f"expected 0 to below 360 degrees, got {self.angle:g}")
+        if self.initial_force is not None and not 0 <= self.initial_force < math.inf:
+            problem = f"expected 0 N or more, got {self.initial_force:g}"
+            raise InputError(None, "initial_force", problem)
+        if self.initial_force is not None and self.prestrain:
+            raise InputError(None, "prestrain", "give either this or initial_force")
+
+
 #: Unless given, in diameters of the cylinder: where loads are listed, and the deflection over which
 #: a slope is taken.
 PLACES, SLOPE_OVER = (0.25, 0.5, 1.0), 0.1
@@ -158,6 +222,7 @@ class CylinderModel:
     gas: Gas = field(default_factory=Gas)
     increments: Sequence[float] = ()
     reading: CurveReading = None  # type: ignore[assignment]
+    cords: Sequence[Cord] = ()
 
     def __post_init__(self) -> None:
         self._check_mesh()
@@ -302,7 +367,8 @@ class InflatedModel:
     mesh : quads counter-clockwise seen from outside. thickness : mm, one or (elements,). warp :
     (3,) or (elements, 3), projected on each facet. pressures : MPa: increments of inflation, and
     frames where nothing bends it. supports : degrees of freedom held at zero, by node set. copies :
-    of the mesh in the whole, of which forces and volume are reported.
+    of the mesh in the whole, of which forces and volume are reported. cords : bonded to quads of a
+    tube along z.
     """
 
     mesh: Mesh
@@ -312,6 +378,7 @@ class InflatedModel:
     supports: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     copies: int = 1
     bending: Bending | None = None
+    cords: Sequence[Cord] = ()
 
     def __post_init__(self) -> None:
         schedules = {"pressures": (self.pressures, "MPa")}
@@ -362,7 +429,7 @@ def inflated_cylinder(
     seam_width: float = SEAM_WIDTH, supports: RigidSupports | None = None,
     collar: Collar | None = None, deflections: Sequence[float] | None = None,
     symmetry: Literal["quarter", "full"] = "quarter", cap_warp: Literal["x", "y"] = "x",
-    gas: Gas | None = None, reading: CurveReading | None = None
+    gas: Gas | None = None, reading: CurveReading | None = None, cords: Sequence[Cord] = ()
 ) -> CylinderModel:  # fmt: skip
     """Return a cylinder that is inflated and bent; lengths in mm before inflation, pressure in MPa.
 
@@ -393,5 +460,5 @@ def inflated_cylinder(
     steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
     return CylinderModel(
         mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas(),
-        reading=reading or curve_reading(diameter)
+        reading=reading or curve_reading(diameter), cords=cords
     )  # fmt: skip

@@ -57,24 +57,32 @@ class BendReadings:
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: a curve a card, readings, and names of a band and of what curves may be off by."""
+    """One case: a curve a card, readings, and names of a band and of what curves may be off by.
+
+    along : the name of the deflection.
+    """
 
     title: str
     lines: Sequence[BendLine] = ()
     measured: BendReadings | None = None
     band: str = ""
     spread: str = ""
+    along: str = ALONG
 
 
 @dataclass(frozen=True)
 class BeamBodies:
-    """Rigid bodies when bent, mm; supports : (z, y) of the axes; collar_height : y of its axis."""
+    """Rigid bodies when bent, mm; supports : (z, y) of the axes; collar_height : y of its axis.
+
+    collars : z of each collar, or strap.
+    """
 
     supports: tuple[tuple[float, float], ...]
     support_radius: float
     collar_height: float
     collar_radius: float
     collar_length: float
+    collars: tuple[float, ...] = (0.0,)
 
 
 def bending_charts(
@@ -133,7 +141,7 @@ def _loads(panel: BendPanel) -> Chart:
     title = panel.title
     if len(known) == 1:
         title += f": RMS error {known[0][1]:.3g} N"
-    return Chart(title, ALONG, "load, N", series, alt, from_zero=True)
+    return Chart(title, panel.along, "load, N", series, alt, from_zero=True)
 
 
 def _misses(panel: BendPanel) -> Chart:
@@ -149,7 +157,7 @@ def _misses(panel: BendPanel) -> Chart:
     known = [f"{own.name} {own.rms:.3g} N" for own in panel.lines if own.rms is not None]
     title = f"RMS error: {', '.join(known)}" if known else ""
     alt = f"{panel.title}: model less mean of the readings"
-    return Chart(title, ALONG, "model − mean, N", series, alt, level=0.0)
+    return Chart(title, panel.along, "model − mean, N", series, alt, level=0.0)
 
 
 def gas_charts(panel: BendPanel) -> Charts:
@@ -165,7 +173,7 @@ def gas_charts(panel: BendPanel) -> Charts:
     across, up = "volume less that when inflated, litres", "gauge pressure, kPa"
     charts = [
         Chart(panel.title, across, up, by_volume, f"{panel.title}: pressure over volume"),
-        Chart("", ALONG, up, by_way, f"{panel.title}: pressure over deflection"),
+        Chart("", panel.along, up, by_way, f"{panel.title}: pressure over deflection"),
     ]
     return Charts("gas", charts, "")
 
@@ -196,6 +204,7 @@ def beam_charts(
     low = min(float(now[:, 1].min()), middle - ring, *feet)
     high = max(float(now[:, 1].max()), float(before[:, 1].max()), middle + ring)
     ends, reach = float(np.abs(now[:, 2]).max()), CLOSE * bodies.collar_length
+    at = bodies.collars[-1]
     tall, axes = bodies.collar_radius + 4 * WALL, ("z, mm", "y, mm")
     shades = shades_of(values)
     scale: dict[str, Any] = {"equal": True, "scale": "log strain along the axis", "shades": shades}
@@ -203,7 +212,7 @@ def beam_charts(
                   x_range=(-1.03 * ends, 1.03 * ends), y_range=(low - 20, high + 20),
                   **scale)  # fmt: skip
     close = Chart("at the collar", *axes, side, "the bent beam at the collar",
-                  x_range=(-reach, reach), y_range=(middle - tall, middle + tall),
+                  x_range=(at - reach, at + reach), y_range=(middle - tall, middle + tall),
                   **scale)  # fmt: skip
     return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=1)
 
@@ -219,16 +228,18 @@ def _supports(bodies: BeamBodies) -> list[Series]:
         line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
     ]
     half, r = 0.5 * bodies.collar_length, bodies.collar_radius
-    for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
-        x = [-half, half, half, -half, -half]
-        series.append(line("collar", x, [y, y, y + WALL, y + WALL, y], colour=0))
+    for z in bodies.collars:
+        for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
+            x = [z - half, z + half, z + half, z - half, z - half]
+            series.append(line("collar", x, [y, y, y + WALL, y + WALL, y], colour=0))
     return series
 
 
 def _cut(section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies) -> Chart:
     before, now = (np.asarray(ring, dtype=float) for ring in section)
+    circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * WALL)
     series = [
-        line("collar", *_circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * WALL)),
+        *([line("collar", *circle)] if 0.0 in bodies.collars else []),
         line("inflated", *before.T, colour=7, dashes=1),
         line("bent", *now.T, colour=3),
     ]

@@ -257,8 +257,10 @@ def predict(
     name = project.fit.solver
     options = project.options_of(name)
     solver = usable_solver(name, options, project.path, cache=project.run_cache)
-    pairs = _pairs(project, chosen, chosen_cards(project, cards), solver)
-    sources, settings = card_sources(project, cards), None
+    # A test that brings its own material needs no card.
+    alone = not cards and not project.cards and all(map(own_card, chosen))
+    pairs = _pairs(project, chosen, {} if alone else chosen_cards(project, cards), solver)
+    sources, settings = [] if alone else card_sources(project, cards), None
     if project.written is not None and sources is not None:
         settings = settings_of_predictions(project, [test.name for test in chosen], sources)
     named = [(test.name, test) for test in chosen]
@@ -281,6 +283,12 @@ def predict(
             failure = f"no run ended well: {runs[0].record.failure}"
             raise SolverFailure(failure, project.fit.solver)
     return Predictions(project, tuple(runs), time.perf_counter() - begun, record)
+
+
+def own_card(test: Test) -> MaterialCard | None:
+    """Return the card that a test brings itself, instead of those of the project; else None."""
+    own: MaterialCard | None = getattr(test, "own_card", None)
+    return own
 
 
 def predicted_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
@@ -323,7 +331,8 @@ def _pairs(
     pairs: list[PredictedRun] = []
     for test in tests:
         models: dict[float, Mapping[str, Any]] = {}
-        for name, card in cards.items():
+        own = own_card(test)
+        for name, card in cards.items() if own is None else [(own.name, own)]:
             try:
                 if card.thickness not in models:
                     models[card.thickness] = test.models(card.thickness)

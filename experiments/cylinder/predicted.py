@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ...errors import SolverFailure, marks
 from ...materials.card import BAND
-from ...meshes.cylinder_model import CylinderModel
+from ...meshes.beam_model import BeamModel
+from ...meshes.cylinder_model import CurveReading, CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
@@ -46,7 +47,7 @@ def run_of(record: RunRecord) -> BendingRun | None:
     return None if record.failure else BendingRun(**record.arrays)
 
 
-def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
+def arrays_of(model: CylinderModel | BeamModel, history: History) -> Mapping[str, Array]:
     """Return the arrays of a history that are stored, by the names of `BendingRun`.
 
     Raises SolverFailure: no gas; fewer frames than asked for without the solver's reason.
@@ -66,7 +67,7 @@ def arrays_of(model: CylinderModel, history: History) -> Mapping[str, Array]:
     return dict(zip((field.name for field in fields(BendingRun)), values, strict=True))
 
 
-def early_end(model: CylinderModel, history: History) -> str:
+def early_end(model: CylinderModel | BeamModel, history: History) -> str:
     """Return the solver's reason for an end before the last deflection, else ""."""
     return "" if len(history.load) > len(model.deflections) else history.early
 
@@ -86,6 +87,65 @@ ONSET = 0.01
 STRAIGHT = 0.5
 
 Point = tuple[float, float]  # deflection in mm and load in N
+
+
+#: Shares of the reference load between which stiffness is compared with measured curves: their
+#: first newtons are friction of rig and wall.
+SECANT = (0.1, 0.35)
+
+
+@dataclass(frozen=True)
+class Against:
+    """A run beside the mean of the measured repetitions: pairs (predicted, measured), or None.
+
+    stiffness : N/mm, between `SECANT` of the load at the `reference` deflection (mm), of each curve
+    its own. knee : N. loads : N by place.
+    """
+
+    reference: float
+    stiffness: tuple[float, float] | None
+    knee: tuple[float, float] | None
+    loads: Mapping[str, tuple[float, float] | None]
+
+    def ratios(self) -> Mapping[str, float | None]:
+        """Return predicted over measured by quantity: "stiffness", "knee", "load at PLACE"."""
+        pairs = {"stiffness": self.stiffness, "knee": self.knee}
+        pairs |= {f"load at {place}": pair for place, pair in self.loads.items()}
+        return {name: pair and pair[0] / pair[1] for name, pair in pairs.items()}
+
+
+def against_measured(
+    reading: CurveReading, d: Array, load: Array, measured: Sequence[BendingCurve]
+) -> Against | None:
+    """Return a curve beside what was measured; None without repetitions."""
+    if not measured:
+        return None
+    curves = [(d, load), *((c.deflection, c.load) for c in measured)]
+    reached = min(float(x[-1]) for x, _ in curves)
+    places = {n: p for n, p in reading.places.items() if p <= reached * (1 + 1e-9)}
+    reference = max(places.values(), default=reached)
+    rows = []
+    for x, y in curves:
+        stiffness = secant_stiffness(x, y, reference)
+        knee = knee_point(x, y, stiffness, reading.slope_over)
+        found = {"stiffness": stiffness, "knee": knee and knee[1]}
+        rows.append(found | {n: loads_at(x, y, {n: p})[n] for n, p in places.items()})
+    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys(reading.places)
+    for name in rows[0]:
+        own, *others = (row[name] for row in rows)
+        known = [value for value in others if value is not None]
+        whole = own is not None and len(known) == len(others)
+        pairs[name] = (float(own or 0.0), float(np.mean(known))) if whole else None
+    stiff, knees = pairs.pop("stiffness"), pairs.pop("knee")
+    return Against(reference, stiff, knees, pairs)
+
+
+def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
+    """Return the slope (N/mm) between `SECANT` of the load at a deflection (mm); None: no rise."""
+    top = float(np.interp(reference, d, load))
+    rising = np.maximum.accumulate(load)
+    low, high = (float(np.interp(share * top, rising, d)) for share in SECANT)
+    return (SECANT[1] - SECANT[0]) * top / (high - low) if top > 0 and high > low else None
 
 
 @dataclass(frozen=True)
@@ -108,6 +168,7 @@ class BendingMeasures:
     pressure_rise: float
     reached: float
     error: BendingError | None
+    against: Against | None = None
 
     @property
     def buckling(self) -> Point | None:
@@ -121,7 +182,7 @@ class BendingMeasures:
 
 
 def bending_measures(
-    model: CylinderModel, run: BendingRun, measured: Sequence[BendingCurve]
+    model: CylinderModel | BeamModel, run: BendingRun, measured: Sequence[BendingCurve]
 ) -> BendingMeasures:
     """Return the numbers of a run of a model, beside what was measured."""
     d, load, over = run.deflection, run.load, model.reading.slope_over
@@ -140,6 +201,7 @@ def bending_measures(
         pressure_rise=1e3 * float(run.pressure[-1] - run.pressure[0]),
         reached=float(d[-1]),
         error=model_error(measured, d, load),
+        against=against_measured(model.reading, d, load, measured),
     )
 
 
@@ -378,6 +440,7 @@ class CylinderOutcome:
             and dict(zip(("r_squared", "largest_deviation"), m.straightness, strict=True)),
             "pressure_rise_kPa": m.pressure_rise,
             "error": None if m.error is None else asdict(m.error),
+            **({} if m.against is None else {"against_measured": _against(m.against)}),
         }
 
     def columns(self, number: int) -> Mapping[str, object]:
@@ -401,6 +464,9 @@ class CylinderOutcome:
             "compared": error and error.compared,
             "reached_mm": m and m.reached,
         }
+        if m is not None and m.against is not None:
+            ratios = m.against.ratios().items()
+            row |= {f"{n.replace(' ', '_')}_over_measured": ratio for n, ratio in ratios}
         if number in self.spreads:
             sigma = zip(places, self.sigma(number).values(), strict=True)
             row |= {f"load_at_{p}_sigma_N": value for p, value in sigma}
@@ -467,6 +533,14 @@ class CylinderOutcome:
         return [*lines, *self.unsure]
 
 
+def _against(found: Against) -> dict[str, Any]:
+    pairs = {"stiffness_N_per_mm": found.stiffness, "knee_N": found.knee}
+    pairs |= {f"load_at_{n.replace(' ', '_')}_N": pair for n, pair in found.loads.items()}
+    names = ("predicted", "measured")
+    named = {n: pair and dict(zip(names, pair, strict=True)) for n, pair in pairs.items()}
+    return {"reference_mm": found.reference, **named}
+
+
 def _point(point: Point | None) -> dict[str, float | None]:
     return {"deflection_mm": point[0] if point else None, "load_N": point[1] if point else None}
 
@@ -478,12 +552,16 @@ class CylinderPredicted:
     early = staticmethod(early_end)
     outcome = CylinderOutcome
 
-    def depends_on(self, model: CylinderModel) -> Sequence[object]:
+    def depends_on(self, model: CylinderModel | BeamModel) -> Sequence[object]:
         """Return all of a model that its result depends on."""
         mesh = model.mesh
+        if isinstance(model, BeamModel):
+            beam = {f.name: getattr(model, f.name) for f in fields(model) if f.name != "mesh"}
+            return (sorted(beam), *beam.values())
         return (
             model.thickness, model.inflation, model.deflections, model.increments, model.collar,
             model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
+            *model.cords,
         )  # fmt: skip
 
     def measured(self, test: CylinderTest) -> bool:
@@ -491,18 +569,18 @@ class CylinderPredicted:
         return bool(test.measured)
 
 
-def deflection_curve(model: CylinderModel, history: History) -> tuple[Array, Array]:
+def deflection_curve(model: CylinderModel | BeamModel, history: History) -> tuple[Array, Array]:
     """Return deflection (mm) and load (N) from the inflated cylinder to where the run ended."""
     return np.array([0.0, *model.deflections])[: len(history.load)], history.load
 
 
-def loads(model: CylinderModel, history: History) -> dict[str, float]:
+def loads(model: CylinderModel | BeamModel, history: History) -> dict[str, float]:
     """Return the load (N) at the places where the curve is read, up to the end of the run."""
     read = loads_at(*deflection_curve(model, history), model.reading.places)
     return {f"load at {place}, N": load for place, load in read.items() if load is not None}
 
 
-def quantities(model: CylinderModel, history: History) -> dict[str, float]:
+def quantities(model: CylinderModel | BeamModel, history: History) -> dict[str, float]:
     """Return the quantities of a mesh study; knee and limit point where there are any."""
     mesh, over = model.mesh, model.reading.slope_over
     inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])

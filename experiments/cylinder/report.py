@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from ...errors import marks, percent
 from ...files import replacing
 from ...materials.card import BAND, LEVEL, MaterialCard
+from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
 from ...readers.bending import scatter
 from ...reports.charts import Charts
 from ...reports.content import Exhibit, Part, Table, Words
 from ...reports.cylinders import (
+    ALONG,
     BeamBodies,
     BendLine,
     BendPanel,
@@ -32,6 +34,7 @@ from ...reports.maps import write_vtu
 from ...reports.vega import save
 from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
 from .predicted import (
+    SECANT,
     BendingRun,
     CylinderOutcome,
     CylinderPredicted,
@@ -56,7 +59,7 @@ class Beam:
     bent: Array
 
 
-def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
+def whole_beam(model: CylinderModel | BeamModel, run: BendingRun) -> Beam:
     """Return the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
@@ -78,8 +81,23 @@ def whole_beam(model: CylinderModel, run: BendingRun) -> Beam:
     return Beam(Mesh(points, quads, sets, {}, warp), moves[0], moves[1])
 
 
-def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies:
+def _axis(position: Array) -> tuple[Array, Array]:
+    """Return z and y (mm) of the axis of a beam's surface, row by row."""
+    rows, row = np.unique(np.round(position[:, 2], 3), return_inverse=True)
+    return rows, np.bincount(row, position[:, 1]) / np.bincount(row)
+
+
+def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -> BeamBodies:
     """Return supports and collar, placed to touch the inflated beam."""
+    if isinstance(model, BeamModel):
+        z, size = model.supports.span, model.supports.diameter
+        strap = np.interp(0.5 * model.load_spacing, *_axis(beam.mesh.points + beam.bent))
+        spots = sorted({-0.5 * model.load_spacing, 0.5 * model.load_spacing})
+        low = -max(model.roller_below, model.section.radius + 0.5 * size)
+        return BeamBodies(
+            ((-0.5 * z, low), (0.5 * z, low)), 0.5 * size, float(strap), model.section.radius,
+            model.collar.length, tuple(spots),
+        )  # fmt: skip
     at = beam.mesh.points + beam.inflated
     radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
     beside = np.abs(np.abs(at[:, 2]) - half)
@@ -93,7 +111,7 @@ def bodies_of(model: CylinderModel, beam: Beam, deflection: float) -> BeamBodies
     )
 
 
-def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> None:
+def draw_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path, title: str) -> None:
     """Draw the last frame."""
     beam = whole_beam(model, run)
     rest, sets = beam.mesh.points, beam.mesh.node_sets
@@ -109,7 +127,7 @@ def draw_beam(model: CylinderModel, run: BendingRun, path: Path, title: str) -> 
     save(path, beam_charts(bent, beam.mesh.quads, strain, *lines, bodies, title))
 
 
-def write_beam(model: CylinderModel, run: BendingRun, path: Path) -> None:
+def write_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path) -> None:
     """Write the last frame for ParaView, with the inflated one as a further displacement."""
     beam = whole_beam(model, run)
     strains = {
@@ -233,7 +251,9 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
         measured = BendReadings(readings, s.deflection, *shown)
     names = [end.name for end in outcome.band]
     walls = f"from {' to '.join(names)}" if names else ""
-    return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card")
+    beam = any(isinstance(run.model, BeamModel) for run in outcome.runs if run.test is test)
+    along = "deflection of mid-span, mm" if beam else ALONG
+    return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card", along)
 
 
 #: mm, of what a project may leave to the usual values.
@@ -424,7 +444,26 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
     text = tuple(range(1, len(named)))
-    return [Table("Against measured loads", header, rows, note, text=text)]
+    beside: list[list[object]] = []
+    places = place_names(run.test for run in outcome.runs)
+    for i, m in outcome.measures.items():
+        if m.against is not None:
+            run = outcome.runs[i]
+            cells: list[object] = []
+            pairs = m.against.stiffness, m.against.knee, *map(m.against.loads.get, places)
+            for pair in pairs:
+                cells += (
+                    [None] * 2 if pair is None else [f"{pair[1]:.4g}", f"{pair[0] / pair[1]:.3f}"]
+                )
+            beside.append(_unbroken([run.test.name, run.card, *(walls and [run.wall]), *cells]))
+    over = ("stiffness, N/mm", "knee, N", *(f"load at {place}, N" for place in places))
+    columns = [*named, *(words for name in over for words in (name, "of it"))]
+    low, high = (f"{100 * share:g}" for share in SECANT)
+    how = "Measured (mean of the repetitions), and predicted over measured. Stiffness: between "
+    how += f"{low} and {high} % of each curve's load at the last place that all reach; knee: where "
+    how += "the slope is half of that."
+    quantities = [Table("Measured quantities", columns, beside, how, text=text)] if beside else []
+    return [*quantities, Table("Against measured loads", header, rows, note, text=text)]
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:

@@ -1,4 +1,8 @@
-"""A cylinder in bending: its section [[cylinder]] of a project, and its model."""
+"""A cylinder in bending: its section [[cylinder]] of a project, and its model.
+
+A membrane (`CylinderTest.model`), or a beam of a wall that the section gives per width: the keys of
+each are refused where the other is asked for.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +17,19 @@ from pydantic import BaseModel, Field
 
 from ...errors import InputError
 from ...files import is_file
+from ...materials.card import MaterialCard
+from ...materials.law import HypoelasticLaw
+from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
 from ...meshes.cylinder_model import (
     DEFLECTION,
     FRAMES,
     LENGTH,
     SEAM_WIDTH,
     Collar,
+    Cord,
     CurveReading,
     CylinderModel,
+    ForceTable,
     Gas,
     RigidSupports,
     curve_reading,
@@ -63,6 +72,41 @@ class GasSection(Section):
     density: Positive | None = None
 
 
+NoUnit = Annotated[float, Field(ge=0, le=1e18)]
+#: One number for all pressures, or one for each of `pressure`.
+ByPressure = Positive | Annotated[list[Positive], Field(min_length=1)]
+
+
+class CordSection(Section):
+    """A cord along the cylinder: force by strain, or stiffness EA (N); N and plain strains."""
+
+    angle: NoUnit
+    stiffness: Positive | None = None
+    strain: Annotated[list[Number], Field(min_length=2)] | None = None
+    force: Annotated[list[Number], Field(min_length=2)] | None = None
+    bonded: bool = True
+    tension_only: bool = True
+    initial_force: NoUnit | None = None
+    prestrain: Number = 0.0
+
+
+class WallSection(Section):
+    """The wall of a beam, N/mm of width by pressure: plain (axial ...) or braided (yarn ...)."""
+
+    pressure: Annotated[list[Pressure], Field(min_length=1)] | None = None
+    axial: ByPressure | None = None
+    hoop: ByPressure | None = None
+    shear: ByPressure | None = None
+    poisson: NoUnit | list[NoUnit] | None = None
+    wrinkles: bool = True
+    angle: ByPressure | None = None
+    yarn: ByPressure | None = None
+    yarn_shear: ByPressure | None = None
+    bladder: ByPressure | None = None
+    bladder_shear: ByPressure | None = None
+    across: NoUnit | list[NoUnit] | None = None
+
+
 class MeasuredSection(Section):
     """Measured loads: a file a repetition, or a column that tells repetitions apart."""
 
@@ -79,9 +123,17 @@ class MeasuredSection(Section):
 
 
 class CylinderSection(Section):
-    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar."""
+    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar or two loads."""
 
     name: Name | None = None
+    model: Literal["membrane", "beam"] = "membrane"
+    cord: list[CordSection] = Field(default_factory=list)
+    wall: WallSection | None = None
+    load_spacing: NotNegative | None = None
+    load_width: NotNegative | None = None
+    roller_below_axis: NotNegative | None = None
+    mass_per_length: NoUnit | None = None
+    friction: NoUnit | None = None
     diameter: Length
     pressure: Pressure
     length: Length | None = None
@@ -109,6 +161,15 @@ SIZE = 25.0
 USUAL = {"span": "span", "seam_width": "seam width", "length": "length", "collar": "collar",
          "support_diameter": "diameter of the supports"}  # fmt: skip
 KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
+#: Keys of a membrane alone, and of a beam alone.
+OF_MEMBRANE = ("length", "seam_width", "symmetry", "support_diameter", "collar", "cap_warp", "gas")
+OF_BEAM = ("wall", "load_spacing", "load_width", "roller_below_axis", "mass_per_length", "friction")
+#: Keys of both kinds of walls of a beam.
+PLAIN, BRAID = ("axial", "hoop", "shear"), (
+    "angle", "yarn", "yarn_shear", "bladder", "bladder_shear"
+)  # fmt: skip
+#: m/s^2 of self weight.
+GRAVITY = 9.80665
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -133,6 +194,8 @@ class CylinderTest:
     deflections: tuple[float, ...]
     gas: Gas
     reading: CurveReading
+    cords: tuple[Cord, ...] = ()
+    beam: BeamModel | None = None
     measured: tuple[BendingCurve, ...] = ()
     reads_files: bool = False
     assumed: tuple[str, ...] = ()
@@ -150,27 +213,41 @@ class CylinderTest:
             if c.path is not None
         )
 
-    def model(self, thickness: float | None = None) -> CylinderModel:
+    @property
+    def own_card(self) -> MaterialCard | None:
+        """Return the wall of a beam as a card of constant moduli, of the fabric's thickness."""
+        if self.beam is None:
+            return None
+        thick = self.place.fabric.thickness
+        axial, hoop, shear, nu = self.beam.section.wall.moduli
+        law = HypoelasticLaw.linear(axial / thick, hoop / thick, shear / thick, nu)
+        return MaterialCard(law, thick, "its wall")
+
+    def model(self, thickness: float | None = None) -> CylinderModel | BeamModel:
         """Return the model with a fabric of this thickness (mm), else of the project's."""
+        if self.beam is not None:
+            return self.beam
         thick = self.place.fabric.thickness if thickness is None else thickness
         return inflated_cylinder(
             self.diameter, self.pressure, thick, self.size, self.length, self.seam_width,
             self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp, self.gas,
-            self.reading,
+            self.reading, self.cords,
         )  # fmt: skip
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
-    ) -> Mapping[str, CylinderModel]:
+    ) -> Mapping[str, CylinderModel | BeamModel]:
         """Return the one model; edges, or every increment, divided by a factor."""
         if what == "elements":
+            if self.beam is not None:
+                return {PART: replace(self.beam, size=self.beam.size / factor)}
             return {PART: replace(self, size=self.size / factor).model(thickness)}
         if factor != int(factor):
             problem = "the cylinder's steps are divided, never joined: use --coarser 0"
             raise InputError(None, "increments", problem)
         model, parts = self.model(thickness), int(factor)
         finer: dict[str, Any] = {}
-        for name in ("inflation", "increments"):
+        for name in ("inflation", "increments") if self.beam is None else ("increments",):
             ends = pairwise((0.0, *getattr(model, name)))
             steps = [np.linspace(a, b, parts + 1)[1:] for a, b in ends]
             finer[name] = [float(value) for part in steps for value in part]
@@ -181,12 +258,19 @@ class CylinderTest:
         names = ("diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
                  "deflections")  # fmt: skip
         bodies = {name: asdict(getattr(self, name)) for name in ("supports", "collar", "gas")}
-        return {**{name: getattr(self, name) for name in names}, **bodies}
+        of_beam = {} if self.beam is None else {"beam": repr(self.beam)}
+        of_cords = {"cords": repr(self.cords)} if self.cords else {}
+        return {**{name: getattr(self, name) for name in names}, **bodies, **of_cords, **of_beam}
 
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     """Read the section of a test; refuse a cylinder that makes no model."""
     length, pressure = place.scales.length, place.scales.pressure
+    others = OF_BEAM if section.model == "membrane" else OF_MEMBRANE
+    for key in others:
+        if key in section.model_fields_set:
+            other = "beam" if section.model == "membrane" else "membrane"
+            raise place.error(key, f'is a key of model = "{other}"; take it out or change model')
 
     def own(value: float | None, default: float) -> float:
         return default if value is None else float(value * length)
@@ -202,6 +286,9 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     deflections, end = listed(section.deflections), own(section.deflection, DEFLECTION)
     if deflections is None:
         deflections = np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist()
+    cords = tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(section.cord))
+    if section.model == "beam":
+        return _beam(section, place, name, deflections, cords)
     try:
         collar = section.collar and Collar(
             **scaled(section.collar, length, "inner_diameter", "length", "fillet")
@@ -225,6 +312,7 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
             reading=curve_reading(
                 diameter, listed(section.places), section.slope_over and section.slope_over * length
             ),
+            cords=cords,
         )
         test.model()
     except InputError as error:
@@ -235,6 +323,97 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
         reads_files=bool(section.measured.files),
         assumed=tuple(words for key, words in USUAL.items() if getattr(section, key) is None),
     )
+
+
+def _cord(section: CordSection, place: Place, at: str) -> Cord:
+    """Return a cord of a section; InputError names its key."""
+    listed = section.strain, section.force
+    if (section.stiffness is None) == (None in listed) or (None in listed and any(listed)):
+        raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
+    if not section.bonded:
+        raise place.error(f"{at}.bonded", "a cord that slides is not modelled; take bonded = true")
+    try:
+        table = axial_table(section.stiffness or 1.0)
+        if section.strain and section.force:
+            table = ForceTable(np.array(section.strain), np.array(section.force))
+        return Cord(
+            section.angle, table, section.initial_force, section.prestrain, section.tension_only
+        )
+    except InputError as error:
+        raise place.error(f"{at}.{error.field}", error.problem) from None
+
+
+def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedWall:
+    """Return the wall at a pressure (in the project's unit), straight between those listed."""
+    known = section.pressure or [at]
+    if not (np.diff(known) > 0).all():
+        raise place.error("wall.pressure", f"expected each above the last, got {known}")
+    if not known[0] * (1 - 1e-9) <= at <= known[-1] * (1 + 1e-9):
+        ends = f"{known[0]:g} to {known[-1]:g}"
+        raise place.error("pressure", f"{at:g} lies outside wall.pressure, {ends}")
+
+    def value(key: str) -> float:
+        given = getattr(section, key)
+        if isinstance(given, list) and len(given) != len(known):
+            raise place.error(f"wall.{key}", f"expected {len(known)}, one a pressure, got {given}")
+        return float(np.interp(at, known, given)) if isinstance(given, list) else float(given)
+
+    own, other = (BRAID, PLAIN) if section.yarn is not None else (PLAIN, BRAID)
+    for keys, there in ((own, False), (other, True)):
+        if wrong := [key for key in keys if (getattr(section, key) is not None) == there]:
+            problem = f"expected {', '.join(PLAIN)}, or of a braid {', '.join(BRAID)}"
+            raise place.error(f"wall.{wrong[0]}", problem)
+    more = "across" if own is BRAID else "poisson"
+    values = {k: value(k) for k in (*own, more) if getattr(section, k) is not None}
+    try:
+        if own is BRAID:
+            return BraidedWall(**values)
+        return PlainWall(**values, wrinkles=section.wrinkles)
+    except InputError as error:
+        raise place.error(f"wall.{error.field}", error.problem) from None
+
+
+def _beam(
+    section: CylinderSection, place: Place, name: str, deflections: Sequence[float],
+    cords: tuple[Cord, ...],
+) -> CylinderTest:  # fmt: skip
+    """Read the section of a beam."""
+    length, usual = place.scales.length, RigidSupports()
+    if section.wall is None:
+        raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
+    wall = _wall(section.wall, section.pressure, place)
+    diameter = section.diameter * length
+    lengths: dict[str, Any] = {
+        key: (getattr(section, name) or 0.0) * length
+        for key, name in (
+            ("load_spacing", "load_spacing"), ("load_width", "load_width"),
+            ("roller_below", "roller_below_axis"),
+        )
+    }  # fmt: skip
+    places = None if section.places is None else [v * length for v in section.places]
+    over = section.slope_over and section.slope_over * length
+    try:
+        beam = BeamModel(
+            TubeSection(0.5 * diameter, section.pressure * place.scales.pressure, wall, cords),
+            (section.span or usual.span / length) * length, deflections,
+            weight=1e-3 * GRAVITY * (section.mass_per_length or 0.0),
+            friction=section.friction or 0.0, size=(section.element_size or SIZE / length) * length,
+            reading=curve_reading(diameter, places, over), **lengths,
+        )  # fmt: skip
+    except InputError as error:
+        keys = {**KEYS, "angle": "wall.angle"}
+        raise place.error(keys.get(error.field, error.field), error.problem) from None
+    assumed = ["span"] if section.span is None else []
+    assumed += ["constant pressure while bending"]
+    if section.mass_per_length is None:
+        assumed += ["weightless tube"]
+    return CylinderTest(
+        name=name, place=place, diameter=diameter, pressure=beam.pressure, length=beam.span,
+        seam_width=0.0, size=beam.size, symmetry="quarter", cap_warp="x", supports=beam.supports,
+        collar=beam.collar, deflections=tuple(deflections), gas=Gas(), reading=beam.reading,
+        cords=cords, beam=beam, measured=read_measured(section.measured, place),
+        reads_files=bool(section.measured.files), assumed=tuple(assumed),
+    )  # fmt: skip
 
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:

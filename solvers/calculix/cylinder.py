@@ -436,6 +436,9 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     run that stops early is reported up to there. SolverFailure: inflation did not end well, or
     bending not even its first reported deflection.
     """
+    if model.cords:
+        problem = "cords are for the solver membrane: CalculiX's deck has no tension-only members"
+        raise InputError(None, "cord", problem)
     solids, folder = solid_mesh(model), setup.templates
 
     def blown(frd: Path, iterations: int) -> tuple[Array, Array]:

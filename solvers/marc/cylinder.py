@@ -231,6 +231,9 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, r
 
     SolverFailure: a run that did not end well. InputError: as `bending_deck`.
     """
+    if model.cords:
+        problem = "cords are for the solver membrane: Marc's deck has no tension-only members"
+        raise InputError(None, "cord", problem)
     filling, bending = len(model.inflation), len(model.increments)
     deck = inflation_deck(model, law, settings)
     shape = run(deck, filling, lambda t19, _: inflated(t19, model))

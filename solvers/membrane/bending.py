@@ -250,6 +250,8 @@ def analyse_inflated(
         bent = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
+        if bent.cords is not None:
+            bent.cords.begin(membrane.reference + record.path[-1])
         bent.iterations = membrane.iterations
         extremes = (record.low, record.high)
         start = (record.path[-1], float(levels[-1]))
@@ -364,5 +366,5 @@ def closed_membrane_of(model: CylinderModel) -> InflatedModel:
     )
     return InflatedModel(
         model.mesh, model.thickness, np.asarray(model.mesh.warp), model.inflation,
-        {**model.guides, "support_bottom": (1,)}, model.copies, bending,
+        {**model.guides, "support_bottom": (1,)}, model.copies, bending, model.cords,
     )  # fmt: skip

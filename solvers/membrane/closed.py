@@ -12,6 +12,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import volume_and_gradient
 from .bubble import STIFF, Wall
+from .cords import Cords, cords_on
 from .factorisation import BorderedTangent, tangent_for
 from .kernel import reference_elements
 from .newton import Membrane, initial_stiffness, searched_equilibrium
@@ -295,13 +296,16 @@ class ClosedMembrane(Membrane):
     gas : sets the pressure by the volume. penalty : MPa/mm, of `bodies` at their present place.
     slack : MPa of artificial isotropic stress in the next tangent, in no residual; it fades with
     every tangent. line_slot : (lines, 144) places of the flexure's stiffness in the tangent, each a
-    quad of before, node, after, node. pressure, volume : at the last evaluation.
+    quad of before, node, after, node. full : MPa at which cords have their initial force. pressure,
+    volume : at the last evaluation.
     """
 
     cavity: Cavity
     wall: Wall = field(default_factory=Wall)
     flexure: Flexure | None = None
     line_slot: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 144), dtype=np.int64))
+    cords: Cords | None = None
+    full: float = 1.0
     gas: ClosedGas | None = None
     bodies: Sequence[RigidCylinder] = ()
     penalty: float = 5.0
@@ -368,6 +372,12 @@ class ClosedMembrane(Membrane):
             self.residual += matrix @ (self.reference + u).reshape(-1)
             if with_tangent:
                 self.tangent.data += added
+        if self.cords is not None:
+            self.cords.level = self.pressure / self.full
+            pull, stiff = self.cords.forces(self.reference + u)
+            np.add.at(self.residual.reshape(-1, 3), self.cords.nodes, pull)
+            if with_tangent:
+                self._add(self.tangent.slot[self.cords.quads], stiff.reshape(-1, 144))
         if with_tangent and self.slack > 0:
             self._add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= FADE
@@ -468,4 +478,6 @@ def closed_membrane(
         cavity=cavity,
         flexure=flexure,
         line_slot=line_slot,
+        cords=cords_on(model.mesh, model.cords, cavity.planes),
+        full=float(model.pressures[-1]),
     )

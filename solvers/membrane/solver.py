@@ -12,13 +12,14 @@ from ...errors import InputError
 from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import bar
+from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
 from ...meshes.strip_models import PatchModel, UniaxialModel
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words
-from . import bending, bubble, closed, strip
+from . import beam, bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
 from .newton import Asked, Membrane
 
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 class Analysis(NamedTuple):
     """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results."""
 
-    prepare: Callable[..., Membrane | strip.Patch]
+    prepare: Callable[..., Membrane | strip.Patch | beam.Beam]
     analyse: Callable[..., tuple[History, Array]]
 
 
@@ -40,6 +41,7 @@ ANALYSES: dict[type, Analysis] = {
     InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
     CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
     PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
+    BeamModel: Analysis(beam.prepare, beam.analyse),
 }
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
@@ -65,7 +67,7 @@ class MembraneSolver:
         self.tolerance = tolerance
         self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
-        self._prepared: tuple[Any, Membrane | strip.Patch] | None = None
+        self._prepared: tuple[Any, Membrane | strip.Patch | beam.Beam] | None = None
 
     @property
     def identity(self) -> str:
@@ -108,8 +110,8 @@ class MembraneSolver:
     @property
     def stress(self) -> Array:
         """Return Cauchy stress (quads, 4, 3) MPa of warp, fill, shear after the last run."""
-        if self._prepared is None:
-            raise LookupError("no run yet: there is no stress")
+        if self._prepared is None or isinstance(self._prepared[1], beam.Beam):
+            raise LookupError("no run of a membrane yet: there is no stress")
         return self._prepared[1].stress_old.copy()
 
     @BLAS.wrap(limits=1, user_api="blas")
@@ -120,11 +122,13 @@ class MembraneSolver:
         asked = Asked(parameters, guess, self.progress)
         return analyse(self._membrane(model, law), model, asked)
 
-    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch:
+    def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch | beam.Beam:
         if self._prepared is None or self._prepared[0] is not model:
             prepare = analysis_of(ANALYSES, model, self.name).prepare
             self._prepared = (model, prepare(model, law, self.tolerance, self.wall))
         membrane = self._prepared[1]
+        if isinstance(membrane, beam.Beam):
+            return membrane
         membrane.law = law
         membrane.keep_tangent, membrane.iterations = False, 0
         membrane.strain_old[:] = 0.0

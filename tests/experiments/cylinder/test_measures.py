@@ -9,6 +9,7 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.cylinder.predicted import (
     STUDIED,
     BendingRun,
+    against_measured,
     arrays_of,
     bending_measures,
     early_end,
@@ -29,6 +30,7 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Mesh, middle_strain, surface_strain
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.project.project import read_project
+from bubblefit.readers.bending import BendingCurve
 from bubblefit.runs.refinement import edge_length
 from bubblefit.solvers.base import History
 
@@ -307,3 +309,21 @@ def test_quantities_of_a_history_made_up(cylinders):
     early = quantities(model, replace(history, load=load[:26], displacement=moves[:26]))
     gone = {"load at 240 mm, N", "load at the limit point, N"}
     assert set(found) - set(early) == gone and len(early) == len(found) - 2
+
+
+def test_a_curve_beside_measured_ones():
+    """Bilinear, 40 and 4 N/mm with the corner at 10 mm; measured 30 N of friction and 25 % less."""
+    way = np.linspace(0.0, 120.0, 1201)
+    load = np.where(way < 10, 40 * way, 400 + 4 * (way - 10))
+    read = 0.75 * load + 30.0 * (way > 0.0)
+    reading = curve_reading(340.0, [100.0, 500.0], 4.0)
+    found = against_measured(reading, way, load, [BendingCurve("a", way[:1101], read[:1101])])
+    assert found.reference == 100.0
+    assert found.stiffness == pytest.approx((40.0, 30.0), rel=1e-6)
+    assert found.knee == pytest.approx((396.0, 0.75 * 396.0 + 30.0), rel=0.02)
+    assert found.loads["100 mm"] == pytest.approx((760.0, 600.0))
+    assert found.loads["500 mm"] is None and found.ratios()["load at 500 mm"] is None
+    assert found.ratios()["stiffness"] == pytest.approx(40.0 / 30.0)
+    twice = [BendingCurve(name, way, factor * read) for name, factor in (("a", 0.9), ("b", 1.1))]
+    assert against_measured(reading, way, load, twice).stiffness[1] == pytest.approx(30.0)
+    assert against_measured(reading, way, load, ()) is None

@@ -10,6 +10,9 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES
 from bubblefit.project.project import read_project
+from bubblefit.runs.predictions import predict
+from bubblefit.solvers.calculix import cylinder as calculix_cylinder
+from bubblefit.solvers.marc import cylinder as marc_cylinder
 
 from ...complaints import complaint_with
 from ...cylinder_cases import write_project, write_readings
@@ -177,3 +180,95 @@ def test_what_the_example_leaves_out_is_the_default(tmp_path):
     for pair in zip(cylinders(EXAMPLE), cylinders(tmp_path / "project.toml"), strict=True):
         said, left = ({k: v for k, v in vars(t).items() if k not in own} for t in pair)
         assert said == left
+
+
+BEAM = """[fabric]
+name = "braid"
+thickness = 1.0
+[units]
+pressure = "kPa"
+[[cylinder]]
+name = "beam"
+model = "beam"
+diameter = 340.0
+pressure = 80.0
+span = 3000.0
+load_spacing = 1000.0
+roller_below_axis = 300.0
+mass_per_length = 2.0
+deflections = [20.0, 40.0]
+places = [40.0]
+wall = { pressure = [60.0, 100.0], yarn = [1000.0, 2000.0], yarn_shear = 2.0, angle = 65.0, bladder = 9.6, bladder_shear = 3.3 }
+[[cylinder.cord]]
+angle = 0.0
+strain = [0.0, 0.002, 0.02]
+force = [0.0, 200.0, 14000.0]
+[[cylinder.cord]]
+angle = 180.0
+stiffness = 8e5
+"""  # noqa: E501
+
+
+def test_a_beam_has_its_wall_by_pressure_and_needs_no_card(tmp_path):
+    path = tmp_path / "beam.toml"
+    path.write_text(BEAM)
+    (test,) = cylinders(path)
+    beam = test.model()
+    assert beam.section.wall.yarn == pytest.approx(1500.0)
+    assert (beam.section.wall.yarn_shear, beam.section.wall.angle) == (2.0, 65.0)
+    assert (beam.load_spacing, beam.roller_below) == (1000.0, 300.0)
+    assert beam.weight == pytest.approx(2e-3 * 9.80665)
+    assert [c.angle for c in beam.cords] == [0.0, 180.0]
+    assert beam.cords[1].table.pull(0.01)[0] == pytest.approx(8000.0)
+    found = predict(read_project(path))
+    row = found.runs().iloc[0]
+    assert row["card"] == "its wall" and row["load_at_40_mm_N"] > 50
+    finer = test.models(what="elements", factor=2)["cylinder"]
+    assert finer.size == 0.5 * beam.size
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "field", "words"),
+    [
+        ("pressure = 80.0", "pressure = 110.0", "cylinder[0].pressure", "60 to 100"),
+        ("yarn = [1000.0, 2000.0]", "yarn = [1.0]", "cylinder[0].wall.yarn", "expected 2"),
+        ("angle = 65.0,", "", "cylinder[0].wall.angle", "braid"),
+        ("angle = 65.0", "angle = 50.0", "cylinder[0].wall.angle", "54.7"),
+        ("stiffness = 8e5", "", "cylinder[0].cord[1]", "stiffness"),
+        (
+            "stiffness = 8e5",
+            "stiffness = 1.0\nbonded = false",
+            "cylinder[0].cord[1].bonded",
+            "true",
+        ),
+        ("0.002, 0.02", "0.02, 0.002", "cylinder[0].cord[0].strain", "above"),
+        ("span = 3000.0", "span = 900.0", "cylinder[0].load_spacing", "900"),
+        ("span = 3000.0", "length = 3000.0", "cylinder[0].length", "membrane"),
+        ('model = "beam"', "", "cylinder[0].wall", "beam"),
+    ],
+)
+def test_mistakes_in_a_beam_name_its_key(tmp_path, before, after, field, words):
+    path = tmp_path / "beam.toml"
+    assert before in BEAM
+    path.write_text(BEAM.replace(before, after))
+    with pytest.raises(InputError) as raised:
+        read_project(path)
+    assert raised.value.field == field and words in raised.value.problem
+
+
+def test_a_membrane_takes_cords_and_other_programs_refuse_them(tmp_path):
+    cords = "".join(
+        f"\n[[cylinder.cord]]\nangle = {angle}\nstiffness = 4e4" for angle in (60.0, 300.0)
+    )
+    path = tmp_path / "cords.toml"
+    path.write_text(
+        '[fabric]\nname = "f"\nthickness = 0.8\n[[cylinder]]\ndiameter = 150.0\npressure = 90.0\n'
+        "element_size = 60.0\ndeflections = [2.0]" + cords
+    )
+    (test,) = cylinders(path)
+    assert [c.angle for c in test.model().cords] == [60.0, 300.0]
+    law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
+    for analyse in (calculix_cylinder.analyse, marc_cylinder.analyse):
+        with pytest.raises(InputError) as raised:
+            analyse(test.model(), law, None, None)
+        assert raised.value.field == "cord"

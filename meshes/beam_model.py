@@ -1,0 +1,337 @@
+"""An inflated tube in bending as a beam: the wall per width, cords, and loads as they are.
+
+Beside the membrane of `cylinder_model`: for walls that are known as stiffness per width (N/mm) and
+for braids, whose yarns lock bilinear quads. Sections stay plane and round. Strain counts from the
+inflated tube, whose radius and braid angle are given, and a section carries
+
+    N = integral of n(strain) r d angle + sum of cords - p pi r^2,   V = (G pi r + p pi r^2) gamma,
+
+n N/mm along the tube, strain = axial - curvature * height. The pressure's part of the shear is that
+of Fichter (NASA TN D-3393). A braid pulls along the tube: its yarns turn as it is stretched, at
+constant length, cos(angle) with the length of the tube and sin(angle) with its radius. So the
+section's thrust less the pull of the braid is p pi r^2 (1 - 2 cot^2 angle), and its derivative
+stiffens the wall by 3 p r cot^2 angle.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
+from .mesh import Array, Mesh
+from .tube import cylinder_mesh
+
+#: Places around a wall at which its force is taken, and stiffness left to a slack wall.
+AROUND, LEFT = 72, 3e-4
+#: Elements of the drawing: mm over the diameter.
+DRAWN = 0.15
+
+
+class TubeWall(Protocol):
+    """The wall of a tube of given pressure (MPa) and radius (mm) when inflated.
+
+    moduli : N/mm along, around and in shear, and Poisson's ratio, of a card in its place.
+    """
+
+    @property
+    def shear(self) -> float: ...
+
+    @property
+    def moduli(self) -> tuple[float, float, float, float]: ...
+
+    def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
+        """Return the force along the tube per width (N/mm) and its derivative by the strain."""
+
+    def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
+        """Return the strain along the tube by inflation that `pull` and the cords begin with."""
+
+
+@dataclass(frozen=True)
+class PlainWall:
+    """Stiffness per width, N/mm: along, around, shear; poisson: strain around over along.
+
+    wrinkles : it goes slack where it would be compressed.
+    """
+
+    axial: float
+    hoop: float
+    shear: float
+    poisson: float = 0.0
+    wrinkles: bool = True
+
+    def __post_init__(self) -> None:
+        _positive(self, ("axial", "hoop", "shear"))
+        if not 0 <= self.poisson < math.sqrt(self.axial / self.hoop):
+            problem = f"expected from 0 to below sqrt(axial / hoop), got {self.poisson:g}"
+            raise InputError(None, "poisson", problem)
+
+    @property
+    def moduli(self) -> tuple[float, float, float, float]:
+        return self.axial, self.hoop, self.shear, self.poisson
+
+    def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
+        by_hoop = self.poisson * self.hoop / self.axial * pressure * radius
+        force, slope = by_hoop + self.axial * strain, np.full_like(strain, self.axial)
+        if self.wrinkles:
+            left = np.where(force < 0, LEFT, 1.0)
+            force, slope = left * force, left * slope
+        return force, slope
+
+    def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
+        """Return the strain at which wall and cords together hold the thrust."""
+        low, high = -1.0, 1.0
+        for _ in range(60):
+            strain = 0.5 * (low + high)
+            held = 2 * math.pi * radius * self.pull(np.array([strain]), pressure, radius)[0][0]
+            held += sum(
+                float(c.table.pull(strain + c.prestrain, c.tension_only)[0])
+                if c.initial_force is None else c.initial_force for c in cords
+            )  # fmt: skip
+            low, high = (strain, high) if held < pressure * math.pi * radius**2 else (low, strain)
+        return 0.5 * (low + high)
+
+
+@dataclass(frozen=True)
+class BraidedWall:
+    """Two families of yarns at plus and minus `angle` (degrees from the axis), and a bladder.
+
+    yarn, across, yarn_shear : N/mm of each family, along and across its yarns and in shear.
+    bladder, bladder_shear : N/mm of the isotropic bladder. It carries compression as well.
+    """
+
+    angle: float
+    yarn: float
+    yarn_shear: float
+    bladder: float
+    bladder_shear: float
+    across: float = 0.0
+
+    def __post_init__(self) -> None:
+        _positive(self, ("yarn", "yarn_shear", "bladder", "bladder_shear"))
+        if not 0 < self.angle < 90:
+            problem = f"expected between 0 and 90 degrees, got {self.angle:g}"
+            raise InputError(None, "angle", problem)
+        if not 0.5 * self.bladder / self.bladder_shear < 2:
+            problem = f"expected above a quarter of bladder, {0.25 * self.bladder:g} N/mm"
+            raise InputError(None, "bladder_shear", problem)
+
+    @cached_property
+    def laminate(self) -> Array:
+        """Return the stiffness (3, 3) N/mm of yarns and bladder: along, around, shear."""
+        c, s = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+        to_yarn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s],
+                            [-2 * c * s, 2 * c * s, c * c - s * s]])  # fmt: skip
+        one = to_yarn.T @ np.diag([self.yarn, self.across, self.yarn_shear]) @ to_yarn
+        mirror = np.diag([1.0, 1.0, -1.0])
+        nu = 0.5 * self.bladder / self.bladder_shear - 1.0
+        plane = self.bladder / (1.0 - nu**2)
+        sheet = np.array([[plane, nu * plane, 0.0], [nu * plane, plane, 0.0], [0.0, 0.0, 0.0]])
+        sheet[2, 2] = self.bladder_shear
+        return np.asarray(one + mirror @ one @ mirror + sheet)
+
+    @property
+    def axial(self) -> float:
+        """Return the stiffness along the tube where it is free to change its radius, N/mm."""
+        a = self.laminate
+        return float(a[0, 0] - a[0, 1] ** 2 / a[1, 1])
+
+    @property
+    def shear(self) -> float:
+        return float(self.laminate[2, 2])
+
+    @property
+    def moduli(self) -> tuple[float, float, float, float]:
+        a = self.laminate
+        return self.axial, float(a[1, 1] - a[0, 1] ** 2 / a[0, 0]), self.shear, 0.0
+
+    def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
+        """Return force and derivative; the thrust that grows with the radius is part of it."""
+        cosine = math.cos(math.radians(self.angle))
+        by_length = 3.0 * cosine**2 * (1.0 + strain) ** 2
+        scale = 0.5 * pressure * radius / (1.0 - cosine**2)
+        force = self.axial * strain + scale * (by_length - 1.0) + 0.5 * pressure * radius
+        return force, self.axial + 2.0 * scale * by_length / (1.0 + strain)
+
+    def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
+        """Return zero: the angle is that of the inflated tube."""
+        return 0.0
+
+    def left_to_cords(self, pressure: float, radius: float) -> float:
+        """Return the thrust less the pull of the braid (N), which cords have to hold."""
+        force, _ = self.pull(np.zeros(1), pressure, radius)
+        return math.pi * pressure * radius**2 - 2 * math.pi * radius * float(force[0])
+
+
+def _positive(wall: object, names: Sequence[str]) -> None:
+    for name in names:
+        if not 0 < getattr(wall, name) < math.inf:
+            raise InputError(None, name, f"expected > 0 N/mm, got {getattr(wall, name):g}")
+
+
+@dataclass(frozen=True, eq=False)
+class TubeSection:
+    """A section of an inflated tube: radius (mm), gauge pressure (MPa), wall and cords.
+
+    Cords of a braid without initial force hold its thrust in equal shares.
+    """
+
+    radius: float
+    pressure: float
+    wall: TubeWall
+    cords: Sequence[Cord] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.wall, BraidedWall) and not min(self.starts, default=-1.0) >= 0:
+            problem = "the braid and the pressure need cords with tension: at least one cord, and "
+            raise InputError(None, "angle", problem + "an angle above 54.74 degrees")
+
+    @property
+    def starts(self) -> list[float]:
+        """Return the forces (N) of the cords in the inflated tube."""
+        wall, held = self.wall, self.wall.at_rest(self.pressure, self.radius, self.cords)
+        free = [c for c in self.cords if c.initial_force is None]
+        given = sum(c.initial_force or 0.0 for c in self.cords)
+        forces = []
+        for c in self.cords:
+            if c.initial_force is not None:
+                forces.append(c.initial_force)
+            elif isinstance(wall, BraidedWall):
+                thrust = wall.left_to_cords(self.pressure, self.radius)
+                forces.append((thrust - given) / len(free))
+            else:
+                forces.append(float(c.table.pull(held + c.prestrain, c.tension_only)[0]))
+        return forces
+
+    @cached_property
+    def _at_rest(self) -> tuple[float, list[float]]:
+        rest = self.wall.at_rest(self.pressure, self.radius, self.cords)
+        own = zip(self.cords, self.starts, strict=True)
+        braided = isinstance(self.wall, BraidedWall)
+        return rest, [
+            c.table.strain_at(force) if braided or c.initial_force is not None
+            else rest + c.prestrain
+            for c, force in own
+        ]  # fmt: skip
+
+    @property
+    def shear(self) -> float:
+        """Return V over the shear strain, N."""
+        return math.pi * self.radius * (self.wall.shear + self.pressure * self.radius)
+
+    def resultants(self, strain: Array, curvature: Array) -> tuple[Array, Array, Array]:
+        """Return N (m,) N, M (m,) N mm, positive in sagging, and derivatives (m, 2, 2).
+
+        strain, curvature (m,) of the axis, from the inflated tube; 1/mm.
+        """
+        rest, starts = self._at_rest
+        turn = 2 * math.pi / AROUND * (0.5 + np.arange(AROUND))
+        heights = self.radius * np.cos(turn)
+        force, slope = self.wall.pull(
+            rest + strain[:, None] - curvature[:, None] * heights, self.pressure, self.radius
+        )
+        width = 2 * math.pi * self.radius / AROUND
+        fibres, pulls, slopes = [heights], [width * force], [width * slope]
+        for cord, start in zip(self.cords, starts, strict=True):
+            height = self.radius * math.cos(math.radians(cord.angle))
+            own = cord.table.pull(start + strain - curvature * height, cord.tension_only)
+            fibres.append(np.array([height]))
+            pulls.append(own[0][:, None])
+            slopes.append(own[1][:, None])
+        y, f, k = np.concatenate(fibres), np.hstack(pulls), np.hstack(slopes)
+        normal = f.sum(axis=1) - math.pi * self.pressure * self.radius**2
+        mixed = -(k @ y)
+        rows = [[k.sum(axis=1), mixed], [mixed, k @ y**2]]
+        return normal, -(f @ y), np.moveaxis(np.array(rows), -1, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class BeamModel:
+    """A tube on two rollers, bent by two equal dead loads (one where they are 0 mm apart).
+
+    span, load_spacing, load_width : mm; of straps along the tube. roller_below : mm from the axis
+    to the rollers, on brackets that turn with the ends. weight : N/mm of tube. friction : N, added
+    to the load of every deflection. deflections : mm of the axis at mid-span, from the inflated
+    tube under its weight. size : mm of an element. mesh : the surface of a quarter, to be drawn.
+    """
+
+    section: TubeSection
+    span: float
+    deflections: Sequence[float]
+    load_spacing: float = 0.0
+    load_width: float = 0.0
+    roller_below: float = 0.0
+    weight: float = 0.0
+    friction: float = 0.0
+    size: float = 25.0
+    increments: Sequence[float] = ()
+    reading: CurveReading = None  # type: ignore[assignment]
+    mesh: Mesh = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        steps = np.array(self.increments if len(self.increments) else self.deflections, float)
+        for name, value in (("deflections", self.deflections), ("increments", steps)):
+            values = np.array(value, dtype=float)
+            if not len(values) or not (np.diff(values, prepend=0.0) > 0).all():
+                raise InputError(None, name, f"expected positive, increasing, got {values}")
+            object.__setattr__(self, name, tuple(values.tolist()))
+        if not self.load_spacing + self.load_width < self.span:
+            problem = f"{self.load_spacing:g} mm does not fit into a span of {self.span:g} mm"
+            raise InputError(None, "load_spacing", problem)
+        if not 0 < self.size <= 0.1 * self.span:
+            problem = f"expected at most a tenth of the span, got {self.size:g} mm"
+            raise InputError(None, "size", problem)
+        if self.reading is None:
+            object.__setattr__(self, "reading", curve_reading(self.diameter))
+        mesh = cylinder_mesh(self.span, self.diameter, DRAWN * self.diameter, around=0.5)
+        object.__setattr__(self, "mesh", mesh)
+
+    @property
+    def diameter(self) -> float:
+        return 2 * self.section.radius
+
+    def diameter_at(self, points: Array) -> float:
+        """Return the diameter: sections keep it."""
+        return self.diameter
+
+    @property
+    def pressure(self) -> float:
+        return self.section.pressure
+
+    @property
+    def inflation(self) -> tuple[float, ...]:
+        return (self.pressure,)
+
+    @property
+    def copies(self) -> int:
+        return 4
+
+    @property
+    def cords(self) -> Sequence[Cord]:
+        return self.section.cords
+
+    @property
+    def reported(self) -> NDArray[np.intp]:
+        steps = np.array(self.increments)
+        return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
+
+    @property
+    def supports(self) -> RigidSupports:
+        """Return the rollers, as they are drawn."""
+        return RigidSupports(self.span, DRAWN * self.diameter)
+
+    @property
+    def collar(self) -> Collar:
+        """Return a strap, as it is drawn."""
+        width = max(self.load_width, DRAWN * self.diameter)
+        return Collar(self.diameter, width, 0.1 * width)
+
+
+def axial_table(stiffness: float) -> ForceTable:
+    """Return the table of a cord of constant stiffness EA, N."""
+    return ForceTable(np.array([0.0, 1.0]), np.array([0.0, stiffness]))

@@ -1,0 +1,145 @@
+"""Cords along a tube: the tangent against differences, and tubes with cords in closed form."""
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.cylinder_model import (
+    Collar,
+    Cord,
+    ForceTable,
+    InflatedModel,
+    RigidSupports,
+    inflated_cylinder,
+)
+from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.solvers.membrane.closed import prepare
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+LINEAR = ForceTable(np.array([0.0, 1.0]), np.array([0.0, 40e3]))
+KINKED = ForceTable(np.array([0.0, 2e-4, 1.0]), np.array([0.0, 20.0, 90e3]))
+WALL = HypoelasticLaw.linear(400.0, 500.0, 50.0, 0.2)
+RADIUS, LENGTH, THICKNESS, PRESSURE = 100.0, 800.0, 0.8, 0.03
+THREE = (60.0, 180.0, 300.0)
+
+
+def tube(cords, symmetry="quarter", pressures=(0.25 * PRESSURE, PRESSURE)):
+    mesh = cylinder_mesh(LENGTH, 2 * RADIUS, 50.0, symmetry=symmetry)
+    if symmetry == "quarter":
+        supports = {"symmetry_x": (0,), "symmetry_z": (2,)}
+        low = mesh.node_sets["bottom_line"]
+        at = low[np.argmin(mesh.points[low, 2])]
+        sets = {**mesh.node_sets, "low": np.array([at])}
+        supports |= {"low": (1,)}
+    else:
+        sets = mesh.node_sets
+        supports = {"top_line": (0,), "bottom_line": (0,), "mid_span": (2,)}
+        low = mesh.node_sets["bottom_line"]
+        at = low[np.argmin(np.abs(mesh.points[low, 2]))]
+        sets = {**sets, "low": np.array([at])}
+        supports["low"] = (1,)
+    mesh = type(mesh)(mesh.points, mesh.quads, sets, mesh.element_sets, mesh.warp)
+    return InflatedModel(
+        mesh, THICKNESS, mesh.warp, list(pressures), supports,
+        4 if symmetry == "quarter" else 1, cords=cords,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("table", [LINEAR, KINKED])
+@pytest.mark.parametrize("given", [None, 150.0])
+def test_the_tangent_is_the_derivative_of_the_residual(table, given):
+    model = tube([Cord(a, table, given) for a in (0.0, 100.0, 260.0)])
+    membrane = prepare(model, WALL, 1e-9, None)
+    assert membrane.cords is not None
+    rng = np.random.default_rng(1)
+    u = 0.3 * rng.standard_normal(membrane.reference.shape) + 2e-3 * membrane.reference
+    if given:
+        membrane.cords.begin(membrane.reference + 0.4 * u)
+    way = rng.standard_normal(u.shape)
+    way.reshape(-1)[np.setdiff1d(np.arange(u.size), membrane.free)] = 0.0
+    step, ends = 1e-6, []
+    force, stiffness = membrane.cords.forces(membrane.reference + u)
+    for sign in (1, -1):
+        ends.append(membrane.cords.forces(membrane.reference + u + sign * step * way)[0])
+    local = np.einsum("mij,mj->mi", stiffness, way[membrane.cords.nodes].reshape(-1, 12))
+    difference = (ends[0] - ends[1]).reshape(-1, 12) / (2 * step)
+    assert np.abs(local - difference).max() < 1e-6 * np.abs(difference).max()
+    assert np.abs(force.sum(axis=1)).max() < 1e-9
+    # And it reaches the matrix: Newton's own tangent against differences of its residual.
+    membrane.unbalance(u, PRESSURE, with_tangent=True)
+    membrane.tangent.factor()
+    plus, minus = (residual(membrane, u + sign * step * way) for sign in (1, -1))
+    back = membrane.tangent.solve((plus - minus)[membrane.free] / (2 * step))
+    wanted = way.reshape(-1)[membrane.free]
+    assert np.abs(back - wanted).max() < 1e-4 * np.abs(wanted).max()
+
+
+def residual(membrane, u):
+    membrane.unbalance(u, PRESSURE, with_tangent=False)
+    return membrane.residual.copy()
+
+
+@pytest.mark.parametrize("symmetry", ["quarter", "full"])
+def test_wall_and_cords_share_the_thrust_of_the_pressure(symmetry):
+    solver = MembraneSolver(1e-9)
+    model = tube([Cord(a, LINEAR) for a in THREE], symmetry)
+    history = solver.run(model, WALL)
+    cords = solver._prepared[1].cords
+    mesh = model.mesh
+    middle = np.abs(mesh.points[mesh.quads][..., 2]).min(axis=1) < 1e-6
+    stress = solver.stress[middle][..., 0].mean()
+    near = np.isin(cords.quads, np.flatnonzero(middle))
+    share = {"quarter": 4.0, "full": 1.0}[symmetry]
+    at = (mesh.points + history.displacement[-1])[mesh.node_sets["mid_span"]]
+    section = ring_area(at, symmetry)
+    around = 2 * np.sqrt(np.pi * section)
+    pull = cords.force[near] * cords.part[near]
+    # A quarter has half of the circumference; a whole ring has quads on both sides of mid-span.
+    total = pull.sum() * (2.0 if share == 4 else 0.5)
+    assert total > 0.2 * PRESSURE * section
+    assert stress * THICKNESS * around + total == pytest.approx(PRESSURE * section, rel=0.02)
+    # Section with cords: strain = (thrust - nu hoop) / (E t 2 pi r + 3 EA), small strains.
+    e1, e2, nu = 400.0, 500.0, 0.2
+    hoop = PRESSURE * RADIUS
+    by_hoop = nu * hoop * 2 * np.pi * RADIUS * 1.0
+    plain = PRESSURE * np.pi * RADIUS**2 - by_hoop
+    strain = plain / (e1 * THICKNESS * 2 * np.pi * RADIUS + 3 * 40e3)
+    assert cords.force[near].mean() == pytest.approx(40e3 * strain, rel=0.06)
+    assert e2 > e1
+
+
+def ring_area(at, symmetry):
+    order = np.argsort(np.arctan2(at[:, 0], -at[:, 1]))
+    x, y = at[order, :2].T
+    area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return 2 * area if symmetry == "quarter" else area
+
+
+def test_given_forces_stand_in_the_inflated_tube_and_stiffen_its_bending():
+    loads = []
+    for force in (None, 60.0):
+        cords = [] if force is None else [Cord(a, LINEAR, force) for a in THREE]
+        model = inflated_cylinder(
+            150.0, 0.1, 0.81, 75.0, 1500.0, 0.0, RigidSupports(1000.0, 100.0),
+            Collar(180.0, 145.0), [4.0], cords=cords,
+        )  # fmt: skip
+        loads.append(MembraneSolver(wall="tension field").run(model, WALL).load[-1])
+    assert loads[1] > 1.1 * loads[0]
+
+
+def test_half_a_tube_needs_the_mirror_image_of_a_cord():
+    with pytest.raises(InputError) as raised:
+        prepare(tube([Cord(60.0, LINEAR)]), WALL, 1e-9, None)
+    assert raised.value.field == "cord.angle" and "300" in raised.value.problem
+
+
+def test_a_table_is_straight_between_and_beyond_its_points():
+    force, slope = KINKED.pull([-1e-4, 1e-4, 0.5, 2.0])
+    steep = (90e3 - 20.0) / (1.0 - 2e-4)
+    assert force == pytest.approx([0.0, 10.0, 20.0 + steep * (0.5 - 2e-4), 90e3 + steep])
+    assert slope == pytest.approx([0.0, 1e5, steep, steep])
+    assert KINKED.pull([-1e-4], tension_only=False)[0] == pytest.approx([-10.0])
+    assert KINKED.strain_at(10.0) == pytest.approx(1e-4)
+    with pytest.raises(InputError) as raised:
+        ForceTable(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
+    assert raised.value.field == "strain"
