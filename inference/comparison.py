@@ -176,8 +176,9 @@ class OwnObjective:
         self.inner, self.function, self.by = inner, function, np.zeros_like(inner.measured)
         self.derivative = getattr(function, "derivative", None)
         self.unit, self.least_noise, self.noise_is = inner.unit, inner.least_noise, inner.noise_is
-        self.sizes = tuple(map(len, self._vectors(function, self.by)))
-        still, near = (self._values(share * inner.measured) for share in (0.0, 0.9))
+        with np.errstate(all="ignore"):  # a model that does not move may have no logarithm
+            self.sizes = tuple(map(len, self._vectors(function, self.by)))
+            still, near = (self._values(share * inner.measured) for share in (0.0, 0.9))
         self.data, blocks = (*inner.data, still, near), Blocks(self.sizes)
         largest = np.maximum.reduceat(np.abs(still), blocks.starts)
         usable = relative & np.isfinite(largest) & (largest > 0)
