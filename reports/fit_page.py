@@ -183,7 +183,7 @@ def assumed(fit: Fit) -> list[tuple[str, object]]:
     return [
         (f"Poisson's ratio nu12 ({'fitted' if fitted['nu12'] else 'fixed'})", fit.law.nu12),
         ("thickness (fitted)" if fitted["thickness"] else "thickness", thick),
-        ("form of the moduli", fit.law.form.name),
+        ("form of the moduli", getattr(fit.law.form, "title", fit.law.form.name)),
     ]
 
 
@@ -442,7 +442,7 @@ def _plain(prepared: Any, fitted: FittedTest, found: Findings, out: Output) -> E
     series = [dots("measured", x, table["measured"], colour=7), curve]
     chart = Chart(prepared.test.name, label, str(unit), series, "measured and modelled values")
     charts = Charts(f"{out.prefix}values", [chart], "Every matched value beside the model's")
-    return Exhibit(facts=[(prepared.test.name, found.summary)], parts=[charts])
+    return Exhibit(facts=[("misfit", found.summary)], parts=[charts])
 
 
 def _beside_model(fit: Fit) -> str:
