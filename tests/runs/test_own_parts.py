@@ -21,6 +21,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports.content import read_page_data
 from bubblefit.runs.setup import fingerprints, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
+from bubblefit.solvers.base import WrappedSolver
 
 from ..places import ROOT
 from ..projects import constant_strips, small, with_form
@@ -138,7 +139,10 @@ def test_a_form_of_functions_is_the_built_in_one(own, ours):
     for name in ORDER:
         np.testing.assert_allclose(one.modulus(name, strain), other.modulus(name, strain), 1e-12)
     assert one.jumps == other.jumps == isinstance(own, Regions)
-    assert np.linalg.cond(form.from_values(RANGE)) < 1e5
+    to_values = np.linalg.inv(form.from_values(RANGE))
+    rising = to_values @ np.tile(np.arange(1.0, 1 + len(to_values) // 3), 3)
+    assert np.linalg.cond(to_values) < 1e5
+    assert (np.diff(rising.reshape(3, -1)) > 0).all()  # the first is at rest
 
 
 def test_other_functions_become_cubics_that_are_near_enough():
@@ -308,6 +312,8 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
     np.testing.assert_allclose(second.residual, first.residual, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(second.jacobian, first.jacobian, atol=1e-8)
     assert [type(c.objective) is OwnObjective for c in other.comparisons] == [True, True, False]
+    twice = prepared(project.with_objective("one", lambda m, d: [m - d, d - m])).problem()
+    assert twice.evaluate(y, False).value == pytest.approx(first.value, rel=1e-12)
     with pytest.raises(InputError):
         project.with_objective("three", np.subtract)
     changing = project.with_objective("one", lambda m, d: np.resize(m - d, 3 if m.any() else 4))
@@ -389,6 +395,8 @@ def test_the_derivative_of_a_closed_form(tmp_path):
     rows, point = problem.rows(1), problem.evaluate(y, True)
     found = differences(problem, y)[rows]
     assert np.abs(found[:, 4:]).max(axis=0).min() > 0 and not found[:, :4].any()
+    modelled = point.residual[rows] + Pull.measured / problem.scale[rows]
+    np.testing.assert_allclose(found[:, -1], modelled / project.fabric.thickness, rtol=1e-6)
     np.testing.assert_allclose(point.jacobian[rows], found, atol=1e-6 * np.abs(found).max())
 
 
@@ -402,8 +410,17 @@ def test_a_test_of_ones_own_alone_and_by_another_solver(tmp_path):
     assert fit.law.G12(0.0) == pytest.approx(best, rel=1e-6) and fit.command == "own"
     assert fit.result["objective_is"].endswith("N mm")
     setup = prepared(with_torsion(easy(tmp_path)))
-    own = setup.own(setup.tests[1])[0].objective
-    assert own.shifted(None, None) is own and own.data[0].shape == own.data[1].shape
+    bubble, tube = setup.problem().comparisons
+    assert tube.objective.shifted(None, None) is tube.objective
+    led = setup.problem_of([bubble.by(Plain(bubble.solver)), tube]).surrogate
+    assert [c.solver.name for c in led.comparisons] == ["membrane", "closed form"]
+
+
+class Plain(WrappedSolver):
+    """A solver that gives no derivatives."""
+
+    def run(self, model, law, scratch=None, timeout=None):
+        return self.solver.run(model, law)
 
 
 class ConstantShear(Form):
