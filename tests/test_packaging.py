@@ -1,6 +1,5 @@
 """The wheel: everything the commands need, nothing else, and it works outside the repository."""
 
-import ast
 import re
 import shutil
 import subprocess
@@ -14,7 +13,6 @@ import pytest
 from bubblefit.project.schema import project_file as project_model
 from bubblefit.solvers.registry import solver_sections
 
-from . import needs
 from .places import PUBLISHED, ROOT
 from .projects import project_file
 from .scripts import script
@@ -163,42 +161,6 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     project_file(project.parent, project.read_text(), ("elements = 800", "elements = 48"))
     output_of(command, "bubble", project, "--starts", "1", "--jobs", "1")
     assert (tmp_path / "out" / "mine" / "report.html").exists()
-
-
-#: What leaves a test out, or lets it fail.
-WORDS = {"skip", "skipif", "skipIf", "skipUnless", "SkipTest", "importorskip", "xfail"}
-
-
-def test_nothing_else_leaves_a_test_out():
-    found = []
-    for path in sorted((ROOT / "tests").rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
-            imported = [getattr(alias, "name", "") for alias in getattr(node, "names", [])]
-            if WORDS & {getattr(node, "attr", ""), *imported}:
-                found.append(f"tests/{path.relative_to(ROOT / 'tests')}")
-    # That place, and the check of it below.
-    assert found == ["tests/needs.py", "tests/test_packaging.py"]
-
-
-WANTS = {
-    "install gfortran": needs.fortran, "install gcc": needs.c_compiler, "ccx": needs.calculix,
-    "no measured data": needs.measured_data,
-    "no_such_library cannot be loaded": lambda: needs.library("no_such_library"),
-}  # fmt: skip
-
-
-def test_what_is_missing_skips_here_and_fails_in_ci(monkeypatch, tmp_path):
-    """On a machine without any program, and without measured data."""
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path))
-    monkeypatch.setattr(needs, "SHARED", tmp_path / "shared" / "data")
-    for name in ("CI", "CC", "BUBBLEFIT_CCX"):
-        monkeypatch.delenv(name, raising=False)
-    for raised in (pytest.skip.Exception, pytest.fail.Exception):
-        for words, missing in WANTS.items():
-            with pytest.raises(raised, match=words):
-                missing()
-        monkeypatch.setenv("CI", "1")
 
 
 def test_every_published_table_has_a_source_and_says_its_units(shared_data):

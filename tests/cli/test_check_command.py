@@ -1,7 +1,6 @@
 """`bubblefit check`, and what fits do with data that are doubtful."""
 
 import json
-import logging
 import re
 
 import bubblefit as bf
@@ -9,11 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.registry import kinds
-from bubblefit.files import THREADS
 from bubblefit.reports.content import read_page_data
-from bubblefit.runs import fit as fits
 from bubblefit.runs.fit import check
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from ..camera import camera_project
 from ..commands import in_process, one_line, result_in
@@ -49,31 +45,6 @@ def test_good_data_are_said_to_be_fine(folder, golden):
     assert (out / "registration.png").is_file() and (out / "rises.png").is_file()
     said = complaint(check, bf.read_project(folder / "project.toml"), None, ["weather"])
     assert "fit.trust" in said and "weather" in said and "z-flipped" in said
-
-
-@pytest.mark.parametrize("said", [0, 2])
-def test_steps_times_and_one_blas_thread_unless_said_otherwise(folder, monkeypatch, said):
-    for name in THREADS:
-        monkeypatch.delenv(name, raising=False)
-    if said:
-        monkeypatch.setenv("OMP_NUM_THREADS", str(said))
-    seen, heard = [], logging.getLogger("bubblefit")
-    monkeypatch.setattr(heard, "level", heard.level)
-    monkeypatch.setattr(heard, "handlers", list(heard.handlers))
-    look = fits.judged  # of what is measured in the midst of a check
-
-    def judged(*arguments):
-        seen.extend(lib["num_threads"] for lib in threadpool_info() if lib["user_api"] == "blas")
-        return look(*arguments)
-
-    monkeypatch.setattr(fits, "judged", judged)
-    with threadpool_limits(2, user_api="blas"):
-        done = in_process("check", "project.toml", "--verbose", "--out", f"t{said}", cwd=folder)
-        steps = []
-        check(bf.read_project(folder / "project.toml"), progress=lambda *step: steps.append(step))
-    assert seen and set(seen) == {said or 1}
-    assert [step[:2] for step in steps] == [(0, 3), (1, 3), (2, 3)]
-    assert [len(re.findall(r"^\S+ .*: \d+\.\d\d s$", done.stderr, re.MULTILINE))] == [3]
 
 
 LAB = """

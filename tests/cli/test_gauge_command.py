@@ -199,17 +199,6 @@ def test_bad_input_is_one_line(strip, tmp_path, options, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_order_that_looks_unmeant_is_said(tmp_path):
-    files = sorted(map(str, write_frames(tmp_path / "frames", LOST)))
-    done = gauge(*files, *GAUGE, "--out", tmp_path / "out.csv", "--json")
-    result = json.loads(done.stdout)
-    assert "f10.csv before f2.csv" in done.stderr
-    assert "f10.csv before f2.csv" in " ".join(result["warnings"])
-    assert result["lost"] == ["f4.csv", "f7.csv"] and result["frames"] == 12
-    assert result["longest"]["strain"] == pytest.approx(0.165)
-    assert len(read_curve(tmp_path / "out.csv")) == 12
-
-
 #: Table A.1 of the thesis: radius, mm, and error, %, of a ball of 40.0 mm.
 TABLE_A1 = [(39.73, 0.67), (39.78, 0.54), (39.90, 0.23), (39.85, 0.38), (39.89, 0.28)]
 

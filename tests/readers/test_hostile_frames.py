@@ -420,51 +420,6 @@ def test_hdf5_members_and_sizes(tmp_path, monkeypatch):
     assert f"{path}: cannot be read as HDF5" in complaint(open_hdf5(path).__enter__)
 
 
-def test_matlab_7_3_by_class_and_by_depth(tmp_path, monkeypatch):
-    path = tmp_path / "a.mat"
-    with h5py.File(path, "w") as file:
-
-        def write(name: str, data, kind: str, **attributes):
-            file[name] = data
-            for key, value in {"MATLAB_class": np.bytes_(kind), **attributes}.items():
-                file[name].attrs[key] = value
-
-        write("grid", np.arange(6.0).reshape(3, 2), "double")
-        write("text", np.array([[97], [98], [0]], dtype="u2"), "char")
-        write("truth", np.array([[0, 1]], dtype="u1"), "logical")
-        write("none", np.zeros(2, dtype="u8"), "double", MATLAB_empty=1)
-        write("blank", np.zeros(2, dtype="u8"), "char", MATLAB_empty=1)
-        write("object", np.zeros((1, 6), dtype="u4"), "string", MATLAB_object_decode=3)
-        references = np.array([[file["grid"].ref, file["text"].ref]], dtype=h5py.ref_dtype)
-        write("cells", references, "cell")
-        file["inner/a"], file["inner/b"] = np.ones((1, 1)), np.zeros((1, 1))
-        file["deep" + 15 * "/g" + "/n"] = np.ones((1, 1))
-        # Cells within each other are as deep as structs are.
-        inner = file["grid"].ref
-        for k in range(17):
-            write(f"cell{k}", np.array([[inner]], dtype=h5py.ref_dtype), "cell")
-            inner = file[f"cell{k}"].ref
-    names = ["grid", "text", "truth", "none", "blank", "object", "cells", "inner", "deep", "x"]
-    found = mat_files._variables_73(path, names)
-    assert "x" not in found
-    assert found["grid"].tolist() == [[0, 2, 4], [1, 3, 5]]
-    assert (found["text"], found["blank"], found["object"]) == ("ab", "", None)
-    assert found["truth"].dtype == bool and found["truth"].tolist() == [[False], [True]]
-    assert found["none"].shape == (0, 0)
-    assert found["cells"][0].tolist() == found["grid"].tolist() and found["cells"][1] == "ab"
-    assert [sorted(one) for one in found["inner"]] == [["a", "b"]]
-    # Sixteen within each other, and no more.
-    with h5py.File(path, "a") as file:
-        file.move("deep", "top/deep")
-    assert len(mat_files._variables_73(path, ["cell15"])["cell15"]) == 1
-    for most, name in ((None, "cell16"), (None, "top"), (2, "cells"), (1, "cells")):
-        if most:
-            monkeypatch.setattr(mat_files, "MOST_PARTS", most)
-        assert "has too many parts" in complaint(mat_files._variables_73, path, [name])
-    monkeypatch.setattr(mat_files, "MOST_PARTS", 3)
-    assert len(mat_files._variables_73(path, ["cells"])["cells"]) == 2
-
-
 ZONE = "VARIABLES = x y z dx dy dz\nZONE {keys}\n1 2 3 4 5 6\n7 8 9 10 11 12\n"
 
 

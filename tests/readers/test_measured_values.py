@@ -1,13 +1,12 @@
 """Values that files tell: units, columns, names, flags; each at its limit, each complaint whole."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit.readers import tables
 from bubblefit.readers.bending import read_bending_curves
-from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
+from bubblefit.readers.curves import LoadCurve, split_at_restarts
 from bubblefit.readers.fields import DisplacementField, fit_surface, read_surfaces
 from bubblefit.readers.formats import dice
 from bubblefit.readers.frames import Frame, FrameOptions, read_frames
@@ -20,7 +19,6 @@ from bubblefit.readers.pressure_log import (
     check_pattern,
     choose_frames,
     find_offset,
-    given_offset,
     log_at,
     misfit_of,
     number_in_name,
@@ -175,16 +173,6 @@ def test_a_specimen_begins_where_the_elongation_falls_below_half():
     # Noise up to a hundredth of all is no elongation yet.
     assert split(0.1, -0.1, 0.1, 10) == [[0.1, -0.1, 0.1, 10]]
     assert split(0.11, -0.1, 0.1, 10) == [[0.11], [-0.1, 0.1, 10]]
-
-
-def test_the_source_says_which_columns_were_read(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("Crosshead (mm),Extension (mm),Load (N)\n0,0,1\n2,1,5\n")
-    for options in ({}, {"format": "text"}):
-        (one,) = read_load_curves(path, direction="warp", **options)
-        assert one.elongation.tolist() == [0.0, 1.0] and one.source.format == "text"
-        assert one.source.columns == {"elongation": "Extension (mm)", "load": "Load (N)"}
-        assert one.source.units == {"elongation": "mm", "load": "N"}
 
 
 def test_a_zero_by_the_first_four_readings(tmp_path):
@@ -493,19 +481,3 @@ def test_the_doubt_is_what_the_offsets_leave_open(noise):
 )
 def test_what_cannot_be_told_is_refused(change, words):
     assert words in complaint(find_offset, *recorded(offset=12.0, noise=5e-4, **change))
-
-
-def test_other_heights_and_an_offset_that_is_given():
-    times, heights, *log = recorded(steps, "flat", 12.0, 5e-4)
-    said = complaint(find_offset, times, np.roll(heights[::-1], 31), *log)
-    assert "at no offset does the sheet rise with the pressure" in said
-    times, log = np.arange(20.0), np.arange(0.0, 60.0, 0.5)
-    said = complaint(find_offset, times, times + 5.0, log, 0.3 * log / 60)
-    least, largest = (float(n) for n in re.findall(r"-?\d+\.\d\d", said)[:2])
-    assert said.startswith("offset: cannot be found: offsets from ") and least < 0 < 30 < largest
-    times, heights, *log = recorded(ramp, "flat", 12.0, 0.0)
-    found = given_offset(12.0, times, heights, *log)
-    np.testing.assert_allclose(found.pressure, ramp(times), atol=1e-12)
-    assert found.misfit is None and found.lower == found.upper == 12.0 and not found.doubt.any()
-    said = complaint(given_offset, 1e5, times, heights, *log)
-    assert "no frame lies within the log" in said and "from -48.00 to 331.80 s" in said

@@ -194,30 +194,6 @@ def test_the_quick_way_reads_what_the_slow_one_does(tmp_path, separator, number)
         assert _slow(Path("a"), found, COLUMNS, [(5, values)])[1].tolist() == good
 
 
-def test_what_the_quick_way_leaves_to_the_slow_one(tmp_path):
-    for hole in ("", "nan", "NaN", "NAN", "-nan(ind)", "1.#QNAN", "n. def.", "---"):
-        found = layout(tmp_path, ROWS.format(";", hole))
-        for read in (_quick(found, COLUMNS, []), _slow(Path("a"), found, COLUMNS, [])):
-            np.testing.assert_array_equal(read[0]["dx"], [3.0, np.nan], hole)
-    for text in (
-        # A cell too many or too few in one row; no numbers; a flag without a value.
-        ROWS.format(",", "8,5"), ROWS.format(" ", "8 8"), ROWS.format(" ", ""),
-        ROWS.format(";", '"8"'), ROWS.format(";", "x"), ROWS.format(";", "1e999"),
-        ROWS.format(";", "NA"), ROWS.format(",", "8").replace("10,0", "10,0,7"),
-        ROWS.format(";", "8").replace("10;0", "10;"),
-    ):  # fmt: skip
-        assert _quick(layout(tmp_path, text), COLUMNS, [(5, None)]) is None, text
-    # A separator at the end of every row is none.
-    text = ROWS.format(";", "8").replace("5;1\n", "5;1;\n").replace("10;0\n", "10;0;\n")
-    found = layout(tmp_path, text)
-    assert numbers(_quick, found, [(5, None)]) == ({"x": [1.0], "dx": [3.0]}, [True, False])
-    words = ["true", "False", "YES", "no", "valid", "Invalid"]
-    rows = "".join(f"{k},2,3,4,5,{word}\n" for k, word in enumerate(words))
-    found = layout(tmp_path, "x,y,dx,dy,dz,ok\n" + rows)
-    values, good = read_numbers(Path("a"), found, COLUMNS, [(5, None)])
-    assert good.tolist() == [True, False] * 3 and values["x"].tolist() == [0.0, 2.0, 4.0]
-
-
 def test_rows_of_another_length_name_their_line(tmp_path):
     def read(text: str, flags=()):
         return read_numbers(Path("a.csv"), layout(tmp_path, text), COLUMNS, flags)

@@ -7,7 +7,6 @@ import pytest
 from bubblefit.reports.content import Report, Section, Table, Words
 from bubblefit.reports.html import print_page, write_report
 from bubblefit.reports.maps import warp_arrow
-from bubblefit.reports.studies import plan_charts
 
 from .. import needs
 from ..browser import BROWSERS, browser
@@ -218,23 +217,3 @@ def test_a_pdf(page, tmp_path):
     needs.program(*BROWSERS, package="chromium")
     path = print_page(page, tmp_path / "report.pdf")
     assert path.read_bytes().startswith(b"%PDF") and path.stat().st_size > 10_000
-
-
-def test_names_in_place_of_numbers(opened, tmp_path):
-    names = ["none", "one & a name that is far too long", "three", "four", "five", "six"]
-    charts = plan_charts(names, {"E1": [1.0, 2, 3, 4, 5, 6]}, "Which next")
-    opened.requests.clear()
-    opened.open(write_report(tmp_path, Report("Plan", sections=[Section("Next", [charts])])))
-    whole = opened.run(TICKS)
-    assert all(name[:14] in whole for name in names)
-    for _ in range(2):
-        opened.press(".charts svg", "ArrowRight")
-    assert opened.run(SAID) == f"E1: test {names[1]}; 1 σ, % of the modulus 2"
-    opened.press(".charts svg", "+")
-    closer = opened.run(TICKS)
-    assert names[1] in closer and "six" not in closer
-    opened.press(".charts svg", "0")
-    assert opened.run(TICKS) == whole
-    opened.wait(CATCH)
-    tables = [text for text in opened.wait(TEXTS) if not text.startswith("<svg")]
-    assert tables[0].splitlines()[2] == f"E1,{names[1]},2,,"

@@ -28,8 +28,6 @@ def polar(angles):
 
 QUARTER, FULL = polar(np.linspace(0, np.pi / 2, 7)), polar(np.linspace(0, 2 * np.pi, 25)[:-1])
 PRESSURES, NAMES = np.array([0.022, 0.186, 0.3]), ["22 kPa", "186 kPa", "300 kPa"]
-TURN = np.linspace(0.0, 2 * np.pi, 37)
-EDGE = 100.0 * np.column_stack([np.cos(TURN), np.sin(TURN)])
 
 
 @pytest.mark.parametrize("points", [QUARTER, FULL], ids=["quarter", "full"])
@@ -87,52 +85,6 @@ def test_heights_are_drawn_against_each_other():
     assert [first[0].title, other[0].title] == ["R² = nan", "R² = -3.000"]
     assert first[1].y_label == "modelled − known, mm"
     assert [bubbles._below_one(r) for r in (0.999, 0.9991)] == ["0.999", "1 − 9.0e-04"]
-
-
-def sheet(count):
-    place = np.arange(count) + 0.5
-    r, t = 99.0 * np.sqrt(place / count), 2.4 * place
-    return np.column_stack([r * np.cos(t), r * np.sin(t)])
-
-
-def test_points_astray_do_not_make_the_ball_small():
-    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    points = np.column_stack([20 + 10 * np.cos(turn), 10 * np.sin(turn), 0 * turn])
-    points[4] = [600.0, 0.0, 0.0]
-    used, off = np.arange(40) != 4, np.linspace(-0.2, 0.1, 40)
-    balls = [("a: 10 mm", points, np.where(used, off, 580.0), used)]
-    (chart,) = bubbles.sphere_charts(balls).charts
-    assert axis_ends(chart)[0] == pytest.approx((9.0, 31.0), abs=0.1)
-    assert shown(chart) == ("x, mm", "y, mm", "a: 10 mm") and chart.equal
-    assert scale_ends(chart) == pytest.approx((-0.2, 0.2))
-    assert chart.series[0].values == pytest.approx(off[used], rel=1e-5)
-    assert lines(chart, "left out")[0].tolist() == [[600.0], [0.0]]
-    assert chart.scale == "beyond the sphere, mm"
-
-
-def test_pressures_and_heights_by_one_clock():
-    times = np.arange(5.0)
-    pressures, heights = np.array([0.0, 0.01, 0.02, 0.03, np.nan]), np.arange(5.0) ** 2
-    charts = bubbles.clock_charts(times, pressures, heights, np.array([0.02]))
-    check_charts(charts)
-    log, _, both = charts.charts
-    pairs = ((times, 1e3 * pressures), (times, heights), (1e3 * pressures, heights))
-    for chart, pair in zip(charts.charts, pairs, strict=True):
-        np.testing.assert_array_equal(data(chart)[0], pair)
-    assert lines(both, "taken")[0].tolist() == [[20.0], [4.0]] and named(both)["taken"].hollow
-    assert shown(log) == ("time by the log's clock, s", "pressure, kPa", "pressure of the log")
-    assert shown(both)[:2] == ("pressure, kPa", "height of the apex, mm")
-    places = np.vstack([sheet(400), EDGE[:-1]])
-    low = 0.02 * places[:, 0] - 0.5  # mm, from -2.5 to 1.5
-    charts = bubbles.disk_charts([("height, mm", places, low), ("none, mm", places, 0 * low)], EDGE)
-    check_charts(charts)
-    for chart, title, most in zip(charts.charts, ("height", "none"), (2.5, 1e-9), strict=True):
-        assert scale_ends(chart) == pytest.approx((-most, most)) and chart.equal
-        body = chart.series[0]
-        x = np.array(body.x, dtype=float).reshape(-1, 3).mean(axis=1)
-        wanted = 0.02 * x - 0.5 if most > 1 else 0 * x
-        np.testing.assert_allclose(body.values, wanted, atol=1e-4)
-        assert (*shown(chart), chart.scale) == ("x (warp), mm", "y (fill), mm", title, "mm")
 
 
 #: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
@@ -321,32 +273,6 @@ def test_loads_and_what_the_models_miss():
     other = strip(models=[("bubble", U, 95 * U)], rms=())
     drawn = load_charts("l", [strip(), other]).charts
     assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
-
-
-def test_without_a_polynomial_the_points_are_the_target():
-    low = load_charts("l", [strip(polynomial=None, rms=())]).charts[1]
-    (spots,) = lines(low, "Table 3.2")
-    assert spots[0] == pytest.approx([0, 1, 3, 5])
-    assert spots[1] == pytest.approx([0, 20.0, 0.0, np.nan], nan_ok=True)
-    alone = strip(polynomial=None, points=None, rms=())
-    (chart,) = load_charts("l", [alone]).charts
-    assert [s.name for s in chart.series] == ["Table 3.2", "bubble"]
-    assert len(load_charts("l", [strip(), alone]).charts) == 3
-    x = np.array([0.0, 1.0, 2.0])
-    warp = [(f"specimen {i}", x, (i + 1) * x) for i in range(8)]
-    left, right = strips.specimen_charts({"warp": warp, "fill": [("", x, 5 * x)]}).charts
-    for i, curve in enumerate(data(left)):
-        np.testing.assert_array_equal(curve, [x, (i + 1) * x])
-    assert [s.name for s in left.series] == [*(f"specimen {i}" for i in range(6)), "", ""]
-    assert len(right.series) == 1
-    assert shown(left) == ("elongation of the gauge, mm", "load, N", "warp")
-    for least in (
-        40.0,
-        -40.0,
-    ):  # the axis begins at no load, or below where a machine recorded less
-        pulled = strip(models=[], polynomial=None, points=([1.0, 2.0], [least, 200.0]), rms=())
-        low, high = axis_ends(load_charts("l", [pulled]).charts[0])[1]
-        assert (low == 0.0 if least > 0 else low < least) and high > 200.0
 
 
 def draw_strip(shear, grips=True):

@@ -1,6 +1,5 @@
 """The whole page of a fit: facts, tables, figures, warnings, files, each as reckoned here."""
 
-import importlib.util
 import pickle
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,13 +28,12 @@ from bubblefit.reports.fit_page import (
 from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of
-from bubblefit.runs.folder import versions, write_table
+from bubblefit.runs.folder import versions
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import COMPARED, TABLES, next_step, reaches
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 
-from ..complaints import complaint_with
 from ..cylinder_cases import FAILS, Banded, write_project, write_readings
 from ..places import ROOT
 from ..projects import ELONGATION, MODULI, small
@@ -317,22 +315,6 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
     assert said == ["1.2 %", "100 %", "998 %", "unknown", "unknown"]
 
 
-@pytest.mark.usefixtures("nothing_shown")
-def test_a_known_solution_with_the_band_of_noise(together, told, tmp_path, monkeypatch):
-    monkeypatch.setattr(type(together.setup.tests[0]), "known", together.law)
-    found = reported(together, tmp_path, monkeypatch)
-    _, curves, known, band, _ = told["moduli_charts"]
-    np.testing.assert_array_equal(known, curves[0])
-    assert band is not None
-    (charts,) = (part for part in found.parts if getattr(part, "name", "") == "moduli")
-    assert len(charts.charts) == 6  # the moduli, and their deviations from the known ones
-    for name, chart in zip(("E1", "E2", "G12"), charts.charts, strict=False):
-        best, ends = chart.series[0], together.best.certainty.band[name]
-        for k in (0, -1):
-            assert (best.lower[k], best.upper[k]) == pytest.approx(ends[:, k], rel=1e-5)
-        assert "known" in [series.name for series in chart.series]
-
-
 @pytest.fixture(autouse=True)
 def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Banded)
@@ -412,31 +394,6 @@ def test_every_table_is_written_and_read_back(together, tmp_path, table):
     if table in ("moduli", "residuals"):
         text = (ROOT / "docs/reference/files.md").read_text()
         assert [name for name in own if f"`{name}`" not in text] == []
-
-
-def test_parquet_is_written_by_pandas_as_it_is(together, tmp_path, monkeypatch):
-    asked = []
-
-    def to_parquet(table, path, **options):
-        asked.append((table, options))
-        path.write_bytes(b"PAR1")
-
-    path = tmp_path / "fit.parquet"
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    words = [f"{path}: ", "pip install 'bubblefit[parquet]'", "or write a .csv"]
-    complaint_with(words, write_table, pd.DataFrame({"a": [1]}), path)
-    for name in ("fit.xlsx", "fit"):
-        complaint_with([name, ".csv or .parquet"], together.write_table, tmp_path / name)
-    words = ["table: 'history' is not one of: residuals, moduli, coefficients, starts"]
-    complaint_with(words, together.write_table, tmp_path / "a.csv", "history")
-    assert list(tmp_path.iterdir()) == []
-    monkeypatch.setattr(pd.DataFrame, "to_parquet", to_parquet)
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name)
-    together.write_table(path, "moduli")
-    ((table, options),) = asked
-    assert path.read_bytes() == b"PAR1" and list(tmp_path.iterdir()) == [path]
-    pd.testing.assert_frame_equal(table, together.moduli())
-    assert options == {"engine": "pyarrow", "index": False}
 
 
 LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)

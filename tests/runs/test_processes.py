@@ -29,7 +29,7 @@ from bubblefit.runs import executor as cluster
 from bubblefit.runs.executor import Executor, executor_of, run_tasks
 from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers import licences
-from bubblefit.solvers.base import Announcement, announce, hearing
+from bubblefit.solvers.base import Announcement, hearing
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.process import check, run_process
 from bubblefit.solvers.scratch import run_folder
@@ -204,24 +204,6 @@ def test_the_processes_end_when_the_reader_stops():
         assert not multiprocessing.active_children()
 
 
-def test_a_process_told_to_end_at_its_very_end_does_not_go_on_as_its_parent(monkeypatch, tmp_path):
-    parent, leave = os.getpid(), os._exit
-
-    def told_to_end(status):
-        os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(0.1)
-        leave(status)
-
-    monkeypatch.setattr(os, "_exit", told_to_end)
-    try:
-        assert list(filter(None, run_tasks(lambda: lambda number, tell: 10 * number, [1, 2], 2)))
-    finally:
-        if os.getpid() != parent:
-            (tmp_path / "went on").touch()
-            leave(0)
-    assert not list(tmp_path.iterdir())
-
-
 #: The workers do not have the tests: their functions travel with what they are.
 for module in (sys.modules[__name__], counted_program):
     cloudpickle.register_pickle_by_value(module)
@@ -254,21 +236,6 @@ def test_a_fit_on_a_cluster_is_the_fit_here(scheduler, together, strips_project,
     assert fitted.law.beta.tolist() == together.law.beta.tolist()
     table, here = (fit.starts().drop(columns="seconds") for fit in (fitted, together))
     assert table.to_csv() == here.to_csv()
-
-
-def test_what_a_task_tells_comes_once_and_before_its_end(scheduler):
-    def task(number, tell):
-        for k in range(2):
-            tell((number, k))
-        return announce("waiting", f"run {number}") or time.sleep(0.1) or number
-
-    heard = []
-    with hearing(heard.append):
-        records = tasks(scheduler, always(task), 5)
-    assert len(records) == 15 and Announcement("waiting", "run 0") in heard
-    for number in range(5):
-        at = records.index((number, 0))
-        assert records[at : at + 3] == [(number, 0), (number, 1), number]
 
 
 def test_no_more_at_once_than_asked_for(scheduler, tmp_path):

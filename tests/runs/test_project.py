@@ -274,32 +274,9 @@ def place(folder=Path(), **scales):
     return Place(folder / "p.toml", "", fabric, Scales(**scales))
 
 
-def table(**said):
-    return CardSection.model_validate({"name": "mine", "beta": [0, 0, 0, 0.5] * 3, **said})
-
-
 def filed(folder, name="soft", file="c.toml"):
     write_card(MaterialCard(LAW, 0.7, name, "a fit"), folder / file)
     return folder / file
-
-
-def test_what_a_table_says_in_units_of_the_file_and_leaves_out():
-    (found,) = read_cards(place(), [table()]).values()
-    card = found.card
-    assert (card.name, card.thickness, card.source, found.test) == ("mine", 0.8, "", None)
-    assert (card.law.nu12, card.law.thickness_change) == (0.24, "incompressible")
-    assert card.law.form.name == "cubic" and card.law.beta[3] == 500.0
-    assert len(card.law.strain_range) == 3 and min(card.law.strain_range) > 1e6
-    said = table(
-        form="constant", beta=CONSTANT, nu12=0.0, thickness=0.001, thickness_change="constant",
-        strain_range=[0.1, 0.2, 0.3], test="strips",
-    )  # fmt: skip
-    cards = read_cards(place(modulus=1e-6, length=1000.0), [said, table(name="other")])
-    assert list(cards) == ["mine", "other"] and cards["mine"].test == "strips"
-    card = cards["mine"].card
-    assert card.law.beta[[3, 7, 11]] == pytest.approx(1e-6 * np.array([0.02, 0.2, 0.5]))
-    assert (card.thickness, card.law.nu12, card.law.thickness_change) == (1.0, 0.0, "constant")
-    assert card.law.strain_range.tolist() == [0.1, 0.2, 0.3]
 
 
 def test_a_card_of_a_file_keeps_what_the_file_says(tmp_path):

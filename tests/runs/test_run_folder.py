@@ -19,9 +19,6 @@ from bubblefit.files import json_text
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import curve_reading, inflated_cylinder
-from bubblefit.project.project import (
-    section_as_run,
-)
 from bubblefit.project.schema import usual_folder
 from bubblefit.reports.content import Report
 from bubblefit.reports.study_pages import write_folder
@@ -32,7 +29,6 @@ from bubblefit.runs.starts import HISTORY, STARTS, EvaluationRecord, RunningFile
 from bubblefit.solvers.base import SNAP
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.registry import solver_named
-from bubblefit.solvers.run_cache import digest_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -186,17 +182,6 @@ def test_the_solver_s_options_are_part_of_it(tmp_path):
     assert words[0] == words[1] != words[2]
     (tmp_path / "cylinder.inp.j2").write_text("*HEADING\nanother")
     assert CalculixSolver(ccx="ccx", templates=tmp_path).identity not in words
-
-
-def test_digests_tell_things_apart_by_what_they_hold():
-    things = [
-        1, 1.0, True, "1", None, [1], [1, 2], [[1], 2], [1, [2]], {"a": 1}, {"a": 2}, {"b": 1},
-        np.array([1.0]), np.array([[1.0]]), np.array([1]), ["ab", "c"], ["a", "bc"],
-    ]  # fmt: skip
-    assert len({digest_of(thing) for thing in things}) == len(things)
-    assert digest_of({"a": 1, "b": 2}) == digest_of({"b": 2, "a": 1})
-    with pytest.raises(TypeError, match="object"):
-        digest_of(object())
 
 
 COLUMNS = ["beta_3_GPa", "beta_7_GPa", "beta_11_GPa"]
@@ -430,23 +415,6 @@ def test_whichever_write_is_the_last_the_end_is_the_same(strips_project, tmp_pat
             assert "cannot be written" in str(ended.value)
         assert fitted(out, resume=Store(out).used) == whole, (number, name)
         assert not [path for path in out.rglob(".*") if path.is_file()]
-
-
-@pytest.mark.parametrize("told", [None, "other"])
-def test_the_folder_of_a_section_is_in_full(tmp_path, told):
-    for name in ("lab/a.csv", "other/a.csv", "beside.csv", "a.csv"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text("")
-    points = {"folder": "lab", "files": ["a.csv", "beside.csv", "none.csv", "plain"], "left": None,
-              "pressure": {"log": {"file": "beside.csv"}}}  # fmt: skip
-    said = {"radius": 5.0, "data": {"points": points}}
-    folder = None if told is None else tmp_path / told
-    found = section_as_run(said, "first", "data.points.folder", tmp_path, folder)
-    beside = str(tmp_path / "beside.csv")
-    whole = {"folder": str(tmp_path / (told or "lab")), "pressure": {"log": {"file": beside}},
-             "files": ["a.csv", beside, "none.csv", "plain"]}  # fmt: skip
-    assert found == {"radius": 5.0, "name": "first", "data": {"points": whole}}
-    assert said["data"]["points"]["folder"] == "lab"
 
 
 def test_a_folder_far_below_is_made(tmp_path):

@@ -153,18 +153,6 @@ def test_from_the_optimum_of_the_coarse_mesh(monkeypatch):
     assert StartRecord.from_json(record.to_json()) == record
 
 
-def test_a_record_of_an_older_version():
-    record = StartRecord(1, (7, 1), 0.5, "ok", 3, (1.0,), (2.0,), 0.25)
-    said = record.to_json()
-    later = {"external_runs": 0, "failure": "", "reached": (), "mesh": "full", "cached_runs": 0,
-             "coarse_objective": None, "coarse_analyses": 0, "same_as": None}  # fmt: skip
-    assert {name: said.pop(name) for name in later} == later
-    assert StartRecord.from_json(said) == record
-    for key in said:
-        with pytest.raises(KeyError):
-            StartRecord.from_json({k: v for k, v in said.items() if k != key})
-
-
 STARTS = 3
 
 
@@ -263,23 +251,6 @@ def test_the_same_data_on_larger_quads(fitted):
     assert point is not None and point.jacobian.shape == (len(full.scale), 3)
     off = np.abs(point.residual * full.scale)
     assert 1e-3 < off.max() < 2.0  # mm, of an apex of 20 mm
-
-
-def test_strips_coarsen_and_refine_too(strips):
-    quads = strips.coarse_to_fine.quads
-    assert set(quads) == {"one: warp", "one: fill", "two: warp"}
-    assert all(coarse < full for coarse, full in quads.values())
-    # Straight strips are homogeneous: their optimum is that of any mesh.
-    for record in strips.best.records:
-        assert record.objective == pytest.approx(record.coarse_objective, rel=1e-6)
-    prepared = strips.setup.tests[0]
-    own = prepared.comparisons(strips.setup.make_solver, Weighting())
-    finer = prepared.finer(strips.setup.make_solver, Weighting(), 2.0)
-    for coarse, fine in zip(own, finer, strict=True):
-        assert len(fine.model.mesh.quads) == 4 * len(coarse.model.mesh.quads)
-        assert fine.model.elongations == coarse.model.elongations
-        assert fine.name == coarse.name
-    assert all(np.abs(off).max() < 1e-6 for off in strips.best.certainty.mesh.values())
 
 
 def ended(fit, number, value, moduli=(80.0, 400.0, 800.0)):

@@ -16,10 +16,6 @@ from bubblefit.errors import LicenceDenied
 from bubblefit.solvers import licences
 from bubblefit.solvers.base import (
     Announcement,
-    BandedSolver,
-    DifferentiatingSolver,
-    ProgramSolver,
-    Solver,
     hearing,
 )
 from bubblefit.solvers.licences import LicensedSolver, held, locked, patiently
@@ -245,47 +241,6 @@ class THING:
     def run(self, model, law, scratch=None, timeout=None): pass
     def check(self): pass
 """
-
-
-def test_a_solver_stays_what_it_is(tmp_path):
-    own = CountedSolver(tmp_path)
-    assert licensed(own, LicenceSettings(licence_denied=["no"])) is own
-    assert licensed(own, LicenceSettings(licence_wait=1.0)) is not own
-    inner = solver_named("membrane")
-    assert licensed(inner, LicenceSettings(licences=1)) is inner  # it needs none
-    plain = licensed(own, LicenceSettings(licences=1))
-    assert isinstance(plain, Solver) and (plain.name, plain.external) == ("counted", True)
-    assert (plain.identity, plain.check()) == (own.identity, own.check())
-    assert not isinstance(plain, DifferentiatingSolver | BandedSolver)
-    plain.progress = print
-    assert own.progress is print
-
-    class Able(CountedSolver):
-        def run_with_sensitivity(self, model, law, parameters=None):
-            return model, parameters
-
-        programs = (Path("/opt/acme"),)
-        keep = load_ratios = True
-
-        def band(self, model):
-            return (model,)
-
-    able = licensed(Able(tmp_path), settings(tmp_path))
-    assert isinstance(able, DifferentiatingSolver) and isinstance(able, BandedSolver)
-    assert able.run_with_sensitivity(3, LAW, ("nu12",)) == (3, ("nu12",))
-    assert able.band(4) == [4]
-    # What a cache of runs asks.
-    assert isinstance(able, ProgramSolver) and able.programs == (Path("/opt/acme"),)
-    assert able.keep and able.load_ratios and not plain.load_ratios
-    assert not plain.keep and not isinstance(plain, ProgramSolver)
-    assert type(able).__module__ == __name__
-
-    class Able(CountedSolver):
-        def run_with_sensitivity(self, *_):
-            return licences._any(tmp_path / "locks", "counted", 1)
-
-    able = licensed(Able(tmp_path), settings(tmp_path, 1))
-    assert able.run_with_sensitivity(3, LAW) is None
 
 
 def test_every_external_solver_has_the_keys(packages, tmp_path):

@@ -178,16 +178,6 @@ class THING:
 FINE = "return SolverCheck('acme', True, '9', True)"
 
 
-def test_our_own_names_stay_ours(packages, monkeypatch):
-    install(packages, "membrane", "raise RuntimeError", group=GROUP)
-    assert isinstance(solver_named("membrane"), MembraneSolver)
-    monkeypatch.setattr(DIAGNOSE, lambda named: [])
-    done = CliRunner().invoke(main, ["doctor"])
-    assert done.exit_code == 0
-    assert "membrane    NOT USABLE  plug-in of acme-things 2.5" in done.output
-    assert "is bubblefit's own: the plug-in needs another name" in done.output
-
-
 CHECKS = {
     "raises": ("raise OSError('no such host')", "...", "fails its check (OSError: no such host)"),
     "failure": ("from bubblefit.errors import SolverFailure; raise SolverFailure('no licence')",

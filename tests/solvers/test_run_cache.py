@@ -19,9 +19,6 @@ from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import (
     SNAP,
-    BandedSolver,
-    BandEnd,
-    DifferentiatingSolver,
     History,
     Solver,
     SolverCheck,
@@ -364,32 +361,6 @@ def test_runs_that_are_not_kept(cache):
         once.run(MODEL, LAW)
     assert cache.entries() == []
     assert once.run(MODEL, LAW).load == 2.0 and once.run(MODEL, LAW).from_cache
-
-
-def test_which_solvers_have_none_and_a_band_stays_one(cache):
-
-    class Sloped(Counting):
-        def run_with_sensitivity(self, model, law, parameters=None, guess=None):
-            raise AssertionError
-
-    class Here(Counting):
-        external = False
-
-    kept = Counting()
-    kept.keep = True
-    for solver in (Sloped(), Here(), kept):
-        assert with_cache(solver, cache, {}) is solver
-    assert isinstance(Sloped(), DifferentiatingSolver)
-    membrane = registry.solver_named("membrane", cache)
-    assert isinstance(membrane, DifferentiatingSolver)
-
-    class Banded(Counting):
-        def band(self, model):
-            return (BandEnd("stiff", "", {}),)
-
-    assert not isinstance(with_cache(Counting(), cache, {}), BandedSolver)
-    banded = with_cache(Banded(), cache, {})
-    assert isinstance(banded, BandedSolver) and banded.band(MODEL)[0].name == "stiff"
 
 
 def options_of(name, **given):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from bubblefit.errors import OutputError, SolverFailure
 from bubblefit.solvers import process, scratch
-from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep, sweep_left
+from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep
 
 from .. import needs
 
@@ -152,19 +152,6 @@ def test_whose_is_swept(tmp_path, monkeypatch):
     clear(folder)
     assert [path.name for path in folder.iterdir() if path.is_file()] == [OWNER]
     os.close(lock)
-
-
-def test_the_usual_places_are_swept(tmp_path, monkeypatch):
-    monkeypatch.setattr(scratch, "MEMORY", tmp_path / "memory")
-    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path / "disk"))
-    folders = []
-    for name in ("memory", "disk", "own"):
-        (tmp_path / name).mkdir()
-        folders.append(left(tmp_path / name, process="999999999"))
-    sweep_left()
-    assert [folder.exists() for folder in folders] == [False, False, True]
-    sweep_left(tmp_path / "own")
-    assert not folders[2].exists()
 
 
 def test_failed_runs_leave_memory(monkeypatch, tmp_path):

@@ -238,30 +238,6 @@ def test_a_second_term_makes_the_order_move_and_is_said():
     assert settled.order == pytest.approx(2.0, abs=0.01) and settled.remark == ""
 
 
-@pytest.mark.parametrize(
-    ("values", "noise", "found"),
-    [
-        # One order exactly, then twice: the order one level coarser is known.
-        ([8.0, 4.0, 2.0, 1.0], 0.0, (1.0, 0.0, 1.0, "")),
-        ([40.64, 40.16, 40.04, 40.01], 0.0, (2.0, 40.0, 2.0, "")),
-        ([1.0 + 2**1.4 + 2, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, 1.4, "")),
-        ([1.0 + 2**1.6 + 2, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, 1.6, "still moves (from 1.6)")),
-        # What the coarser levels change is the solver's: only one order is known.
-        ([3.0, 3.0, 2.0, 1.5], 0.0, (1.0, 1.0, None, "one order only, a level coarser")),
-        ([7.0, 3.0, 2.0, 1.5], 0.08, (None, None, None, "accuracy of the solver")),
-        ([3.0, 2.0, 1.5], 0.0, (1.0, 1.0, None, "one order only: one more")),
-        # Below an order of a half there is no limit.
-        ([0.0, 2**0.49, 2**0.49 + 1.0], 0.0, (None, None, None, "order 0.49")),
-    ],
-)
-def test_everything_of_a_sequence(values, noise, found):
-    seen = convergence([2.0**-k for k in range(len(values))], values, noise)
-    order, limit, previous, words = found
-    for name, wanted in (("order", order), ("limit", limit), ("previous", previous)):
-        assert getattr(seen, name) == pytest.approx(wanted, abs=1e-8), name
-    assert words in seen.remark and bool(words) == bool(seen.remark)
-
-
 def test_noise_is_a_share_of_the_largest_value():
     """Of 40 here, at the coarsest level: 0.5 are changed by the last step; in any unit."""
     for noise, unit in product((0.0125, 0.0124), (1.0, 1e-3)):

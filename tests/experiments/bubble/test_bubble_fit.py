@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy.sparse as sp
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import prepared as preparation
 from bubblefit.experiments.bubble import report
@@ -95,19 +95,6 @@ def test_one_card(tmp_path, monkeypatch):
     assert (tmp_path / "bubble.pvd").exists()
 
 
-def test_several_cards_one_of_which_fails(tmp_path, monkeypatch):
-    drawn = caught(monkeypatch, report, "bubbles.cut_charts")
-    broken = SolverFailure("no equilibrium", "membrane")
-    said = simulated(tmp_path, "any but a flat one", broken=broken, soft=history())
-    assert list(said.numbers) == ["cards"]
-    assert said.numbers["cards"]["broken"] == {"failed": "no equilibrium"}
-    assert len(said.lines) == 5 and said.lines[0] == "broken: failed: no equilibrium"
-    assert said.lines[1] == "soft:" and said.lines[4].startswith("note: ")
-    files = {path.name for path in tmp_path.iterdir()}
-    assert files == {"displacement-2.csv", "bubble-2.pvd", "bubble-2-vtu"}
-    assert drawn[0][0] == tmp_path / "profiles-2.png"
-
-
 def test_what_a_study_looks_at():
     assert quantities(MODEL, history()) == pytest.approx(
         {"apex at 22 kPa, mm": 10.0, "apex at 300 kPa, mm": 30.0,
@@ -148,20 +135,6 @@ def test_what_cannot_be_read_or_registered_names_its_key(monkeypatch, stage, err
     monkeypatch.setattr(preparation, "read_fields", lambda *_, **__: ())
     monkeypatch.setattr(preparation, stage, failing)
     assert complaint(preparation._measured, made(), files).startswith(f"{expected}: ")
-
-
-def test_surfaces_that_are_only_reported_can_be_left_out():
-    def fields(count):
-        at = np.random.default_rng(1).uniform(0, 50, (count, 2))
-        return (DisplacementField(0.1, at, np.ones((count, 3))),)
-
-    for by in ("surfaces", "points"):
-        (found,) = preparation._surfaces(made(by), fields(20), computed=False)
-        assert found.degree == 2
-    assert preparation._surfaces(made("points"), fields(8), computed=False) == ()
-    # A computed quarter is mirrored first.
-    assert len(preparation._surfaces(made("points"), fields(8), computed=True)) == 1
-    assert "match.degree" in complaint(preparation._surfaces, made(), fields(8), computed=False)
 
 
 @pytest.mark.parametrize(

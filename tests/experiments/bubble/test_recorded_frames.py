@@ -13,8 +13,7 @@ from bubblefit.experiments.kinds import Output
 from bubblefit.project.project import read_project
 from bubblefit.readers.pressure_log import picture_numbers
 
-from ...complaints import complaint, complaint_with
-from ...dic_exports import pyaldic
+from ...complaints import complaint_with
 
 #: kPa, a picture each; the last is of the release.
 LEVELS = np.array([0.0, 0, 0, 10, 10, 10, 21, 21, 21, 33, 33, 33, 60, 60, 60, 12, 12.0])
@@ -198,31 +197,6 @@ def test_one_table_of_all_frames(folder, tmp_path):
         assert [len(field.points) for field in fields] == [81] * 3
         rises = [field.displacement[40, 2] for field in fields]
         assert rises == pytest.approx([40 * (p / 60) ** (1 / 3) for p in (10, 21, 60)], abs=0.1)
-
-
-def test_one_file_with_all_frames(folder, tmp_path):
-    (tmp_path / "data").mkdir()
-    shutil.copy(folder / "data" / "valve.csv", tmp_path / "data")
-    home = folder / "data" / "frames"
-    files = [home / f"p{k}_{level:g}kPa.csv" for k, level in enumerate(LEVELS, 1)]
-    tables = [np.loadtxt(file, delimiter=",", skiprows=1) for file in files]
-    frames = [(np.column_stack([t[:, :2], 0 * t[:, 0]]), t[:, 2:5]) for t in tables[1:]]
-    (path,) = pyaldic(tmp_path / "data", frames)
-    named = f'files = ["{path.name}"]\nfolder = "data"'
-    test = bubble(project(tmp_path, LOG.format(more=""), "[10, 60]", named))
-    taken = test.data.recorded
-    # Of the frame at rest that the format adds, and of the 16 of the film.
-    assert taken.count == 17 and taken.clock.offset == pytest.approx(AHEAD, abs=1.0)
-    assert taken.names[0].startswith(f"{path.name}, frame ")
-    low, high = prepare(test, None, None).fields
-    assert [low.pressure, high.pressure] == list(test.pressures)
-    number = [int(name.split()[-1]) - 1 for name in taken.names]
-    assert LEVELS[number] == pytest.approx([10, 60])
-    np.testing.assert_allclose(high.displacement, tables[number[1]][:, 2:5], atol=1e-9)
-    path.rename(tmp_path / "data" / "all_60kPa.npz")
-    section = "[bubble.data.points.pressure]\nfrom_name = true\n"
-    test = bubble(project(tmp_path, section, "", named.replace(path.name, "all_60kPa.npz")))
-    assert "one frame for each of 1 pressures, found 17" in complaint(prepare, test, None, None)
 
 
 def test_a_simulation_needs_no_frames(tmp_path):

@@ -100,23 +100,6 @@ def test_numbers_for_result_json():
     assert (neither.buckling_is, neither.buckling) == ("none", None)
 
 
-def test_a_row_of_the_table_of_runs():
-    outcome = outcome_of(run(case("a"), "soft"), measures={0: MEASURES})
-    row = outcome.columns(0)
-    assert row == {
-        "stiffness_N_per_mm": 4.256,
-        "knee_mm": 61.0, "knee_N": 251.0, "limit_mm": 120.0, "limit_N": 502.6,
-        "wrinkles_mm": 33.0, "wrinkles_N": 140.0,
-        "load_at_20_mm_N": 86.4, "load_at_a_long_way_N": None,
-        "inflation_warp_strain": 0.011, "inflation_fill_strain": 0.022,
-        "pressure_rise_kPa": 1.6,
-        "rms_N": 3.1, "rms_relative": 0.0519, "mean_error_N": -1.2, "compared": 17,
-        "reached_mm": 150.0,
-    }  # fmt: skip
-    failed = outcome_of(run(case("a"), "soft", failure="killed")).columns(0)
-    assert list(failed) == list(row) and set(failed.values()) == {None}
-
-
 def test_curves_and_readings():
     """Lists of rows as they go into load_deflection.csv and measured.csv."""
     way = np.array([0.0, 30.0])
@@ -222,18 +205,6 @@ def test_every_cell(tmp_path, undrawn):
     assert measured["mean_N"].max() == pytest.approx(100.0, rel=0.02)
     assert measured["standard_deviation_N"].abs().max() < 1e-9
     assert [test.name for test in report.tests_of(outcome)] == ["150/90", "the wide one"]
-
-
-def test_without_readings_there_is_nothing_to_compare(tmp_path, undrawn):
-    plain = outcome_of(
-        run(case("a"), "soft"), run(case("b", size=20.0, length=1e3), "soft"),
-        bent={0: BENT, 1: BENT}, measures={i: replace(MEASURES, error=None) for i in (0, 1)},
-    )  # fmt: skip
-    shown = report.show_outcome(plain, Output(tmp_path))
-    assert [name for name, _ in shown.files] == ["load_deflection.csv", "b.vtu"]
-    assert [table.title for table in shown.tables] == ["Runs"]
-    assert shown.facts == [("span, mm", 2000.0), ("seam width, mm", 35.0)]  # what all share
-    assert plain.error(0) is None and plain.ended(1) == "finished"
 
 
 # Figures

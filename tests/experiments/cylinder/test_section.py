@@ -15,7 +15,7 @@ from bubblefit.solvers.calculix import cylinder as calculix_cylinder
 from bubblefit.solvers.marc import cylinder as marc_cylinder
 
 from ...complaints import complaint_with
-from ...cylinder_cases import write_project, write_readings
+from ...cylinder_cases import write_project
 from ...places import EXAMPLES
 from ...projects import changed
 
@@ -66,23 +66,6 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
         law = card.card.law
         for modulus, column in (("E1", 0), ("E2", 1), ("G12", 2)):
             assert law.modulus(modulus, np.linspace(0, law.strain_range[column], 500)).min() > 0
-
-
-def test_a_cylinder_says_its_own(tmp_path):
-    write_readings(tmp_path / "a.csv")
-    first = """length = 2500
-span = 1800
-collar = { inner_diameter = 200, length = 100, fillet = 5 }
-deflections = [5, 10]
-gas = { ambient = 95 }
-measured.files = ["a.csv"]"""
-    one, other = cylinders(write_project(tmp_path, first))
-    assert (one.length, one.supports.span, one.deflections) == (2500.0, 1800.0, (5.0, 10.0))
-    assert (one.collar.inner_diameter, one.collar.length, one.collar.fillet) == (200, 100, 5)
-    assert one.gas.ambient == pytest.approx(0.095) and other.gas.ambient == 0.101
-    assert [c.repetition for c in one.measured] == ["a 1", "a 2"]
-    assert (other.length, len(other.deflections), other.name) == (3000.0, 24, "high")
-    assert one.model(0.5).thickness.min() == 0.5
 
 
 def test_where_a_curve_is_read_follows_the_diameter(tmp_path):

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, FittedTest, Output, Weighting
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
@@ -362,53 +361,6 @@ def simulated(folder, outcomes, within: bool = False):
     cards: Any = {name: SimpleNamespace(law=law) for name, _ in outcomes}
     runs = {key: CardRun(MODEL, outcome) for key, outcome in outcomes.items()}
     return report.simulate(test, cards, runs, Output(folder), within)
-
-
-def test_cards_side_by_side(tmp_path, drawn):
-    """The polynomial says 220 and 440 N at 2 and 4 mm."""
-    found = simulated(tmp_path, {
-        ("soft", "warp"): history(223.0, 436.0), ("soft", "bias"): history(10.0, 20.0, shear=0.3),
-        ("hard", "warp"): SolverFailure("no equilibrium", "membrane"),
-        ("hard", "bias"): history(11.0, 21.5),
-    })  # fmt: skip
-    warp = {
-        "rms_N": pytest.approx(RMS), "end_load_N": 436.0, "shown_to_mm": 4.0,
-        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.0},
-    }  # fmt: skip
-    bias = {
-        "rms_N": None, "end_load_N": 20.0, "shown_to_mm": 4.0,
-        "strain_reached": {"warp": 0.1, "fill": 0.02, "shear": 0.3},
-    }  # fmt: skip
-    cards = found.numbers["cards"]
-    assert cards["soft"] == {"e_uniaxial_N": None, "directions": {"warp": warp, "bias": bias}}
-    assert cards["hard"]["directions"]["warp"] == {"failed": "no equilibrium"}
-    assert found.lines == [
-        "soft: RMS warp 3.536 N to 4 mm, bias 20 N at the end",
-        "hard: RMS warp failed, bias 21.5 N at the end",
-    ]
-    assert [name for name, _ in found.figures] == ["loads.png"]
-    table = pd.read_csv(tmp_path / "loads.csv")
-    assert list(table.columns) == ["card", "direction", "elongation_mm", "load_N"]
-    assert table.to_numpy().tolist() == [
-        ["soft", "warp", 2.0, 223.0], ["soft", "warp", 4.0, 436.0],
-        ["soft", "bias", 2.0, 10.0], ["soft", "bias", 4.0, 20.0],
-        ["hard", "bias", 2.0, 11.0], ["hard", "bias", 4.0, 21.5],
-    ]  # fmt: skip
-    ((path, _, (first, second)),) = drawn["loads"]
-    assert path == tmp_path / "loads.png"
-    assert [(name, load.tolist()) for name, _, load in first.models] == [("soft", [223.0, 436.0])]
-    assert list(first.rms) == pytest.approx([RMS]) and list(second.rms) == []
-    assert [name for name, *_ in second.models] == ["soft", "hard"]
-    assert [call[2].name for call in drawn["bias"]] == ["bias-1.png", "bias-2.png"]
-    assert [call[3].name for call in drawn["bias"]] == ["bias-1.vtu", "bias-2.vtu"]
-
-
-def test_one_card_has_a_sum_and_files_without_a_number(tmp_path, drawn):
-    found = simulated(tmp_path, {("soft", "warp"): history(223.0, 436.0)})
-    assert found.numbers["cards"]["soft"]["e_uniaxial_N"] == pytest.approx(RMS)
-    assert found.lines == ["soft: RMS warp 3.536 N to 4 mm; sum 3.536 N"]
-    simulated(tmp_path, {("soft", "bias"): history(10.0, 20.0)})
-    assert drawn["bias"][0][2].name == "bias.png"
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (
     ABOVE,
-    BentCylinder,
     GasCurve,
     bending_context,
     bending_history,
@@ -247,24 +246,6 @@ def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path)
         np.testing.assert_array_equal(found.volume, whole.volume[: len(found.volume)])
     with pytest.raises(SolverFailure, match="before the first reported deflection"):
         bending_history(replace(model, deflections=[9.0], increments=()), whole, gas)
-
-
-def test_frames_between_increments_lie_on_a_smooth_curve():
-    model = case(60.0)
-    x = np.array([0.0, 1.0, 2.2, 4.0, 5.0, 7.0, 9.0])
-    model = replace(model, deflections=[0.5, 3.0, 6.0], increments=())
-    force = np.stack([0 * x, -(3 * x - 0.1 * x**2), 0 * x], axis=1)
-    shape = x[:, None, None] * np.ones((1, len(model.mesh.points), 3))
-    bent = BentCylinder(x, shape, {"collar": force, "supports": -force}, 1e7 - x**2, 0, False)
-    gas = GasCurve(x, 0.14 + 1e-3 * x)
-    history = bending_history(model, bent, gas)
-    d = np.array([0.0, *model.deflections])
-    # Slopes of a parabola are exact inside, of first order at the ends.
-    np.testing.assert_allclose(history.load[2:], (3 * d - 0.1 * d**2)[2:], rtol=1e-12)
-    np.testing.assert_allclose(history.load, 3 * d - 0.1 * d**2, atol=0.02)
-    np.testing.assert_allclose(history.displacement[:, 0, 0], d, rtol=1e-12)
-    np.testing.assert_allclose(history.cavity_pressure, 0.14 + 1e-3 * d, rtol=1e-12)
-    np.testing.assert_array_equal(history.reactions["collar"], -history.reactions["supports"])
 
 
 def test_the_gas_settles_in_two_passes_on_a_compliant_volume():
