@@ -153,7 +153,7 @@ def _copy(folder: Path, example: str) -> None:
         raise OutputError(
             f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
         ) from None
-    click.echo(f"wrote {', '.join(f.name for f in files)} to {folder}")
+    click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
     click.echo(f"next: {advice.format(folder / project)}")
 
 

@@ -34,7 +34,7 @@ def test_the_command_writes_it(tmp_path):
 def test_every_example_brings_the_schema(tmp_path):
     for example in KINDS:
         folder = tmp_path / example
-        in_process("init", folder, "--example", example, cwd=tmp_path)
+        in_process("init", example, "--example", example, cwd=tmp_path)
         for path in folder.glob("*.toml"):
             assert path.read_text().startswith("#:schema project.schema.json\n")
         assert (folder / SHIPPED.name).read_text() == SHIPPED.read_text()

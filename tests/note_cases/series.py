@@ -42,8 +42,9 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
     """A project of one bar; what its solver `says` and `fails` at."""
     solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
     solver.says = says or solver.says
+    patch.setattr("bubblefit.project.project.kinds", lambda: known)
     for module in ("runs.simulation", "project.project"):
-        patch.setattr(f"bubblefit.{module}.kinds", lambda: known)
+        patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
     reports = experiments.report_of
     patch.setattr(
         "bubblefit.runs.simulation.report_of",

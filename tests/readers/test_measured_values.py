@@ -38,8 +38,10 @@ def test_units_of_columns_are_those_of_si():
         "bar": 1e5, "MPa": 1e6,
     }  # fmt: skip
     assert {k: 1e6 * v for k, v in tables.PRESSURE_UNITS.items()} == pytest.approx(pascal)
-    lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "um": 1e-3, "\u00b5m": 1e-3}
-    assert pytest.approx(lengths | {"\u03bcm": 1e-3}) == tables.LENGTH_UNITS
+    lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8, "um": 1e-3}
+    assert (
+        pytest.approx(lengths | dict.fromkeys(("\u00b5m", "\u03bcm"), 1e-3)) == tables.LENGTH_UNITS
+    )
     pond, pound = 9.80665e-3, 0.45359237 * 9.80665
     loads = {"N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "gf": pond, "lbf": pound}
     assert pytest.approx(loads | {"kgf": 1e3 * pond, "kp": 1e3 * pond}) == tables.LOAD_UNITS
