@@ -21,7 +21,9 @@ API = HERE / "reference" / "api"
 PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "fits": (
         "Projects, fits, predictions",
-        ("project.project:read_project,Project",
+        ("project.objects:Bubble,Strips,Biaxial,Cylinder,Sheet,Registration,Law",
+         "project.measured:read,register,Registered",
+         "project.project:read_project,Project",
          "project.objects:Bubble,Strips,Law,Sheet,Registration", "runs.fit:fit,check",
          "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",

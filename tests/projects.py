@@ -1,7 +1,10 @@
 """Small projects and changed ones, for the tests of reading them and of whole fits."""
 
+import bubblefit as bf
 import numpy as np
+import pandas as pd
 from bubblefit.project.project import read_project
+from bubblefit.runs.setup import prepare_fit
 
 from .places import KNOWN
 
@@ -117,3 +120,37 @@ def constant_strips(folder, *changes):
                 ]
         (folder / f"{test}.csv").write_text("\n".join(lines) + "\n")
     return project_file(folder, STRIPS, *changes)
+
+
+def computed_fields(**keys):
+    """Fields of a bubble of a known law, as `[[bubble]]` says it: in mm and MPa."""
+    known = {"beta": [0, 0, 0, 9.0, 0, 0, 0, 200.0, 0, 0, 0, 400.0]}
+    bubble = bf.Bubble.of(radius=100.0, data={"known_solution": known}, **keys)
+    project = bf.Project.of(bubble, bf.Law("constant"), fabric=bf.Fabric("made", thickness=0.8))
+    return prepare_fit(project, project.chosen(None)).tests[0].fields
+
+
+def camera_arrays(folder, **keys):
+    """Write camera.npz: points, displacements and pressures of `computed_fields`."""
+    fields = computed_fields(**keys)
+    points = np.column_stack([fields[0].points, np.zeros(len(fields[0].points))])
+    moved = np.array([field.displacement for field in fields])
+    pressures = [field.pressure for field in fields]
+    np.savez(folder / "camera.npz", points=points, displacements=moved, pressures=pressures)
+
+
+def two_exports(folder):
+    """Write one bubble as two cameras export it, turned by 20 degrees: vic_*.csv, davis_*.txt."""
+    fields = computed_fields(pressures=[0.03, 0.06, 0.1], elements=800)
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    for k, field in enumerate(fields):
+        places = np.column_stack([field.points, np.zeros(len(field.points))])
+        seen = np.column_stack([places @ turn.T + [5.0, 2.0, 300.0], field.displacement @ turn.T])
+        names = ["x [m]", "y [m]", "z [m]", "dx [m]", "dy [m]", "dz [m]"]
+        metres = pd.DataFrame(seen / 1000, columns=names)
+        metres.to_csv(folder / f"vic_{k + 8}.csv", index=False)  # 8, 9, 10
+        words = pd.DataFrame(seen).map(lambda x: f"{x:.6f}".replace(".", ","))
+        names = [f"{name} [mm]" for name in "XYZUVW"]
+        words.to_csv(folder / f"davis_{k}.txt", sep=";", header=names, index=False)
+    return fields

@@ -14,7 +14,7 @@ from bubblefit.project.schema import project_file as project_model
 from bubblefit.solvers.registry import solver_sections
 
 from .places import PUBLISHED, ROOT
-from .projects import project_file
+from .projects import project_file, two_exports
 from .scripts import script
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -161,6 +161,20 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     project_file(project.parent, project.read_text(), ("elements = 800", "elements = 48"))
     output_of(command, "bubble", project, "--starts", "1", "--jobs", "1")
     assert (tmp_path / "out" / "mine" / "report.html").exists()
+    # Scripts of users, checked by their types and run against what is installed.
+    scripts = sorted((ROOT / "tests" / "typed").glob("*.py"))
+    check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
+    output_of(sys.executable, *check, "--python-executable", python, *scripts)
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text("import bubblefit as bf\nbf.Fabric('a', thickness='wide')\nbf.fits\n")
+    done = subprocess.run(
+        [sys.executable, *check, "--python-executable", python, wrong],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert "Found 2 errors" in done.stdout
+    two_exports(tmp_path)
+    output_of(python, ROOT / "tests" / "typed" / "two_cameras.py")
+    assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
 
 
 def test_every_published_table_has_a_source_and_says_its_units(shared_data):

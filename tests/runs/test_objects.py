@@ -1,5 +1,6 @@
 """Tests, laws and sheets as objects: from arrays, to a fit, to a project file and back."""
 
+import re
 import runpy
 from dataclasses import fields, is_dataclass
 from itertools import islice
@@ -17,10 +18,9 @@ from bubblefit.readers.sections import in_base_units
 from bubblefit.runs.setup import prepare_fit
 
 from ..places import EXAMPLES, ROOT
-from ..projects import constant_strips
+from ..projects import camera_arrays, constant_strips, two_exports
 
 FABRIC = bf.Fabric("made", thickness=0.8)
-KNOWN_LAW = [0, 0, 0, 9.0, 0, 0, 0, 200.0, 0, 0, 0, 400.0]
 PRESSURES = np.linspace(0.005, 0.1, 20)
 #: Of `constant_strips`.
 ELONGATION = np.linspace(0.2, 3.0, 12)
@@ -38,12 +38,9 @@ def project_of(*tests, form="constant", **more):
 @pytest.fixture(scope="session")
 def camera(tmp_path_factory):
     """20 frames of a known law as a camera's software saves them: mm, and MPa."""
-    fields = fields_of(pressures=PRESSURES, elements=48, symmetry="quarter")
-    path = tmp_path_factory.mktemp("camera") / "camera.npz"
-    points = np.column_stack([fields[0].points, np.zeros(len(fields[0].points))])
-    moved = np.array([field.displacement for field in fields])
-    np.savez(path, points=points, displacements=moved, pressures=PRESSURES)
-    return path
+    folder = tmp_path_factory.mktemp("camera")
+    camera_arrays(folder, pressures=PRESSURES, elements=48, symmetry="quarter")
+    return folder / "camera.npz"
 
 
 @pytest.fixture
@@ -438,25 +435,9 @@ def test_biaxial_and_cylinder_from_arrays(tmp_path):
         bf.Cylinder(150.0, 90.0)
 
 
-def fields_of(**keys):
-    """Fields of the known law, computed."""
-    data = {"known_solution": {"beta": KNOWN_LAW}}
-    return prepared(project_of(bf.Bubble.of(radius=100.0, data=data, **keys))).tests[0].fields
-
-
 def test_read_and_register_what_two_cameras_export(tmp_path):
-    fields = fields_of(pressures=[0.03, 0.06, 0.1], elements=800)
-    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fields = two_exports(tmp_path)
     loads = [field.pressure for field in fields]
-    for k, field in enumerate(fields):
-        places = np.column_stack([field.points, np.zeros(len(field.points))])
-        seen = np.column_stack([places @ turn.T + [5.0, 2.0, 300.0], field.displacement @ turn.T])
-        one = pd.DataFrame(seen / 1000, columns=[f"{q} [m]" for q in QUANTITIES])
-        one.to_csv(tmp_path / f"vic_{k + 8}.csv", index=False)  # 8, 9, 10
-        seen = pd.DataFrame(seen).map(lambda x: f"{x:.6f}".replace(".", ","))
-        names = [f"{name} [mm]" for name in "XYZUVW"]
-        seen.to_csv(tmp_path / f"davis_{k}.txt", sep=";", header=names, index=False)
     tables = bf.read(tmp_path / "vic_*.csv"), bf.read(tmp_path / "davis_*.txt")
     for table in tables:
         assert list(table.columns) == ["frame", *QUANTITIES] and table["frame"].max() == 2
@@ -473,3 +454,17 @@ def test_read_and_register_what_two_cameras_export(tmp_path):
     assert bf.register(found.bubble).registration.warp_angle == pytest.approx(0.0, abs=1.0)
     with pytest.raises(InputError, match=r"as strips: .* as biaxial: "):
         bf.read(EXAMPLES / "batch" / "README.md")
+
+
+def test_the_code_of_the_document_runs(tmp_path, monkeypatch):
+    camera_arrays(tmp_path, pressures=PRESSURES[::5], elements=48)
+    two_exports(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / "how-to" / "python.md").read_text()
+    assert len(text.split()) <= 600
+    (tmp_path / "code.py").write_text(
+        "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+    )
+    found = runpy.run_path("code.py")
+    assert objective(found["same"]) == objective(found["project"])
+    assert set(found["again"].tests) == {"bubble", "strips"} and found["other"].fit.starts == 8
