@@ -90,10 +90,12 @@ _PLACES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name in _PLACES:
-        return getattr(import_module(f"bubblefit.{_PLACES[name]}"), name)
-    raise AttributeError(f"module 'bubblefit' has no attribute {name!r}")
+if not TYPE_CHECKING:  # so that a type checker knows which names there are
+
+    def __getattr__(name: str) -> Any:
+        if name in _PLACES:
+            return getattr(import_module(f"bubblefit.{_PLACES[name]}"), name)
+        raise AttributeError(f"module 'bubblefit' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

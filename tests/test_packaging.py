@@ -162,9 +162,9 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     output_of(command, "bubble", project, "--starts", "1", "--jobs", "1")
     assert (tmp_path / "out" / "mine" / "report.html").exists()
     # Scripts of users, checked by their types and run against what is installed.
-    scripts = sorted((ROOT / "tests" / "typed").glob("*.py"))
+    shutil.copytree(ROOT / "tests" / "typed", typed := tmp_path / "typed")
     check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
-    output_of(sys.executable, *check, "--python-executable", python, *scripts)
+    output_of(sys.executable, *check, "--python-executable", python, typed)
     wrong = tmp_path / "wrong.py"
     wrong.write_text("import bubblefit as bf\nbf.Fabric('a', thickness='wide')\nbf.fits\n")
     done = subprocess.run(
@@ -173,7 +173,7 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     )  # fmt: skip
     assert "Found 2 errors" in done.stdout
     two_exports(tmp_path)
-    output_of(python, ROOT / "tests" / "typed" / "two_cameras.py")
+    output_of(python, typed / "two_cameras.py")
     assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
 
 
