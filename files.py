@@ -46,6 +46,8 @@ MOST_PARTS = 100
 #: Every file with compiled functions. An edit of one must reach the compiled code of all, while
 #: numba's own cache looks only at the file in which a function stands.
 KERNELS = (
+    "materials/pieces.py",
+    "materials/memory.py",
     "materials/point_law.py",
     "materials/wrinkles.py",
     "materials/law.py",

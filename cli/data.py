@@ -389,6 +389,8 @@ def biaxial_command(**options: Any) -> None:
               help="Where a file names none.")  # fmt: skip
 @click.option("--strain-unit", type=click.Choice(["%", "mm/mm"]), help="Where a file names none.")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Mark in the numbers.")
+@click.option("--fit", "fitted", is_flag=True,
+              help="Fit a law with a memory; predict cycles from the others.")  # fmt: skip
 @given.out_option("out/cycles")
 @given.OVERWRITE
 @given.AS_JSON
@@ -397,9 +399,11 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
 
     Prints for each cycle the strain kept at the reference load, the tangent stiffness between 40
     and 90 % of its peak on loading and unloading, and the energy lost. Writes cycles.csv,
-    holds.csv (creep and relaxation) and cycles.png. Slip and drift of an extensometer are noted.
+    holds.csv (creep and relaxation) and cycles.png, with --fit memory.csv and left-out.csv. Slip
+    and drift of an extensometer are noted.
     """
     out, overwrite, as_json = (options.pop(name) for name in ("out", "overwrite", "as_json"))
+    fitted = options.pop("fitted")
     folder = Path("out/cycles") if out is None else out
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
@@ -409,16 +413,21 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
         "holds": found.holds,
         "notes": pd.DataFrame(note_rows(found.notes)),
     }
+    if fitted:
+        tables |= {"memory": found.memory, "left-out": found.left_out}
     for name, table in tables.items():
         with replacing(folder / f"{name}.csv") as path:
             table.to_csv(path, index=False, float_format="%.9g")
-    drawn = [
-        (one.name, one.history.load, one.history.strain - one.zero,
-         [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in one.values])
-        for one in found.histories
-    ]  # fmt: skip
+    drawn = []
+    for k, one in enumerate(found.histories):
+        strain, model = one.history.strain - one.zero, None
+        if fitted:
+            model = strain[found.fits[k].rows], found.fits[k].load
+        rows = [(v.cycle.start, v.cycle.peak, v.cycle.end) for v in one.values]
+        drawn.append((one.name, one.history.load, strain, rows, model))
     save(folder / "cycles.png", cycle_charts(drawn))
     result = {"command": "cycles"} | {
         name: json.loads(table.to_json(orient="records")) for name, table in tables.items()
     }
-    show(result, [*found.lines(), *note_lines(found.notes), written_to(folder)], as_json)
+    said = [*found.lines(), *(found.fit_lines() if fitted else [])]
+    show(result, [*said, *note_lines(found.notes), written_to(folder)], as_json)

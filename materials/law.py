@@ -36,6 +36,7 @@ from .forms.base import (
 )
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
+from .memory import NAMES, PLAIN, Memory
 from .point_law import SLOPES, membrane_stress, stress_update
 
 ThicknessChange = Literal["constant", "incompressible"]
@@ -51,7 +52,8 @@ class HypoelasticLaw:
     beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12),
     beyond which, and below zero, a modulus keeps its end value. thickness_change : "constant"
     (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio). pieces : (3, P, 5)
-    MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here.
+    MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here. memory : unloading and
+    reloading (`memory.py`); None: every loading is along the same curve.
     """
 
     beta: Array
@@ -59,6 +61,7 @@ class HypoelasticLaw:
     strain_range: Array = None  # type: ignore[assignment]
     thickness_change: ThicknessChange = "constant"
     form: Form = CUBIC
+    memory: Memory | None = None
     pieces: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -124,8 +127,14 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Array:
-        """Return nu12, and the gain (MPa) of E1 and E2 by their load ratios; (3,), read-only."""
-        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta])
+        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, the memory; read-only."""
+        remembered = () if self.memory is None else self.memory.constants
+        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta, *remembered])
+
+    @property
+    def state(self) -> int:
+        """Return the entries of a strain vector: 3, with what a memory keeps 9."""
+        return PLAIN if self.memory is None else 3 * PLAIN
 
     @property
     def area_power(self) -> float:
@@ -168,12 +177,23 @@ class HypoelasticLaw:
     def increment(
         self, strain_old: ArrayLike, strain_new: ArrayLike, stress_old: ArrayLike
     ) -> tuple[Array, Array]:
-        """Return stress (n, 3) MPa after an increment of strain, and its tangent, or NaN."""
-        old, new, stress = (
-            np.ascontiguousarray(np.atleast_2d(a), dtype=float)
-            for a in (strain_old, strain_new, stress_old)
+        """Return stress (n, 3) MPa after an increment of first loading, and its tangent, or NaN."""
+        old = np.atleast_2d(np.asarray(strain_old, dtype=float))[:, :PLAIN]
+        return self.follow(old, strain_new, stress_old)[:2]
+
+    def follow(
+        self, state: ArrayLike, strain: ArrayLike, stress: ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """Return stress (n, 3), tangent (n, 3, 3) and state after an increment of any history.
+
+        state : (n, 3) strain before it, or (n, 9) as the call before it returned; strain : (n, 3).
+        """
+        old, new = (
+            np.pad(a, ((0, 0), (0, max(0, self.state - a.shape[1]))))[:, : self.state]
+            for a in (np.atleast_2d(np.asarray(a, dtype=float)) for a in (state, strain))
         )
-        return _increments(self.pieces, self.coupling, old, new, stress)
+        before = np.ascontiguousarray(np.atleast_2d(stress), dtype=float)
+        return (*_increments(self.pieces, self.coupling, old, new, before), new)
 
     def second_piola_kirchhoff(
         self, gradient: ArrayLike, strain_old: ArrayLike | None = None,
@@ -186,6 +206,8 @@ class HypoelasticLaw:
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
         zero = np.zeros((len(f), 3))
+        if self.memory is not None:  # of one increment, which is a first loading
+            return replace(self, memory=None).second_piola_kirchhoff(f, strain_old, stress_old)
         old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
         return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
@@ -253,24 +275,27 @@ def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignor
 def law_slopes(
     law: HypoelasticLaw, parameters: Sequence[str], thickness: float
 ) -> tuple[Array, Array]:
-    """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling` (3, np).
+    """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling`, by np.
 
-    parameters : "beta_i" (per MPa), "nu12" and "thickness" (per mm); by any other they are zero.
+    parameters : "beta_i" (per MPa), "nu12", `memory.NAMES` and "thickness" (per mm); by any other
+    they are zero.
     """
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
-    coupling, gains = np.zeros((3, len(parameters))), ratio_map(law.form)
+    coupling, gains = np.zeros((len(law.coupling), len(parameters))), ratio_map(law.form)
     for j, name in enumerate(parameters):
         if name.startswith("beta_"):
             place = int(name.removeprefix("beta_"))
-            rows[..., j], coupling[1:, j] = of_beta[..., place], gains[:, place]
+            rows[..., j], coupling[1:PLAIN, j] = of_beta[..., place], gains[:, place]
         elif name == "nu12":
             coupling[0, j] = 1.0
+        elif name in NAMES and law.memory is not None:
+            coupling[PLAIN + NAMES.index(name), j] = 1.0
         elif name == "thickness":
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
             # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
-            coupling[1:, j] = law.coupling[1:] / thickness
+            coupling[1:PLAIN, j] = law.coupling[1:PLAIN] / thickness
     return rows, coupling
 
 

@@ -8,175 +8,16 @@ The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 i
 (eps1, eps2, gamma12) with the engineering shear; Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
 
-`pieces` (3, P, 5) is a law's three moduli as `forms.base.pieces_of` writes them. The modulus of an
-increment is its MEAN over the increment, (F(x) - F(x_old))/(x - x_old) with F its integral. So a
-bar has the exact stress in any number of increments, a modulus that jumps gives a stress that does
-not, and d(stress)/d(strain) is the modulus at the END of the increment.
+`pieces` (3, P, 5) is a law's three moduli (`pieces.py`); `coupling` (3,), or (15,) of a law that
+remembers its history, its other constants (`memory.py`).
 """
 
 import math
 
 from ..files import compiled
 from .forms.base import EVEN, Array
-
-#: An increment of strain across the end of a piece is not divided by where it is smaller.
-TINY = 1e-12
-
-
-@compiled()
-def _place(pieces: Array, component: int, x: float) -> int:
-    k, last = 0, pieces.shape[1] - 1
-    while k < last and x > pieces[component, k, 0]:
-        k += 1
-    return k
-
-
-@compiled()
-def _means(a: float, b: float) -> tuple[float, float, float]:
-    total, squares = a + b, a * a + b * b
-    return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
-
-
-@compiled()
-def _mean_of_piece(pieces: Array, component: int, k: int, a: float, b: float) -> float:
-    third, second, first = _means(a, b)
-    value = pieces[component, k, 1] * third + pieces[component, k, 2] * second
-    return value + pieces[component, k, 3] * first + pieces[component, k, 4]
-
-
-@compiled()
-def point_modulus(pieces: Array, component: int, x: float) -> float:
-    size = abs(x) if component == 2 else x
-    held = min(max(size, 0.0), pieces[component, pieces.shape[1] - 1, 0])
-    k = _place(pieces, component, held)
-    value = pieces[component, k, 1] * held + pieces[component, k, 2]
-    return (value * held + pieces[component, k, 3]) * held + pieces[component, k, 4]
-
-
-@compiled()
-def _integral(pieces: Array, component: int, low: float, high: float) -> float:
-    """Return the integral of the modulus from low to high, summed over the pieces on the way."""
-    total, start = 0.0, 0.0
-    if low < 0.0:
-        total += (min(high, 0.0) - low) * pieces[component, 0, 4]
-    for k in range(pieces.shape[1]):
-        end = pieces[component, k, 0]
-        a, b = max(low, start), min(high, end)
-        if b > a:
-            total += (b - a) * _mean_of_piece(pieces, component, k, a, b)
-        start = end
-    if high > start:
-        total += (high - max(low, start)) * point_modulus(pieces, component, start)
-    return total
-
-
-@compiled()
-def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[float, float, float]:
-    """Return as `increment_modulus`, for an increment that leaves a piece."""
-    change = x - x_old
-    if abs(change) < TINY:
-        return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
-    if component == 2 and x * x_old < 0.0:
-        whole = _integral(pieces, 2, 0.0, abs(x)) + _integral(pieces, 2, 0.0, abs(x_old))
-    elif component == 2:
-        a, b = abs(x), abs(x_old)
-        whole = _integral(pieces, 2, min(a, b), max(a, b))
-    else:
-        whole = _integral(pieces, component, min(x, x_old), max(x, x_old))
-    mean = whole / abs(change)
-    ahead = (point_modulus(pieces, component, x) - mean) / change
-    behind = (mean - point_modulus(pieces, component, x_old)) / change
-    return mean, ahead, behind
-
-
-@compiled()
-def increment_modulus(
-    pieces: Array, component: int, x: float, x_old: float
-) -> tuple[float, float, float]:
-    """Return the mean modulus from x_old to x, and its derivatives by x and by x_old."""
-    a, b, sign = x_old, x, 1.0
-    if component == 2 and x <= 0.0 and x_old <= 0.0:
-        a, b, sign = -x_old, -x, -1.0
-    end = pieces[component, pieces.shape[1] - 1, 0]
-    # A strain that is not a number fails these comparisons, and the mean is not a number.
-    if component != 2 and a <= 0.0 and b <= 0.0:
-        return pieces[component, 0, 4], 0.0, 0.0
-    if a >= end and b >= end:
-        return point_modulus(pieces, component, end), 0.0, 0.0
-    low, high = min(a, b), max(a, b)
-    k = _place(pieces, component, high)
-    start = pieces[component, k - 1, 0] if k > 0 else 0.0
-    if not (low >= start and high <= pieces[component, k, 0]):
-        return _across(pieces, component, x, x_old)
-    third, second, first = (
-        pieces[component, k, 1], pieces[component, k, 2], pieces[component, k, 3]
-    )  # fmt: skip
-    mean = _mean_of_piece(pieces, component, k, a, b)
-    ab, aa, bb = 2.0 * a * b, a * a, b * b
-    ahead = third * (0.25 * (aa + ab + 3.0 * bb)) + second * ((a + 2.0 * b) * (1.0 / 3.0))
-    behind = third * (0.25 * (3.0 * aa + ab + bb)) + second * ((2.0 * a + b) * (1.0 / 3.0))
-    return mean, sign * (ahead + 0.5 * first), sign * (behind + 0.5 * first)
-
-
-@compiled()
-def _add(weights: Array, k: int, share: float, a: float, b: float) -> None:
-    third, second, first = _means(a, b)
-    weights[k, 0] += share * third
-    weights[k, 1] += share * second
-    weights[k, 2] += share * first
-    weights[k, 3] += share
-
-
-@compiled()
-def _add_way(
-    pieces: Array, component: int, low: float, high: float, whole: float, weights: Array
-) -> None:
-    """Add the share of each piece on the way from low to high, part of one of length `whole`."""
-    start = 0.0
-    if low < 0.0:
-        _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
-    for k in range(_place(pieces, component, high) + 1):
-        end = pieces[component, k, 0]
-        a, b = max(low, start), min(high, end)
-        if b > a:
-            _add(weights, k, (b - a) / whole, a, b)
-        if high > end and k == pieces.shape[1] - 1:
-            _add(weights, k, (high - max(low, end)) / whole, end, end)
-        start = end
-
-
-@compiled()
-def by_pieces(
-    pieces: Array, component: int, x: float, x_old: float, weights: Array
-) -> tuple[int, int]:
-    """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
-    a, b, whole = x_old, x, abs(x - x_old)
-    if component == 2 and x * x_old >= 0.0:
-        a, b = abs(x_old), abs(x)
-    if whole < TINY:
-        a = b = 0.5 * (a + b)
-    low, high = min(a, b), max(a, b)
-    k = _place(pieces, component, high)
-    start = pieces[component, k - 1, 0] if k > 0 else 0.0
-    if low >= start and high <= pieces[component, k, 0]:
-        weights[k, 0], weights[k, 1], weights[k, 2] = _means(a, b)
-        weights[k, 3] = 1.0
-        return k, k + 1
-    turns = component == 2 and low < 0.0  # the shear changes its sign
-    first = 0 if turns else _place(pieces, component, low)
-    stop = max(k, _place(pieces, component, -low)) + 1 if turns else k + 1
-    for i in range(first, stop):
-        weights[i] = 0.0
-    if whole < TINY:
-        held = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
-        _add(weights, stop - 1, 1.0, held, held)
-    elif turns:
-        _add_way(pieces, 2, 0.0, high, whole, weights)
-        _add_way(pieces, 2, 0.0, -low, whole, weights)
-    else:
-        _add_way(pieces, component, low, high, whole, weights)
-    return first, stop
-
+from .memory import PLAIN, recalled_modulus
+from .pieces import increment_modulus
 
 # The load ratio of one increment at one integration point, compiled.
 #
@@ -371,14 +212,19 @@ def stress_update(
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
     pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
-    load ratios; h, h_old (3,) strain, s_old (3,) stress at the start. Writes s_new (3,), tangent =
-    d s_new/d h (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the moduli by h_old,
-    RATIO.. the load ratios less those at 1:1, TURN.. and BY.. u and w of `mean_ratio`. False when a
-    modulus, or 1 - nu12 nu21, is not positive.
+    load ratios; h, h_old (3,) strain, s_old (3,) stress at the start. Of a law that remembers,
+    coupling is (15,), h and h_old are (9,) as in `memory.py`, and h[3:] is written. Writes s_new
+    (3,), tangent = d s_new/d h (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the
+    moduli by h_old, RATIO.. the load ratios less those at 1:1, TURN.. and BY.. u and w of
+    `mean_ratio`. False when a modulus, or 1 - nu12 nu21, is not positive.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
+    if coupling.shape[0] > PLAIN:
+        warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, 0, h, h_old)
+        fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, 1, h, h_old)
+        shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, 2, h, h_old)
     slopes[RATIO1:] = 0.0
     if coupling[1] != 0.0 or coupling[2] != 0.0:
         (

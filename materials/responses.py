@@ -21,6 +21,7 @@ from ..errors import InputError
 from ..files import compiled
 from .forms.base import COMPONENTS, UNLIMITED, Array
 from .law import HypoelasticLaw, law_slopes
+from .pieces import by_pieces
 from .point_law import (
     BEFORE1,
     BEFORE2,
@@ -40,7 +41,6 @@ from .point_law import (
     SLOPES,
     TURN1,
     TURN2,
-    by_pieces,
     stress_update,
 )
 

@@ -19,7 +19,8 @@ import numpy as np
 
 from ..files import compiled
 from .forms.base import Array
-from .point_law import SLOPES, increment_modulus, log_strain, referred_stress, stress_update
+from .pieces import increment_modulus
+from .point_law import SLOPES, log_strain, referred_stress, stress_update
 
 ITERATIONS = 25
 #: Strain, or stress over the stiffness, that is taken as none.

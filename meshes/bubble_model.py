@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, are_levels
 
 THICKNESS = "thickness"
 
@@ -50,7 +50,8 @@ class BubbleModel:
 
     mesh : mm; warp is x, fill is y, z the surface in the reference picture, from which
     displacements are counted. pressures : MPa, increasing: the frames. increments : MPa, containing
-    every pressure: steps of the law, which hardly matter (benchmarks/bench_law.py increments).
+    every pressure: steps of the law, which hardly matter (benchmarks/bench_law.py increments);
+    `unloaded` : both may fall, and each increment is a frame.
     supports : degrees of freedom held at zero, by node set; those of the rim where it moves. modes
     : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm. slack : how much
     longer the stress-free sheet is along x (warp) and y (fill), as a share. rim_motion :
@@ -66,15 +67,16 @@ class BubbleModel:
     modes: Mapping[str, Array] = field(default_factory=dict)
     slack: tuple[float, float] = (0.0, 0.0)
     rim_motion: Array | None = None
+    unloaded: bool = False
 
     def __post_init__(self) -> None:
         steps = np.array(self.increments if len(self.increments) else self.pressures, float)
         wanted = np.array(self.pressures, float)
         for name, values in (("pressures", wanted), ("increments", steps)):
-            if not len(values) or not (np.diff(values, prepend=0.0) > 0).all():
+            if not are_levels(values, self.unloaded):
                 raise InputError(None, name, f"expected positive, increasing, got {values} MPa")
         near = np.abs(steps[:, None] - wanted).min(axis=0) if len(steps) else wanted
-        if (near > 1e-9 * wanted).any():
+        if (near > 1e-9 * wanted).any() or (self.unloaded and len(steps) != len(wanted)):
             raise InputError(None, "increments", "must contain every reported pressure")
         if not self.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
@@ -159,6 +161,8 @@ class BubbleModel:
     @property
     def reported(self) -> NDArray[np.intp]:
         steps = np.array(self.increments)
+        if self.unloaded:
+            return np.arange(len(steps))
         return np.array([int(np.argmin(np.abs(steps - p))) for p in self.pressures])
 
     @property

@@ -415,3 +415,10 @@ class FacetReading:
             shape=(len(middles), read.shape[0]),
         )
         return sp.csr_matrix(gather @ read), counts.astype(float)
+
+
+def are_levels(levels: NDArray[np.float64], unloaded: bool) -> bool:
+    """Return whether levels (n,) of a load are positive and rise; `unloaded`: or only change."""
+    change = np.diff(levels, prepend=0.0)
+    moves = (change != 0).all() and (levels > 0).all() if unloaded else (change > 0).all()
+    return bool(len(levels) and moves)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .bubble_model import OfThickness
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, are_levels
 
 
 def strip_mesh(
@@ -98,7 +98,8 @@ class UniaxialModel(OfThickness):
 
     mesh : mm, in the xy plane, pulled along y; node sets `gauge` (two nodes), `bottom` and those in
     `supports` (held at zero; every node stays in the plane). warp : (3,) direction of the warp
-    yarn. elongations : mm of the gauge, increasing: the increments of the law, every one reported.
+    yarn. elongations : mm of the gauge, positive, increasing unless it is `unloaded` between two:
+    the increments of the law, every one reported.
     pulled : the node set that moves along -y. load_factor : of the reaction: 2 for one half of the
     width.
     """
@@ -110,6 +111,7 @@ class UniaxialModel(OfThickness):
     supports: Mapping[str, tuple[int, ...]]
     pulled: str = "bottom"
     load_factor: float = 1.0
+    unloaded: bool = False
 
     def __post_init__(self) -> None:
         for name in ("gauge", self.pulled, *self.supports):
@@ -118,7 +120,7 @@ class UniaxialModel(OfThickness):
         if len(self.mesh.node_sets["gauge"]) != 2:
             raise InputError(None, "mesh", "the node set 'gauge' must hold two nodes")
         levels = np.array(self.elongations, float)
-        if not len(levels) or not (np.diff(levels, prepend=0.0) > 0).all():
+        if not are_levels(levels, self.unloaded):
             raise InputError(None, "elongations", f"expected positive, increasing, got {levels} mm")
         for name in ("thickness", "load_factor"):
             if not getattr(self, name) > 0:

@@ -240,15 +240,18 @@ def _grips(rest: Array, now: Array) -> list[Series]:
 
 
 def cycle_charts(
-    histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]]]],
+    histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]],
 ) -> Charts:
     """Return load over strain of histories: name, load (n,) N, strain (n,), rows of each cycle.
 
-    Rows are where a cycle begins, is highest and ends; unloading is dashed.
+    Rows are where a cycle begins, is highest and ends; unloading is dashed. Last : strains and
+    loads of a model, or None.
     """
     charts = []
-    for name, load, strain, rows in histories:
+    for name, load, strain, rows, model in histories:
         series = []
+        if model is not None:
+            series.append(line("model", 100 * np.asarray(model[0]), model[1], colour=7, wide=True))
         for number, (start, peak, end) in enumerate(rows):
             up, down = slice(start, peak + 1), slice(peak, end + 1)
             colour, label = number % 6, f"cycle {number + 1}"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.law import HypoelasticLaw
+from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
 from ..meshes.mesh import Mesh, log_strain_of, meshio_of, surface_strain
 from .membrane.kernel import reference_elements
@@ -42,7 +43,8 @@ STRAIN_DATA, STRESS_DATA = "log_strain_1_2_12", "stress_1_2_12_MPa"
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
     """Return the parameters of derivatives: entries of beta, nu12, and the model's `parameters`."""
     own = getattr(model, "parameters", ())
-    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *own)
+    remembered = () if law.memory is None else NAMES
+    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *remembered, *own)
 
 
 def instability(unstable: Sequence[str] | None) -> str:
@@ -137,7 +139,7 @@ class History:
                     law.pieces, law.coupling, strain, fabric, stress
                 )
             else:
-                stress, fabric = law.increment(fabric, strain, stress)[0], strain
+                stress, _, fabric = law.follow(fabric, strain, stress)
             every.append(stress.reshape(shape))
         return np.array(every)[reported]
 
@@ -361,6 +363,9 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
             f"the loads, and {solver.name} takes moduli of strain"
         )
         raise InputError(None, "form", problem)
+    if law.memory is not None and not getattr(solver, "remembers", False):
+        problem = f"a law with a memory is for the solver membrane; {solver.name} does not take it"
+        raise InputError(None, "memory", problem)
 
 
 def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:

@@ -159,7 +159,7 @@ def test_an_edit_reaches_code_compiled_from_another_file(tmp_path):
         ignore=shutil.ignore_patterns(".*", "out", "tests", "build", "*.egg-info", "__pycache__"),
     )
     before = run(tmp_path / "cache", package.parent)
-    law = package / "materials" / "point_law.py"
+    law = package / "materials" / "pieces.py"
     text = law.read_text()
     edited = text.replace(
         "first + pieces[component, k, 4]", "first + 2.0 * pieces[component, k, 4]"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind
+from ...materials.forms.spline import Spline
+from ...materials.law import HypoelasticLaw, law_slopes
+from ...materials.memory import NAMES, QUANTITIES, Memory, own_stress
 from ...readers.histories import (
     Cycle,
     Hold,
@@ -237,12 +241,125 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
     return EvaluatedHistory(history, level, zero, tuple(values), holds, stable, doubts)
 
 
+#: Knots of the tangent of a loading curve; its bounds, of the mean stiffness; largest U and R.
+KNOTS, BOUNDS, MOST = 6, (1e-4, 1e2), 1.99
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCycles:
+    """A loading curve with unloading and reloading, fitted to a history (`materials/memory.py`).
+
+    knots (k,) strains and stiffness (k,) N, the tangent of the loading curve there, above the
+    reference load; memory (4,) : set, unloading, reloading, saturation, in the order of
+    `memory.QUANTITIES`; sigma (k + 4,) one standard deviation each, of independent readings. rows :
+    readings that are followed; load : modelled, N. rms : N, of those that were fitted.
+    """
+
+    knots: Array
+    stiffness: Array
+    memory: Array
+    sigma: Array
+    rows: NDArray[np.intp]
+    load: Array
+    rms: float
+
+    def kept(self, largest: float) -> float:
+        """Return the permanent strain after a largest strain."""
+        return float(self.memory[0] * largest / (1.0 + self.memory[3] * largest))
+
+
+def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> FittedCycles:
+    """Fit a loading curve and a memory to all cycles but `leave`; each branch has one weight.
+
+    The readings count from the first passage of the reference load to the last, in strain and load.
+    """
+    from scipy.optimize import least_squares
+
+    h, values, level = one.history, one.values, one.reference
+    first, last = values[0].cycle, values[-1].cycle
+    start = first.start + passage(h.load[first.start :], h.strain[first.start :], level)[0] + 1
+    end = last.peak + (passage(h.load[last.peak :], h.strain[last.peak :], level)[0] or 0)
+    rows = np.arange(start, (end if end > last.peak else len(h.load) - 1) + 1)
+    strain, load = np.maximum(h.strain[rows] - one.zero, 0.0), h.load[rows] - level
+    weight, none = np.zeros(len(rows)), [0.0, 1.0]
+    for v in values:
+        stop = len(h.load) if v.cycle is last else values[v.cycle.number].cycle.start
+        for a, b in ((v.cycle.start, v.cycle.peak), (v.cycle.peak, stop)):
+            own = (rows >= a) & (rows < b) & (v.cycle.number != leave)
+            weight[own] = 1.0 / (v.peak * math.sqrt(max(int(own.sum()), 1)))
+    top = float(strain[weight > 0].max())
+    form = Spline.at([np.linspace(0.0, top, knots).tolist(), none, none])
+    free = [form.size - knots + k for k in range(knots)]  # E1 comes last
+    names = [*(f"beta_{i}" for i in free), *NAMES[: len(QUANTITIES)]]
+    mean = float(load.max()) / top
+
+    def modelled(x: Array) -> tuple[Array, Array]:
+        # By the share of U - 1 that R - 1 is, so that R stays below U; strains over the largest.
+        kept, up, share, fade = x[knots:]
+        memory = Memory.of([kept, up, 1.0 + share * (up - 1.0), fade / top, *[0, 1, 1, 0] * 2])
+        beta = np.r_[np.full(form.size - knots, mean), mean * x[:knots]]
+        law = HypoelasticLaw(beta, 0.0, np.array([top, 1, 1]), form=form, memory=memory)
+        slopes = law_slopes(law, names, 1.0)
+        found, by = own_stress(law.pieces, law.coupling, 0, strain, *slopes)
+        chain = np.diag([*[mean] * knots, 1.0, 1.0, up - 1.0, 1.0 / top])
+        chain[knots + 2, knots + 1] = share
+        return found, by @ chain
+
+    low = [*[BOUNDS[0]] * knots, 0.0, 1.0, 0.0, 0.0]
+    high = [*[BOUNDS[1]] * knots, 0.99, MOST, 1.0, 100.0]
+    begin = [*[1.0] * knots, 0.3, 1.4, 0.4, 0.1]
+    best = least_squares(
+        lambda x: weight * (modelled(x)[0] - load), begin,
+        lambda x: weight[:, None] * modelled(x)[1], bounds=(low, high),
+        xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400,
+    )  # fmt: skip
+    found, _ = modelled(best.x)
+    fitted = weight > 0
+    spread = 2 * best.cost / max(int(fitted.sum()) - len(begin), 1)
+    _, up, share, fade = best.x[knots:]
+    scale = np.r_[np.full(knots, mean), 1.0, 1.0, up - 1.0, 1.0 / top]
+    sigma = scale * np.sqrt(spread * np.diag(np.linalg.pinv(best.jac.T @ best.jac)))
+    rms = float(np.sqrt(np.mean((found - load)[fitted] ** 2)))
+    memory = np.array([best.x[knots], up, 1.0 + share * (up - 1.0), fade / top])
+    stiffness = mean * best.x[:knots]
+    return FittedCycles(np.array(form.knots[0]), stiffness, memory, sigma, rows, found + level, rms)
+
+
+def left_out(one: EvaluatedHistory, knots: int = KNOTS) -> pd.DataFrame:
+    """Return each cycle beside its prediction by a fit to the others: a row a cycle.
+
+    Predicted are loads at the measured strains, so stiffness, and the permanent strain. A cycle
+    that alone reaches its largest strain, and the first, have no others that could predict them.
+    """
+    table, largest = [], 0.0
+    tops = [v.top for v in one.values]
+    for v in one.values:
+        largest, number = max(largest, v.top), v.cycle.number
+        others = [top for k, top in enumerate(tops, start=1) if k != number]
+        if number == 1 or v.top > max(others) or math.isnan(v.permanent):
+            continue
+        fitted = fit_cycles(one, knots, leave=number)
+        load = one.history.load.copy()
+        load[fitted.rows] = fitted.load
+        parts = slice(v.cycle.start, v.cycle.peak + 1), slice(v.cycle.peak, v.cycle.end + 1)
+        row: dict[str, Any] = {"file": one.history.path.name, "cycle": number}
+        for name, rows in zip(("EA_loading", "EA_unloading"), parts, strict=True):
+            predicted = _slope(load[rows], one.history.strain[rows], v.peak)
+            row |= {f"{name}_N": getattr(v, name), f"{name}_predicted_N": predicted}
+            row[f"{name}_off_percent"] = 100 * (predicted / getattr(v, name) - 1)
+        kept = fitted.kept(largest)
+        row |= {"permanent_strain": v.permanent, "permanent_strain_predicted": kept}
+        table.append(row | {"permanent_strain_off": kept - v.permanent})
+    return pd.DataFrame(table)
+
+
 @dataclass(frozen=True, eq=False)
 class Cycles:
     """Evaluated histories; width : mm, for stiffness per width (N/mm), or None."""
 
     histories: tuple[EvaluatedHistory, ...]
     width: float | None = None
+    knots: int = KNOTS
     notes: list[Note] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -297,6 +414,46 @@ class Cycles:
                             f"{name}_per_decade": float(slope)}  # fmt: skip
                 table.append(row)
         return pd.DataFrame(table)
+
+    @cached_property
+    def fits(self) -> tuple[FittedCycles, ...]:
+        """Return a fit to all cycles of each history."""
+        return tuple(fit_cycles(one, self.knots) for one in self.histories)
+
+    @property
+    def memory(self) -> pd.DataFrame:
+        """Return a row a history: set, unloading, reloading, saturation, one sigma each, RMS."""
+        table = []
+        for one, fitted in zip(self.histories, self.fits, strict=True):
+            row: dict[str, Any] = {"file": one.history.path.name, "rms_N": fitted.rms}
+            pairs = zip(fitted.memory.tolist(), fitted.sigma[-4:].tolist(), strict=True)
+            for name, (value, sigma) in zip(QUANTITIES, pairs, strict=True):
+                row |= {name: value, f"{name}_sigma": sigma}
+            for k, knot in enumerate(fitted.knots.tolist(), start=1):
+                row |= {f"strain_{k}": knot, f"EA_{k}_N": float(fitted.stiffness[k - 1])}
+            table.append(row)
+        return pd.DataFrame(table)
+
+    @cached_property
+    def left_out(self) -> pd.DataFrame:
+        """Return each cycle beside its prediction by a fit to the others, see `left_out`."""
+        return pd.concat([left_out(one, self.knots) for one in self.histories], ignore_index=True)
+
+    def fit_lines(self) -> list[str]:
+        """Return the fits, and the cycles that were left out, as lines for the terminal."""
+        said = []
+        for one, f in zip(self.histories, self.fits, strict=True):
+            pairs = zip(QUANTITIES, f.memory.tolist(), f.sigma[-4:].tolist(), strict=True)
+            words = ", ".join(f"{name} {value:.3g} +- {sigma:.2g}" for name, value, sigma in pairs)
+            said.append(f"{one.history.path.name}: memory: {words}; RMS error {f.rms:.3g} N")
+        for row in self.left_out.to_dict("records"):
+            off = row["EA_loading_off_percent"], row["EA_unloading_off_percent"]
+            said.append(
+                f"{row['file']}: cycle {row['cycle']} from the others: stiffness off by "
+                f"{off[0]:+.2g} and {off[1]:+.2g} % (loading, unloading), permanent strain by "
+                f"{100 * row['permanent_strain_off']:+.2g} % of strain"
+            )
+        return said
 
     def lines(self) -> list[str]:
         """Return the results as lines for the terminal."""

@@ -23,6 +23,7 @@ from .newton import (
     Record,
     initial_moduli,
     lagrange,
+    last_way,
     march,
     named,
 )
@@ -185,10 +186,11 @@ class Inflation(Loading):
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in p^(1/3), in which inflation is nearly linear."""
-        x = np.cbrt(levels[-LOOK_BACK:])
-        if len(path) == 1:
-            return np.asarray(path[0] * math.cbrt(level / levels[0]))
-        return lagrange(x, np.array(path[-LOOK_BACK:]), math.cbrt(level))
+        count = last_way(levels, level, LOOK_BACK)
+        if count == 1:
+            return np.asarray(path[-1] * math.cbrt(level / levels[-1]))
+        x = np.cbrt(levels[-count:])
+        return lagrange(x, np.array(path[-count:]), math.cbrt(level))
 
     def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
         return np.asarray(u * (to / at) ** (1.0 / 3.0))

@@ -15,7 +15,7 @@ from .bubble import STIFF, Wall
 from .cords import Cords, cords_on
 from .factorisation import BorderedTangent, tangent_for
 from .kernel import reference_elements
-from .newton import Membrane, initial_stiffness, searched_equilibrium
+from .newton import Membrane, forgets, initial_stiffness, searched_equilibrium
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -448,6 +448,7 @@ def prepare(
 def closed_membrane(
     model: InflatedModel, law: HypoelasticLaw, tolerance: float, fixed: NDArray[np.intp], wall: Wall
 ) -> ClosedMembrane:
+    forgets(law, "a closed membrane")
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     warp = np.broadcast_to(np.asarray(model.warp, dtype=float), (len(quads), 3))

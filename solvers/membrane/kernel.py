@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import compiled
+from ...materials.memory import BY_X, ON, PLAIN, RECALLED, remember
+from ...materials.pieces import by_pieces
 from ...materials.point_law import (
     BEFORE1,
     BEFORE2,
@@ -37,7 +39,6 @@ from ...materials.point_law import (
     SLOPES,
     TURN1,
     TURN2,
-    by_pieces,
     membrane_stress,
 )  # fmt: skip
 from ...materials.wrinkles import relaxed_membrane_stress
@@ -45,7 +46,8 @@ from ...materials.wrinkles import relaxed_membrane_stress
 # mypy does not see through numba; the shapes are in the docstrings.
 
 Array = NDArray[np.float64]
-#: Numbers that `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), tangent (9).
+#: Numbers that `explicit` leaves at each point for `advance`: f (6), d strain/dE (9), tangent (9);
+#: of a law that remembers, too, derivatives by the strain of the largest ones and own stresses (6).
 POINT = 24
 _G = 1.0 / np.sqrt(3.0)
 #: 2 x 2 Gauss points of the square; all weights are one.
@@ -124,6 +126,7 @@ def assemble(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             if share >= 0.0:
+                # Only of a law without a memory, see `closed.prepare`.
                 if relaxed_membrane_stress(
                     m, q, c, pieces, coupling, power, share, h_old[e, g], s_old[e, g], total,
                     h_new[e, g], s_new[e, g], pk2, stiff, p, law, steep, pull, work,
@@ -261,7 +264,8 @@ def explicit(  # type: ignore[no-untyped-def]
     """
     nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
-    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    remembers, memory = coupling.shape[0] > PLAIN, np.empty(RECALLED)
+    h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
     weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))
@@ -293,6 +297,13 @@ def explicit(  # type: ignore[no-untyped-def]
                         row[j] += (
                             w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
                         )
+            if remembers:
+                for i in range(3):
+                    remember(
+                        pieces, coupling, i, h, h_old[e, g], rows, by_coupling, dh_old[e, g],
+                        weights, own[i], memory,
+                    )  # fmt: skip
+                    point[e, g, POINT + i], point[e, g, POINT + 3 + i] = memory[ON], memory[BY_X]
             dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
             wt = area[e, g] * thickness[e]
             for i in range(3):
@@ -375,6 +386,9 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                 stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
                 stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
                 stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2
+            for i in range(3, strain.shape[0]):
+                for j in range(count):
+                    strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
 
 
 @compiled(fastmath=FAST)
@@ -389,7 +403,7 @@ def by_sheet(  # type: ignore[no-untyped-def]
     """
     count = len(surface)
     rate[:] = 0.0
-    h, s_new, pk2 = np.empty(3), np.empty(3), np.empty(3)
+    h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
     steep = np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))

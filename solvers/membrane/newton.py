@@ -41,10 +41,11 @@ SheetSlopes = Mapping[str, tuple[Array, Array]]
 class Membrane:
     """State of an equilibrium iteration: strain and stress at start and end of an increment.
 
-    reference (n, 3) mm; thickness mm, one or (elements,), as section; strain_*, stress_*, wrinkle
-    (elements, 4, 3), the last the strain of the fabric less that of the surface; step_limit mm: the
-    largest nodal correction of one iteration; keep_tangent: end every increment with its tangent
-    assembled; wrinkle_stiffness: share left to wrinkles; None: the membrane carries compression.
+    reference (n, 3) mm; thickness mm, one or (elements,), as section; strain_* (elements, 4,
+    law.state); stress_*, wrinkle (elements, 4, 3), the last the strain of the fabric less that of
+    the surface; step_limit mm: the largest nodal correction of one iteration; keep_tangent: end
+    every increment with its tangent assembled; wrinkle_stiffness: share left to wrinkles; None: the
+    membrane carries compression.
     """
 
     reference: Array
@@ -68,10 +69,10 @@ class Membrane:
     residual: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        shape = (len(self.quads), 4, 3)
+        shape, state = (len(self.quads), 4, 3), (len(self.quads), 4, self.law.state)
         self.section = np.array(np.broadcast_to(self.thickness, len(self.quads)), dtype=float)
-        self.strain_old, self.stress_old = np.zeros(shape), np.zeros(shape)
-        self.strain_new, self.stress_new = np.zeros(shape), np.zeros(shape)
+        self.strain_old, self.stress_old = np.zeros(state), np.zeros(shape)
+        self.strain_new, self.stress_new = np.zeros(state), np.zeros(shape)
         self.wrinkle = np.zeros(shape)
         self.residual = np.zeros(3 * len(self.reference))
 
@@ -161,6 +162,12 @@ def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
             f"{e1:.3g}, {e2:.3g}, {g12:.3g} MPa and must be positive"
         )
     return e1, e2, g12
+
+
+def forgets(law: HypoelasticLaw, what: str) -> None:
+    """Raise SolverFailure for a law with a memory, which `what` does not take."""
+    if law.memory is not None:
+        raise SolverFailure(f"{what} takes no law with a memory: use the card without it")
 
 
 def initial_stiffness(law: HypoelasticLaw) -> Array:
@@ -274,6 +281,13 @@ def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) ->
     return reach(loading, middle, halfway, level, start, cuts - 1)
 
 
+def last_way(levels: Sequence[float], level: float, most: int) -> int:
+    """Return how many of the last levels lie one after the other on the way to the next one."""
+    steps = np.sign(np.diff([*levels, level]))[::-1]
+    turned = np.flatnonzero(steps != steps[0])
+    return min(most, int(turned[0]) if len(turned) else len(steps))
+
+
 def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
     """Return the point on the line through the last two of the path; else its last one."""
     if len(path) < 2:
@@ -303,8 +317,9 @@ class Record:
         self.membrane.accept()
         self.path[i] = u
         self.forces[i] = self.membrane.residual.reshape(u.shape)
-        np.minimum(self.low, self.membrane.strain_old.min(axis=(0, 1)), out=self.low)
-        np.maximum(self.high, self.membrane.strain_old.max(axis=(0, 1)), out=self.high)
+        strain = self.membrane.strain_old[..., :3]
+        np.minimum(self.low, strain.min(axis=(0, 1)), out=self.low)
+        np.maximum(self.high, strain.max(axis=(0, 1)), out=self.high)
 
 
 # Newton's iteration with a line search, for contact and wrinkles: their stiffness jumps.
@@ -387,10 +402,12 @@ class Derivatives:
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
+        more = law.state - 3
         self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
-        self.strain, self.stress, self.fresh = np.zeros(shape), np.zeros(shape), np.empty(shape)
-        self.point = np.empty((len(membrane.quads), 4, POINT))
+        self.stress, self.fresh = np.zeros(shape), np.empty(shape)
+        self.strain = np.zeros((*shape[:2], law.state, len(names)))
+        self.point = np.empty((len(membrane.quads), 4, POINT + more))
         self.rate = np.empty((membrane.reference.size, len(names)))
         self.sheet: Sheet | None = None
         if sheet and stress_free is not None:
@@ -415,7 +432,10 @@ class Derivatives:
         advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
         if self.sheet is not None:
             strain, stress = self.sheet.at_points(self.point)
-            self.strain[..., self.sheet.columns] += strain
+            self.strain[..., :3, self.sheet.columns] += strain
+            for first in range(3, self.strain.shape[2], 3):
+                own = self.point[..., POINT + first - 3 : POINT + first, None]
+                self.strain[..., first : first + 3, self.sheet.columns] += own * strain
             self.stress[..., self.sheet.columns] += stress
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
@@ -454,6 +474,6 @@ class Sheet:
     def at_points(self, point: Array) -> tuple[Array, Array]:
         """Return those of strain and stress (elements, 4, 3, columns); point : from `explicit`."""
         to_strain = point[..., 6:15].reshape(*point.shape[:2], 3, 3)
-        to_stress = point[..., 15:24].reshape(*point.shape[:2], 3, 3)
+        to_stress = point[..., 15:POINT].reshape(*point.shape[:2], 3, 3)
         strain = to_strain @ self.green
         return strain, to_stress @ strain

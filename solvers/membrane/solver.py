@@ -58,7 +58,7 @@ class MembraneSolver:
 
     name = "membrane"
     external = False
-    load_ratios = True
+    load_ratios = remembers = True
 
     def __init__(
         self, tolerance: float = 1e-8, wrinkle_stiffness: float | None = None,
@@ -123,9 +123,12 @@ class MembraneSolver:
         return analyse(self._membrane(model, law), model, asked)
 
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch | beam.Beam:
-        if self._prepared is None or self._prepared[0] is not model:
+        known = self._prepared
+        state = law.state if known is None else getattr(known[1], "law", law).state
+        if known is None or known[0] is not model or state != law.state:
             prepare = analysis_of(ANALYSES, model, self.name).prepare
             self._prepared = (model, prepare(model, law, self.tolerance, self.wall))
+        assert self._prepared is not None
         membrane = self._prepared[1]
         if isinstance(membrane, beam.Beam):
             return membrane

@@ -22,8 +22,10 @@ from .newton import (
     Loading,
     Membrane,
     Record,
+    forgets,
     initial_moduli,
     lagrange,
+    last_way,
     march,
     named,
 )
@@ -196,8 +198,9 @@ class Pulling(Loading):
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         """Extrapolate in the elongation, from zero or from the last increments."""
-        x = np.array([0.0, *levels][-LOOK_BACK:])
-        known = np.array([np.zeros_like(path[0]), *path][-LOOK_BACK:])
+        count = last_way([0.0, *levels], level, LOOK_BACK)
+        x = np.array([0.0, *levels][-count:])
+        known = np.array([np.zeros_like(path[0]), *path][-count:])
         return lagrange(x, known, level)
 
     def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
@@ -238,6 +241,7 @@ class Patch:
 
 def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Patch:
     """Return the patch; equilibrium holds to rounding, whatever the tolerance."""
+    forgets(law, "a biaxial patch")
     return Patch(law)
 
 

@@ -4,13 +4,23 @@ import csv
 import json
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bubblefit import cycles
 from bubblefit.errors import InputError
-from bubblefit.experiments.strips.cycles import DRIFT, SLIP
-from bubblefit.readers.histories import find_cycles, find_holds, read_history
+from bubblefit.experiments.strips.cycles import (
+    DRIFT,
+    SLIP,
+    evaluate_history,
+    fit_cycles,
+    left_out,
+)
+from bubblefit.materials.forms.spline import Spline
+from bubblefit.materials.law import HypoelasticLaw, law_slopes
+from bubblefit.materials.memory import Memory, own_stress
+from bubblefit.readers.histories import LoadHistory, find_cycles, find_holds, read_history
 
 from ...commands import in_process
 from ...load_cycles import LOW, MADE, faulty, made, write
@@ -218,3 +228,42 @@ def test_the_raw_export_is_its_plain_table(shared_data):
     # Ranges published with the data: 1.75 in strap, cycles 1 and 3.
     assert found.histories[0].values[0].permanent == pytest.approx(0.0123, rel=0.02)
     assert found.histories[0].values[2].loss == pytest.approx(20.7, rel=0.02)
+
+
+def test_a_known_history_of_three_cycles_in_two_directions_gives_its_law_back():
+    knots, level = np.linspace(0.0, 0.08, 6), 5.0
+    memory = Memory((0.45, 0.55, 0.3), (1.7, 1.6, 1.5), (1.2, 1.3, 1.0), (4.0, 2.0, 0.0))
+    tangents = {0: [900.0, 500, 400, 600, 800, 900], 1: [300.0, 250, 200, 220, 300, 350]}
+    form = Spline.at([knots.tolist()] * 2 + [[0.0, 1.0]])
+    law = HypoelasticLaw(np.array([15.0, 15.0, *tangents[1], *tangents[0]]), 0.24,
+                         [0.08, 0.08, 1.0], form=form, memory=memory)  # fmt: skip
+    for pulled in (0, 1):
+        turns, strain = [0.0, 0.05, 0.018, 0.05, 0.016, 0.08, 0.025], []
+        for a, b in pairwise(turns):
+            strain += np.linspace(a, b, 41)[1:].tolist()
+        slopes = law_slopes(law, [], 1.0)
+        stress, _ = own_stress(law.pieces, law.coupling, pulled, np.array(strain), *slopes)
+        history = LoadHistory(Path(f"{pulled}.csv"), np.r_[0.0, level, level + stress],
+                              np.r_[-0.01, 0.0, strain])  # fmt: skip
+        found = fit_cycles(evaluate_history(history, level))
+        assert found.knots == pytest.approx(knots)
+        assert found.stiffness == pytest.approx(tangents[pulled], rel=1e-6)
+        own = memory.constants[4 * pulled : 4 * pulled + 4]
+        assert found.memory == pytest.approx(own, rel=1e-6)
+        assert found.load == pytest.approx(history.load[found.rows], abs=1e-6)
+
+
+def test_left_out_cycles_of_cords_are_predicted(shared_data):
+    """The 16 tests' typical cords, whose extensometer held: stiffness and permanent strain."""
+    count = 0
+    for path in sorted((shared_data / "webbing").glob("cord_typ_*.csv")):
+        one = cycles(path, reference_load=89.0).histories[0]
+        if any(note.kind == SLIP for note in one.notes):
+            continue
+        table = left_out(one)
+        assert table["cycle"].tolist() == [2, 3]
+        assert table["EA_loading_off_percent"].abs().max() < 10
+        assert table["EA_unloading_off_percent"].abs().max() < 10
+        assert table["permanent_strain_off"].abs().max() < 0.001
+        count += 1
+    assert count >= 2

@@ -30,7 +30,7 @@ from bubblefit.materials.forms.polynomial import (
 )
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.point_law import by_pieces, increment_modulus, point_modulus
+from bubblefit.materials.pieces import by_pieces, increment_modulus, point_modulus
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline

@@ -1,0 +1,261 @@
+"""Unloading and reloading of the law: permanent set and hysteresis, compiled.
+
+A law that remembers keeps, for each strain component x (warp, fill, shear), the largest strain seen
+m and its own stress f, the integral of its modulus along the history. On first loading f = F(x),
+the law without a memory. Below m, with p = m set / (1 + saturation m) the permanent set, L = m - p,
+F = F(m), K = F / L and s = (x - p) / L,
+
+    unloading from (x0, f0)             f = f0 g(s) / g(s0),  g = (2 - U) s + (U - 1) s^2
+    reloading from (x0, f0) to (m, F)   F - f = R K (m - x) + B ((m - x) / (m - x0))^2
+                                        with B = F - f0 - R K (m - x0)
+    below p, both ways                  f = (2 - U) K (x - p); of shear F (x - p) / (m + p)
+
+U and R are the tangents at the top of unloading and reloading over the mean stiffness K; a whole
+loop m, p, m loses F L (U - R) / 6. The modulus of an increment is (f - f_old) / (x - x_old), so
+that a branch is exact in any number of them. Shear of either sign is alike: m has its sign.
+
+A strain vector is (eps1, eps2, gamma12, m of each, f of each); coupling[3:] has set, U, R and the
+saturation of each.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..files import compiled
+from .forms.base import STRAIN_NAMES, Array
+from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
+
+#: Entries of `coupling`, and of a strain vector, of a law that remembers nothing.
+PLAIN = 3
+#: An increment that is not divided by: f_new - f_old would be rounding.
+TINY = 1e-10
+QUANTITIES = ("set", "unloading", "reloading", "saturation")
+#: Names of the parameters, in the order of `coupling`.
+NAMES = tuple(f"{quantity}_{name}" for name in STRAIN_NAMES for quantity in QUANTITIES)
+FIELDS = ("permanent_set", "unloading", "reloading", "saturation")
+#: What `recall` writes: f, m, d f / d (x, x_old, f_old, m, F, set, U, R, saturation), where F is
+#: taken, and 1 where that is the new strain.
+(
+    F_NEW, M_NEW, BY_X, BY_OLD, BY_F, BY_M, BY_TOP, BY_SET, BY_U, BY_R, BY_FADE, TOP, ON,
+) = range(13)  # fmt: skip
+RECALLED = 13
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Permanent set and stiffness below the largest strain; each of warp, fill, shear.
+
+    permanent_set : share of the largest strain that is kept, 0 to below 1, where that is small;
+    saturation : per unit of strain, by which the share falls: set / (1 + saturation m). unloading,
+    reloading : tangent modulus where unloading begins, and where reloading ends, over the mean
+    modulus between set and largest strain; 1 <= reloading <= unloading < 2.
+    """
+
+    permanent_set: Sequence[float]
+    unloading: Sequence[float]
+    reloading: Sequence[float] = (1.0, 1.0, 1.0)
+    saturation: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for field in FIELDS:
+            values = tuple(float(x) for x in getattr(self, field))
+            if len(values) != len(STRAIN_NAMES):
+                problem = f"expected a number of {', '.join(STRAIN_NAMES)}, got {len(values)}"
+                raise InputError(None, f"memory.{field}", problem)
+            object.__setattr__(self, field, values)
+        for name, *own in zip(STRAIN_NAMES, *(getattr(self, f) for f in FIELDS), strict=True):
+            kept, up, back, fade = own
+            if not 0 <= kept < 1:
+                problem = f"{name}: expected 0 to below 1, got {kept:g}"
+                raise InputError(None, "memory.permanent_set", problem)
+            if not 1 <= back <= up < 2:
+                problem = f"{name}: expected 1 <= reloading <= unloading < 2, got {back:g}, {up:g}"
+                raise InputError(None, "memory.unloading", problem)
+            if not 0 <= fade < math.inf:
+                raise InputError(
+                    None, "memory.saturation", f"{name}: expected 0 or more, got {fade:g}"
+                )
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """Return the numbers that `NAMES` lists."""
+        rows = zip(*(getattr(self, field) for field in FIELDS), strict=True)
+        return tuple(x for row in rows for x in row)
+
+    @classmethod
+    def of(cls, constants: Sequence[float]) -> "Memory":
+        """Return the memory of the numbers that `NAMES` lists."""
+        return cls(*(constants[k :: len(FIELDS)] for k in range(len(FIELDS))))
+
+    def kept(self, component: int, largest: float) -> float:
+        """Return the permanent set after a largest strain."""
+        fade = 1.0 + self.saturation[component] * largest
+        return self.permanent_set[component] * largest / fade
+
+
+@compiled()
+def _below(k: int, b: float, m: float, top: float, kept: float, up: float, out: Array) -> None:
+    """Write the line below the permanent set, by which loading and unloading are one."""
+    p = kept * m
+    if k == 2:
+        slope = top / (m + p)
+        by_set = -slope / (1.0 + kept)
+    else:
+        slope = (2.0 - up) * top / (m - p)
+        by_set = slope / (1.0 - kept)
+        out[BY_U] = -top / (m - p) * (b - p)
+    out[F_NEW], out[BY_X] = slope * (b - p), slope
+    out[BY_M] = -slope / m * (b - p) - slope * kept
+    out[BY_SET] = by_set * (b - p) - slope * m
+    out[BY_TOP] = (b - p) * slope / top
+
+
+@compiled()
+def recall(
+    pieces: Array, coupling: Array, k: int, x: float, x_old: float, largest: float, own: float,
+    out: Array,
+) -> bool:  # fmt: skip
+    """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
+
+    Returns False where all of it is first loading; the derivatives are then those of F(x).
+    """
+    out[:] = 0.0
+    out[M_NEW], out[BY_M] = largest, 0.0
+    m, side = abs(largest), -1.0 if largest < 0.0 else 1.0
+    a, b = side * x_old, side * x
+    first = m == 0.0 or (a >= m and b >= a)
+    if first or b > m or (k == 2 and b < -m):
+        if k == 2 or x > 0.0:
+            out[ON], out[TOP], out[M_NEW] = 1.0, abs(x), x
+            out[BY_TOP] = -1.0 if x < 0.0 else 1.0
+            out[F_NEW] = out[BY_TOP] * integral_of(pieces, k, 0.0, abs(x))
+            out[BY_X] = point_modulus(pieces, k, x)
+        return not first
+    up, back = coupling[4 + 4 * k], coupling[5 + 4 * k]
+    fade = 1.0 / (1.0 + coupling[6 + 4 * k] * m)
+    kept = coupling[3 + 4 * k] * fade
+    top, p = integral_of(pieces, k, 0.0, m), kept * m
+    length, f = m - p, side * own
+    mean = top / length
+    out[TOP] = m
+    if b < p or (b <= p and b >= a):
+        _below(k, b, m, top, kept, up, out)
+    elif b < a:
+        s0, s1 = (a - p) / length, (b - p) / length
+        g0, g1 = ((2.0 - up) + (up - 1.0) * s0) * s0, ((2.0 - up) + (up - 1.0) * s1) * s1
+        slope0, slope1 = (2.0 - up) + 2.0 * (up - 1.0) * s0, (2.0 - up) + 2.0 * (up - 1.0) * s1
+        share = f / g0
+        out[F_NEW], out[BY_F] = share * g1, g1 / g0
+        out[BY_X] = share * slope1 / length
+        out[BY_OLD] = -share * g1 / g0 * slope0 / length
+        by0, by1 = slope0 * -a / (length * m), slope1 * -b / (length * m)
+        out[BY_M] = share * (by1 - g1 / g0 * by0)
+        by0, by1 = slope0 * m * (s0 - 1.0) / length, slope1 * m * (s1 - 1.0) / length
+        out[BY_SET] = share * (by1 - g1 / g0 * by0)
+        out[BY_U] = share * (s1 * (s1 - 1.0) - g1 / g0 * s0 * (s0 - 1.0))
+    else:
+        from_set = a < p
+        if from_set:
+            a, f = p, 0.0
+        ahead, left, steep = m - a, m - b, back * mean
+        q, rest = left / ahead, top - f - steep * ahead
+        out[F_NEW] = top - steep * left - rest * q * q
+        out[BY_X] = steep + 2.0 * rest * q / ahead
+        by_a = -steep * q * q - 2.0 * rest * q * q / ahead
+        by_steep = ahead * q * q - left
+        out[BY_M] = steep * (q * q - 1.0) - 2.0 * rest * q * (b - a) / (ahead * ahead)
+        out[BY_M] -= by_steep * steep / m
+        out[BY_TOP] = 1.0 - q * q + by_steep * back / length
+        out[BY_SET], out[BY_R] = by_steep * steep / (1.0 - kept), by_steep * mean
+        if from_set:
+            out[BY_M] += by_a * kept
+            out[BY_SET] += by_a * m
+        else:
+            out[BY_OLD], out[BY_F] = by_a, q * q
+    # From the share that is kept to its parameters.
+    out[BY_M] -= out[BY_SET] * kept * coupling[6 + 4 * k] * fade
+    out[BY_FADE] = -out[BY_SET] * kept * m * fade
+    out[BY_SET] *= fade
+    # Of the side on which the largest strain lies: f, F and the constants have its sign.
+    out[F_NEW] *= side
+    out[BY_TOP] *= side
+    out[BY_SET] *= side
+    out[BY_U] *= side
+    out[BY_R] *= side
+    out[BY_FADE] *= side
+    return True
+
+
+@compiled()
+def recalled_modulus(
+    pieces: Array, coupling: Array, k: int, h: Array, h_old: Array
+) -> tuple[float, float, float]:
+    """Return as `increment_modulus`, of a law that remembers; write m and f of h (9,)."""
+    out = np.empty(RECALLED)
+    x, x_old, own = h[k], h_old[k], h_old[6 + k]
+    again = recall(pieces, coupling, k, x, x_old, h_old[3 + k], own, out)
+    h[3 + k], h[6 + k] = out[M_NEW], out[F_NEW]
+    if not again:
+        return increment_modulus(pieces, k, x, x_old)
+    change = x - x_old
+    if abs(change) < TINY:
+        return out[BY_X], 0.0, 0.0
+    mean = (out[F_NEW] - own) / change
+    return mean, (out[BY_X] - mean) / change, (out[BY_OLD] + mean) / change
+
+
+@compiled()
+def remember(
+    pieces: Array, coupling: Array, k: int, h: Array, h_old: Array, rows: Array, by_coupling: Array,
+    dh_old: Array, weights: Array, mean: Array, out: Array,
+) -> None:  # fmt: skip
+    """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
+
+    rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
+    and f are replaced by theirs after the increment. mean (np,) : of the modulus; kept on a first
+    loading. out : of `recall`.
+    """
+    again = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
+    change, by_m = h[k] - h_old[k], out[BY_M]
+    if out[ON] == 0.0:  # F is that of the largest strain before
+        steep = point_modulus(pieces, k, out[TOP])
+        by_m += out[BY_TOP] * (-steep if h_old[3 + k] < 0.0 else steep)
+    first, stop = by_pieces(pieces, k, out[TOP], 0.0, weights)
+    for j in range(mean.shape[0]):
+        total = 0.0
+        for piece in range(first, stop):
+            for power in range(4):
+                total += weights[piece, power] * rows[k, piece, power, j]
+        total *= out[BY_TOP] * out[TOP]
+        total += by_m * dh_old[3 + k, j] + out[BY_F] * dh_old[6 + k, j]
+        for i in range(4):
+            total += out[BY_SET + i] * by_coupling[PLAIN + 4 * k + i, j]
+        if again:
+            mean[j] = (total - dh_old[6 + k, j]) / change if abs(change) >= TINY else 0.0
+        dh_old[6 + k, j] = total + out[BY_OLD] * dh_old[k, j]
+        dh_old[3 + k, j] *= 1.0 - out[ON]
+
+
+@compiled()
+def own_stress(
+    pieces: Array, coupling: Array, k: int, strain: Array, rows: Array, by_coupling: Array
+) -> tuple[Array, Array]:
+    """Return the stress (n,) of a bar along a history of its strain (n,), and slopes (n, np).
+
+    k : 0 warp, 1 fill; the bar is pulled along it and free to contract. rows, by_coupling : of
+    `law_slopes`.
+    """
+    count = by_coupling.shape[1]
+    stress, slopes, out = np.empty(len(strain)), np.empty((len(strain), count)), np.empty(RECALLED)
+    h, h_old, by = np.zeros(9), np.zeros(9), np.zeros((9, count))
+    weights, mean = np.empty((pieces.shape[1], 4)), np.empty(count)
+    for i in range(len(strain)):
+        h[k] = strain[i]
+        remember(pieces, coupling, k, h, h_old, rows, by_coupling, by, weights, mean, out)
+        h_old[k], h_old[3 + k], h_old[6 + k] = strain[i], out[M_NEW], out[F_NEW]
+        stress[i], slopes[i] = out[F_NEW], by[6 + k]
+    return stress, slopes
