@@ -67,7 +67,7 @@ class BubbleModel:
     modes: Mapping[str, Array] = field(default_factory=dict)
     slack: tuple[float, float] = (0.0, 0.0)
     rim_motion: Array | None = None
-    unloaded: bool = False
+    unloaded: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         steps = np.array(self.increments if len(self.increments) else self.pressures, float)
