@@ -107,8 +107,9 @@ class History:
     @property
     def mesh(self) -> Mesh:
         """Return the mesh of the model, at rest; InputError where the model is not known."""
-        if self.model is None:
-            raise InputError(None, "model", "is not known here: simulate(...) and fit.history() do")
+        if not hasattr(self.model, "mesh"):
+            problem = "is not known here, or has no mesh: simulate(...) and fit.history() tell it"
+            raise InputError(None, "model", problem)
         return cast(Mesh, self.model.mesh)
 
     def strain(self, at: Places = "elements") -> Array:
