@@ -491,8 +491,9 @@ def alike_in_all(
     common = _values(np.concatenate(along), shapes) @ mean
     followed = np.linalg.qr(whole @ kept.T)[0] if len(kept) else np.zeros((len(common), 0))
     rms = float(np.sqrt(np.mean((common - followed @ (followed.T @ common)) ** 2)))
-    if not np.linalg.eigvalsh(spread).min() > 0:
-        return None  # specimens that do not differ at all: nothing to test against
+    sizes = np.linalg.eigvalsh(spread)
+    if not sizes[0] > NOTHING**2 * sizes[-1]:
+        return None  # specimens that differ by a factor only, or not at all
     square = specimens * float(mean @ np.linalg.solve(spread, mean))
     ratio = square * (specimens - count) / (count * (specimens - 1))
     largest = float(fdtri(count, specimens - count, 1 - FALSE_ALARMS))

@@ -272,3 +272,13 @@ def test_a_card_exports_as_the_command(together, tmp_path, name):
     assert card.export(name, tmp_path / "python", overwrite=True) == files
     with pytest.raises(InputError, match=r"abaqus-umat, .*gsa.*'nope'"):
         card.export("nope")
+
+
+def test_specimens_that_differ_by_a_factor_are_fitted():
+    u = np.linspace(0.1, 2.0, 20)
+    loads = 20 * (700 * np.log1p(u / 20) - 750 * np.log1p(u / 20) ** 2)
+    curves = {way: [(u, f * loads) for f in (0.95, 1.0, 1.02, 1.04)] for way in ("warp", "fill")}
+    strips = bf.Strips(curves, gauge=20.0, match="points", increments=5)
+    law = bf.Law("linear", strain_range=[0.1, 0.1, 0.1])
+    fit = bf.fit([strips], law, fabric=bf.Fabric("made", 0.8), starts=1, jobs=1)
+    assert np.isfinite(fit.bands()["upper_MPa"]).all() and fit.findings
