@@ -114,6 +114,38 @@ def test_the_notebook_runs():
         assert f"bf.{name}(" in NOTEBOOK.read_text()
 
 
+GALLERY = sorted((EXAMPLES / "gallery").glob("*.ipynb"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", GALLERY, ids=lambda path: path.stem)
+def test_the_gallery_runs(path):
+    """Without an error, with the drawings that are stored, and leaves nothing behind."""
+    notebook = nbformat.read(path, as_version=4)
+    stored = [len(drawings(cell)) for cell in notebook.cells]
+    before = {own.name for own in path.parent.iterdir()}
+    where = {"metadata": {"path": str(path.parent)}}
+    NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where).execute()
+    assert [len(drawings(cell)) for cell in notebook.cells] == stored
+    assert {own.name for own in path.parent.iterdir()} == before
+
+
+def test_the_gallery_is_eight_short_notebooks_with_pictures():
+    listed = (EXAMPLES / "gallery" / "README.md").read_text()
+    assert len(GALLERY) == 8
+    for path in GALLERY:
+        notebook = nbformat.read(path, as_version=4)
+        assert len(notebook.cells) <= 25 and f"]({path.name})" in listed
+        assert sum(len(drawings(cell)) for cell in notebook.cells) >= 2
+        assert not [o for cell in notebook.cells for o in cell.get("outputs", ()) if "ename" in o]
+
+
+def drawings(cell):
+    """The drawings that a cell gave."""
+    given = (output.get("data", {}) for output in cell.get("outputs", ()))
+    return [data["image/svg+xml"] for data in given if "image/svg+xml" in data]
+
+
 def steps_of_github():
     job = yaml.safe_load((BATCH / "github.yml").read_text())["jobs"]["fit"]
     return job, [step["run"] for step in job["steps"] if "run" in step]
