@@ -201,7 +201,7 @@ class MaterialCard:
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
         sure = self.certainty
         band = None if sure is None else functools.partial(sure.band, self.law)
-        return moduli_html(self.law, words, band)
+        return moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:

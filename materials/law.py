@@ -215,11 +215,11 @@ class HypoelasticLaw:
 
 def moduli_html(
     law: HypoelasticLaw, caption: str,
-    band: Callable[[str, Array], tuple[Array, Array]] | None = None,
+    band: Callable[[str, Array], tuple[Array, Array]] | None = None, level: str = "",
 ) -> str:  # fmt: skip
     """Return a table of the moduli at rest, and halfway to and at the end of their range.
 
-    band : of a modulus by its name, at strains (n,).
+    band : of a modulus by its name, at strains (n,). level : its name.
     """
     rows: list[list[object]] = []
     for name, component in COMPONENTS.items():
@@ -231,7 +231,7 @@ def moduli_html(
             ends = [f"{low:.4g} to {high:.4g}" for low, high in pairs]
         values = zip(strain, law.modulus(name, strain), ends, strict=True)
         rows += [[name, f"{100 * x:.3g} %", f"{value:.4g}", own] for x, value, own in values]
-    return html_table(caption, ["", "strain", "MPa", "" if band is None else "95 % band"], rows)
+    return html_table(caption, ["", "strain", "MPa", level], rows)
 
 
 def _read_only(numbers: ArrayLike) -> Array:

@@ -27,7 +27,7 @@ from ..experiments.registry import report_of
 from ..files import __version__, html_table
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
 from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
-from ..inference.posterior import Posterior
+from ..inference.posterior import LEVEL, Posterior
 from ..inference.problem import FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
@@ -267,7 +267,7 @@ class Fit:
         ]  # fmt: skip
         words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
         words += f"best of {len(self.best.ranked)} starts, {len(self.notes)} notes"
-        return html_table(words, ["", "strain", "MPa", "95 % band", "kN/m"], rows)
+        return html_table(words, ["", "strain", "MPa", f"{LEVEL:.0%} band", "kN/m"], rows)
 
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: value, sigma, bounds, correlation with each other one."""
