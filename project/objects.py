@@ -14,6 +14,7 @@ import csv
 import difflib
 import hashlib
 import io
+import json
 import os
 import re
 import shutil
@@ -32,7 +33,7 @@ from ..errors import InputError
 from ..experiments.bubble.section import RegistrationSection, SheetSection
 from ..experiments.kinds import Output
 from ..experiments.registry import kind_named
-from ..files import is_file, write_text
+from ..files import is_file, output_errors, write_text
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..readers.curves import DIRECTIONS, read_load_curves
 from ..readers.frames import QUANTITIES, frame_files
@@ -606,11 +607,24 @@ def _words(said: Mapping[str, Any]) -> str:
     return ", ".join(f"{key}={repr(value)[:60]}" for key, value in said.items())
 
 
+SCRATCH = "bubblefit-arrays-"
+
+
 def scratch_folder() -> Path:
     """Return a new folder for arrays of a project without one; removed when Python ends."""
-    folder = tempfile.mkdtemp(prefix="bubblefit-arrays-")
+    folder = tempfile.mkdtemp(prefix=SCRATCH)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
+
+
+def with_kept_arrays(content: Any, folder: Path) -> Any:
+    """Return plain values that name files of arrays below a folder, where they will last."""
+    text = json.dumps(content)
+    for root in set(re.findall(rf'"([^"]*{SCRATCH}[^"/\\]*)', text)):
+        with output_errors(folder):
+            shutil.copytree(json.loads(f'"{root}"'), folder / "data", dirs_exist_ok=True)
+        text = text.replace(root, json.dumps(os.path.abspath(folder / "data"))[1:-1])
+    return json.loads(text)
 
 
 @contextmanager

@@ -36,6 +36,7 @@ from ..files import (
     replacing,
     write_text,
 )
+from ..project.objects import with_kept_arrays
 from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
@@ -470,7 +471,9 @@ class Record:
 
     def write(self, folder: Path) -> None:
         """Write provenance.json, and the project as run; raises OutputError."""
-        content = self.to_json()
+        names = ("text", "settings", "data")
+        kept = with_kept_arrays({name: getattr(self, name) for name in names}, folder)
+        content = replace(self, **kept).to_json()
         if self.settings is not None:
             write_text(folder / AS_RUN, content["project"]["as_run"])
         write_text(folder / PROVENANCE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")

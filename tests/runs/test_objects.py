@@ -468,3 +468,26 @@ def test_the_code_of_the_document_runs(tmp_path, monkeypatch):
     found = runpy.run_path("code.py")
     assert objective(found["same"]) == objective(found["project"])
     assert set(found["again"].tests) == {"bubble", "strips"} and found["other"].fit.starts == 8
+
+
+def test_results_of_arrays_are_run_again_and_resumed(arrays, tmp_path):
+    bubble = bf.Bubble(**arrays, radius=100.0, elements=48, symmetry="quarter")
+    how = {"fabric": FABRIC, "starts": 1, "jobs": 1}
+    fit = bf.fit(bubble, bf.Law("constant"), **how)
+    fit.report(tmp_path / "page")
+    for name in ("as-run.toml", "provenance.json"):
+        assert "bubblefit-arrays" not in (tmp_path / "page" / name).read_text()
+    again = bf.read_project(tmp_path / "page" / "as-run.toml")
+    assert objective(again) == objective(fit.setup.project)
+
+    out = tmp_path / "out"
+    bf.fit(bubble, bf.Law("constant"), out=out, **how)
+    made = sorted((out / "data").rglob("*.csv"))
+    more = bf.fit(bubble, bf.Law("constant"), out=out, resume=True, **{**how, "starts": 2})
+    assert len(made) == 20 and made == sorted((out / "data").rglob("*.csv"))
+    assert objective(more.setup.project) == objective(again)
+    arrays["displacements"][0, 0, 0] += 0.1
+    other = bf.Bubble(**arrays, radius=100.0, elements=48, symmetry="quarter")
+    with pytest.raises(InputError, match="something else"):
+        bf.fit(other, bf.Law("constant"), out=out, resume=True, **how)
+    assert objective(bf.read_project(out / "as-run.toml")) == objective(again)
