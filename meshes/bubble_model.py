@@ -41,6 +41,8 @@ RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
 }  # fmt: skip
 #: Parameters of the stress-free sheet beside its modes.
 SLACK = ("slack_warp", "slack_fill")
+#: The angle, in radians, by which the yarns are turned in the plane, from x to y.
+TURN = "turn"
 PRESSURE_OFFSET = "pressure_offset"
 
 
@@ -48,7 +50,7 @@ PRESSURE_OFFSET = "pressure_offset"
 class BubbleModel:
     """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
-    mesh : mm; warp is x, fill is y, z the surface in the reference picture, from which
+    mesh : mm; warp is x unless the mesh says it, z the surface in the reference picture, from which
     displacements are counted. pressures : MPa, increasing: the frames. increments : MPa, containing
     every pressure: steps of the law, which hardly matter (benchmarks/bench_law.py increments);
     `unloaded` : both may fall, and each increment is a frame.
@@ -107,7 +109,7 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        return (PRESSURE_OFFSET, THICKNESS, *SLACK, *self.modes)
+        return (PRESSURE_OFFSET, THICKNESS, *SLACK, TURN, *self.modes)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the model with `values` added to its `parameters`; itself where all are zero."""
@@ -120,8 +122,13 @@ class BubbleModel:
         warp, fill = (
             own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
         )
+        yarns = self.mesh.warp
+        if turn := values.get(TURN, 0.0):
+            x, y, z = np.eye(3)[0] if yarns is None else yarns.T
+            turned = [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
+            yarns = np.array(np.broadcast_to(np.stack(turned, axis=-1), (len(self.mesh.quads), 3)))
         return replace(
-            self, mesh=replace(self.mesh, points=points),
+            self, mesh=replace(self.mesh, points=points, warp=yarns),
             thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
             increments=[p + offset for p in self.increments], slack=(warp, fill)
@@ -132,16 +139,22 @@ class BubbleModel:
         warp, fill = self.slack
         return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
 
-    def sheet_slope(self, name: str) -> tuple[Array, Array]:
-        """Return derivatives (nodes, 3) of the reference surface and of `stress_free` by a
-        parameter."""
+    @property
+    def yarn(self) -> Array:
+        """Return the direction of the warp in the plane, (3,)."""
+        return np.eye(3)[0] if self.mesh.warp is None else np.asarray(self.mesh.warp[0])
+
+    def sheet_slope(self, name: str) -> tuple[Array, Array, Array]:
+        """Return derivatives of the reference surface and of `stress_free` (nodes, 3), and of
+        `yarn` (3,), by a parameter."""
         surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
+        yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
         if name in self.modes:
             surface[:, 2] = sheet[:, 2] = self.modes[name]
         elif name in SLACK:
             axis = SLACK.index(name)
             sheet[:, axis] = self.mesh.points[:, axis]
-        return surface, sheet
+        return surface, sheet, yarn
 
     def held(self, pressure: float) -> Array:
         """Return (fixed,) mm, displacements of the held degrees of freedom at a pressure (MPa)."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 Unknowns = Mapping[str, float]
 #: Nuisance of a measured field: a rigid displacement, mm.
 OFFSETS = ("offset_x", "offset_y", "offset_z")
+#: What a registration leaves open: a tilt of the plane about x and y (degrees), and how far the
+#: true places lie along x and y from those that are given (mm).
+PLACED = ("tilt_x", "tilt_y", "shift_x", "shift_y")
 #: mm, noise of a displacement by a good image correlation.
 CORRELATION = 0.05
 
@@ -152,7 +156,28 @@ class FieldObjective:
     def modelled(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
         shift = displacement_offset(nuisance)
-        return [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
+        moved = [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
+        amounts = {name: own for name, own in (nuisance or {}).items() if name in PLACED and own}
+        if not amounts:
+            return moved
+        values = np.array([amounts.get(name, 0.0) for name in PLACED])
+        return [m + placed @ values for m, placed in zip(moved, self._placed, strict=True)]
+
+    @cached_property
+    def _placed(self) -> list[Array]:
+        """Return (n, 3, 4) mm of each target: what one of each of `PLACED` changes.
+
+        By the measured field, of which the model's hardly differs: of first order in the amounts.
+        """
+        found = []
+        for target in self.targets:
+            assert target.at_rest is not None
+            (dx, dy, dz), none = target.displacement.T, np.zeros(len(target.displacement))
+            by_x, by_y = _slopes(target.at_rest, target.displacement)
+            tilts = [np.stack([none, -dz, dy], axis=1), np.stack([dz, none, -dx], axis=1)]
+            columns = [*(np.pi / 180 * one for one in tilts), by_x, by_y]
+            found.append(np.stack(columns, axis=-1))
+        return found
 
     def differences(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return model less measured (n, 3) mm of each target, without a constant field."""
@@ -242,15 +267,15 @@ class FieldObjective:
         return {words: self._columns(own) for words, own in parts.items()}
 
     def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """Return (m, names), the slope of the residual by offset_x, offset_y, offset_z (mm)."""
-        unknown = [name for name in names if name not in OFFSETS]
+        """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `PLACED`."""
+        every = (*OFFSETS, *PLACED)
+        unknown = [name for name in names if name not in every]
         if unknown:
             raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
-        columns = [
-            np.kron(np.diag(1.0 / scale), np.ones((len(target.displacement), 1)))
-            for target, scale in zip(self.targets, self.scales, strict=True)
-        ]
-        return np.concatenate(columns)[:, [OFFSETS.index(name) for name in names]]
+        parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
+        if any(name in PLACED for name in names):
+            parts = [np.concatenate(both, -1) for both in zip(parts, self._placed, strict=True)]
+        return self._columns(parts)[:, [every.index(name) for name in names]]
 
     def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
         """Return the mean of |dx| + |dy| + |dz| differences over all places and pressures, mm."""

@@ -16,7 +16,7 @@ from ...inference.comparison import Comparison, Nuisance
 from ...inference.virtual_work import GapObjective, smoothed
 from ...materials.forms.base import form_named
 from ...materials.law import HypoelasticLaw
-from ...meshes.bubble_model import BubbleModel, default_increments
+from ...meshes.bubble_model import TURN, BubbleModel, default_increments
 from ...meshes.disk import Outline
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
@@ -29,7 +29,15 @@ from .objective import FieldObjective, FieldTarget, folded, mirrored
 from .point_files import PointFiles
 from .registration import Registration, register_fields
 from .section import Sheet
-from .sheet import FLAT, MeasuredSheet, measured_sheet, sheet_nuisance, with_sheet
+from .sheet import (
+    FLAT,
+    MOST_SIGMAS,
+    MeasuredSheet,
+    measured_sheet,
+    prior_weight,
+    sheet_nuisance,
+    with_sheet,
+)
 from .test import PART, BubbleTest, KnownSolution, measured_fields
 
 #: Over pressures and directions; relative to the largest measured displacement of each.
@@ -39,6 +47,8 @@ STAGE = 2
 #: mm and kPa; a pressure offset leaves the first pressure positive.
 MOST_SHIFT, MOST_PRESSURE, LEAST_SHARE = 20.0, 50.0, -0.9
 PRESSURE = "pressure_offset"
+#: Degrees: beyond, a sheet of swapped moduli comes near.
+MOST_TURN = 30.0
 #: Quads of the full disk: with fewer it is no disk any more.
 LEAST_QUADS = 48
 #: Quads on which a smoothed shape is balanced, at most: measured fields know no more.
@@ -119,7 +129,11 @@ class PreparedBubble:
             objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
         except InputError as error:
             raise test.place.error(error.field, error.problem) from None
-        nuisance = (*nuisance_of(test), *sheet_nuisance(sheet, model, objective.scale))
+        nuisance = (
+            *nuisance_of(test),
+            *sheet_nuisance(sheet, model, objective.scale),
+            *registration_nuisance(test, objective),
+        )
         if masks and all(target.frame is not None for target in targets):
             # What lies above the last frame that counts strains nothing.
             last = max(sheet.since or 0, *(target.frame or 0 for target in targets))
@@ -249,6 +263,27 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
         least = LEAST_SHARE * 1e3 * min(test.increments)
         on.append(Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3))
     return tuple(on)
+
+
+def registration_nuisance(test: BubbleTest, objective: FieldObjective) -> list[Nuisance]:
+    """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
+
+    Their priors weigh as the noise does: the field's symmetry tells far more.
+    """
+    known, found = test.registration, list[Nuisance]()
+    weight = prior_weight(objective.least_noise, objective.scale)
+    for name, prior in known.items():
+        most = MOST_SIGMAS * prior
+        if name == "turn":
+            most = min(most, MOST_TURN)
+            found.append(
+                Nuisance(name, -most, most, "deg", TURN, float(np.pi / 180), prior, weight)
+            )
+            continue
+        unit = "deg" if name == "tilt" else "mm"
+        own = (one for one in matching.PLACED if one.startswith(name))
+        found += [Nuisance(one, -most, most, unit, prior=prior, weight=weight) for one in own]
+    return found
 
 
 def resampled(

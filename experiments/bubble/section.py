@@ -254,6 +254,27 @@ class Sheet:
         return bool(self.measured or self.modes or self.constant or self.since is not None)
 
 
+#: One standard deviation of what a registration leaves open: degrees, degrees, mm.
+LEFT_OPEN = {"turn": 10.0, "tilt": 3.0, "shift": 3.0}
+
+
+def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
+    """Return one standard deviation of each unknown of the registration (degrees, mm).
+
+    Raises InputError where such an unknown needs more of the test than there is.
+    """
+    nuisance, length = section.nuisance, place.scales.length
+    usual = LEFT_OPEN if nuisance.registration == "fitted" else {}
+    given = {name: getattr(nuisance, name) for name in LEFT_OPEN}
+    scale = {"turn": 1.0, "tilt": 1.0, "shift": length}
+    said = {name: scale[name] * own for name, own in given.items() if own is not None}
+    found = {**usual, **said}
+    if found and section.symmetry == "quarter":
+        key = next(iter(said), "registration")
+        raise place.error(f"nuisance.{key}", "a quarter cannot be turned: needs symmetry = 'full'")
+    return {name: found[name] for name in LEFT_OPEN if name in found}
+
+
 def sheet_of(
     section: SheetSection,
     place: Place,
@@ -381,10 +402,17 @@ class MatchSection(Section):
 
 
 class NuisanceSection(Section):
-    """Offsets of a measurement, fitted beside the moduli."""
+    """Offsets of a measurement, and its registration, fitted beside the moduli.
+
+    turn, tilt (degrees), shift : one standard deviation of each around what was registered.
+    """
 
     displacement_offset: bool = False
     pressure_offset: bool = False
+    registration: Literal["given", "fitted"] = "given"
+    turn: Positive | None = None
+    tilt: Positive | None = None
+    shift: Positive | None = None
 
 
 class BubbleSection(Section):

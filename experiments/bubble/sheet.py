@@ -158,9 +158,14 @@ def with_sheet(
     return replace(model, modes=disk_modes(outline.unit(places), 1.0, sheet.modes))
 
 
+def prior_weight(misfit: float, scale: Array) -> float:
+    """Return the residual of an unknown one prior away; misfit : mm; scale (m,) : mm in one."""
+    return float(misfit * np.sqrt(TOGETHER) / np.median(scale))
+
+
 def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
     """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
-    weight = sheet.misfit * np.sqrt(TOGETHER) / float(np.median(scale))
+    weight = prior_weight(sheet.misfit, scale)
     most = MOST_SIGMAS * sheet.prior
     unknowns = [
         Nuisance(name, -most, most, "mm", name, 1.0, sheet.prior, weight) for name in model.modes

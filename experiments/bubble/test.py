@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import pairwise
 from typing import Literal
@@ -20,7 +20,15 @@ from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
 from .registration import clamp_radius
-from .section import BubbleSection, Sheet, Symmetry, facet_of, outline_of, sheet_of
+from .section import (
+    BubbleSection,
+    Sheet,
+    Symmetry,
+    facet_of,
+    fitted_registration,
+    outline_of,
+    sheet_of,
+)
 
 
 def merge_increments(
@@ -97,6 +105,7 @@ class BubbleTest:
 
     `pressures` are reported and matched, `increments` are the load steps and contain them. `noise`
     of one displacement. `facet` : by which the camera reads displacements, None for points.
+    `registration` : one standard deviation (degrees, mm) of each of its unknowns.
     """
 
     name: str
@@ -118,6 +127,7 @@ class BubbleTest:
     noise: float | None = None
     facet: Facet | None = None
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
+    registration: Mapping[str, float] = field(default_factory=dict)
     kind: str = "bubble"
 
     @property
@@ -183,6 +193,8 @@ class BubbleTest:
         said["outline"] = asdict(self.outline)
         if self.facet is not None:
             said["filter"] = asdict(self.facet)
+        if self.registration:
+            said["fitted_registration"] = dict(self.registration)
         if self.sheet != Sheet():
             said["sheet"] = asdict(self.sheet)
         if isinstance(self.data, PointFiles) and self.data.registration is not None:
@@ -230,6 +242,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         facet=facet_of(camera, place, length, section.symmetry, section.match.by),
         sheet=sheet,
         of_clamp=section.radius == "clamp",
+        registration=fitted_registration(section, place),
     )
 
 

@@ -111,7 +111,9 @@ def bubble_decks(
     later = FIRST_OF_STEP if rim else 1.0
     context: dict[str, Any] = {
         # The law's increments are the model's, whatever CalculiX makes of them.
-        "constants": constants(law, whole_times=True),
+        "constants": constants(
+            law, angle=math.degrees(math.atan2(*model.yarn[1::-1])), whole_times=True
+        ),
         "thickness": model.thickness,
         "supports": supports_of(supports),
         "rim": rim,

@@ -103,8 +103,8 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
-        points, quads, reference_elements(model.stress_free, quads), model.thickness, law, free,
-        tangent_for(quads, points.size, free), tolerance,
+        points, quads, reference_elements(model.stress_free, quads, model.mesh.warp),
+        model.thickness, law, free, tangent_for(quads, points.size, free), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
     )  # fmt: skip
 
@@ -117,7 +117,7 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     if asked.parameters:
         of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
         slopes = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
-        derivatives = Derivatives(membrane, asked.parameters, model.stress_free, slopes)
+        derivatives = Derivatives(membrane, asked.parameters, model.stress_free, slopes, model.yarn)
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
     record, keep = Record(membrane, len(levels)), model.reported
     judged, unstable = set(keep.tolist()), []

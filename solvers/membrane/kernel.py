@@ -471,18 +471,23 @@ def by_sheet(  # type: ignore[no-untyped-def]
                         )
 
 
-def element_slopes(points: Array, quads: NDArray[np.intp], direction: Array) -> tuple[Array, Array]:
-    """Return derivatives of `reference_elements`, slopes and area, along a direction (n, 3)."""
+def element_slopes(
+    points: Array, quads: NDArray[np.intp], direction: Array, yarn: Array, yarn_by: Array
+) -> tuple[Array, Array]:
+    """Return derivatives of `reference_elements`, slopes and area, along a direction (n, 3).
+
+    yarn, yarn_by : (3,) the warp of all facets, and its own derivative.
+    """
     base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
     base_by = np.einsum("pan,mnk->mpak", NATURAL, direction[quads])
     normal = np.cross(base[:, :, 0], base[:, :, 1])
     normal_by = np.cross(base_by[:, :, 0], base[:, :, 1])
     normal_by += np.cross(base[:, :, 0], base_by[:, :, 1])
     unit, unit_by, _, area_by = _normalised(normal, normal_by)
-    # Along the yarn: x less its part along the normal.
-    across, across_by = unit[..., :1], unit_by[..., :1]
-    along = np.array([1.0, 0.0, 0.0]) - across * unit
-    along, along_by, _, _ = _normalised(along, -across_by * unit - across * unit_by)
+    # Along the yarn: its direction less the part along the normal.
+    across, across_by = unit @ yarn[:, None], unit_by @ yarn[:, None] + unit @ yarn_by[:, None]
+    along = yarn - across * unit
+    along, along_by, _, _ = _normalised(along, yarn_by - across_by * unit - across * unit_by)
     frame = np.stack([along, np.cross(unit, along)], axis=2)
     frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=2)
     jacobian = np.einsum("mpak,mpbk->mpab", base, frame)

@@ -33,8 +33,11 @@ MOST_TRIALS, LEFT = 10, 0.5
 GAIN, SMALL = 0.1, 1e-2
 #: Part of the way to the end known to be too far: at least, where only that is known, at most.
 NEAREST, BLIND, FARTHEST = 0.1, 0.3, 0.9
-#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones.
-SheetSlopes = Mapping[str, tuple[Array, Array]]
+#: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones,
+#: and (3,) of the direction of the warp.
+SheetSlopes = Mapping[str, tuple[Array, Array, Array]]
+#: The warp of a sheet that does not say it.
+WARP = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(eq=False)
@@ -392,12 +395,12 @@ class Derivatives:
 
     parameters : "beta_i", "nu12", "pressure_offset", "thickness", and those of `sheet`: slopes of
     the sheet's own parameters, which need stress_free (n, 3) mm, places of the nodes without
-    stress.
+    stress, and yarn (3,), the warp.
     """
 
     def __init__(
         self, membrane: Membrane, parameters: Sequence[str], stress_free: Array | None = None,
-        sheet: SheetSlopes | None = None,
+        sheet: SheetSlopes | None = None, yarn: Array = WARP,
     ) -> None:  # fmt: skip
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
@@ -411,7 +414,7 @@ class Derivatives:
         self.rate = np.empty((membrane.reference.size, len(names)))
         self.sheet: Sheet | None = None
         if sheet and stress_free is not None:
-            self.sheet = Sheet(membrane, stress_free, sheet, [names.index(n) for n in sheet])
+            self.sheet = Sheet(membrane, stress_free, sheet, [names.index(n) for n in sheet], yarn)
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
@@ -452,11 +455,15 @@ class Sheet:
     """Part of the stress-free sheet's parameters at fixed displacement; columns : among all."""
 
     def __init__(
-        self, membrane: Membrane, stress_free: Array, slopes: SheetSlopes, columns: Sequence[int]
-    ) -> None:
+        self, membrane: Membrane, stress_free: Array, slopes: SheetSlopes, columns: Sequence[int],
+        yarn: Array,
+    ) -> None:  # fmt: skip
         self.membrane, self.columns = membrane, list(columns)
-        self.surface = np.array([surface for surface, _ in slopes.values()])
-        pairs = [element_slopes(stress_free, membrane.quads, way) for _, way in slopes.values()]
+        self.surface = np.array([surface for surface, _, _ in slopes.values()])
+        pairs = [
+            element_slopes(stress_free, membrane.quads, way, yarn, turn)
+            for _, way, turn in slopes.values()
+        ]
         self.slopes = np.array([slopes for slopes, _ in pairs])
         self.area = np.array([area for _, area in pairs])
         self.green = np.empty((len(membrane.quads), 4, 3, len(columns)))
