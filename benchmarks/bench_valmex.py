@@ -44,6 +44,7 @@ pressures = {pressures}
 elements = {elements}
 objective = "mm"
 sheet = {{ modes = {modes} }}
+{unknowns}
 [bubble.data.points]
 pattern = "grid/test{test}_{{index:02d}}.csv"
 indices = {frames}
@@ -65,10 +66,13 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
  shear = [0.0, 0.1, 0.3, 0.6, 0.883] }"""
 
 
-def project(law, tests, data, frames, elements, modes, starts, strip_increments):
+def project(
+    law, tests, data, frames, elements, modes, starts, strip_increments, unknowns=""
+):  # fmt: skip
+    """Return a project of measured tests by name and, unless 0, of the published strips."""
     table = pd.read_csv(data / "grid_pressures.csv")
     said = {"pressures": [float(table["p_bar"][k]) for k in frames], "frames": list(frames)}
-    said |= {"elements": elements, "modes": modes}
+    said |= {"elements": elements, "modes": modes, "unknowns": unknowns}
     text = PROJECT.format(law=law, starts=starts)
     text += "".join(BUBBLE.format(name=name, test=test, **said) for name, test in tests.items())
     if strip_increments:

@@ -2,9 +2,9 @@
 
     E1 = E1(eps1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2),
 
-and E2 alike. A yarn that carries all is straightened by nothing that holds the other's crimp; one
-that carries as much as the other exchanges crimp with it (Galliot and Luchsinger, Composite
-Structures 90 (2009) 438, for constants).
+and E2 alike: yarns that both carry exchange crimp, a yarn that carries all straightens freely. The
+gains are constants, as those of `LoadRatio` are (Galliot and Luchsinger, 2009), of which this is
+the form with moduli of strain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .base import Array, Offer, register_form
+from .base import EVEN, Array, Offer, register_form
 from .spline import Spline, spline_named
 
 GAINS = ("dE2", "dE1")
@@ -59,13 +59,21 @@ class SplineRatio:
         return self.spline.grid(component, end)
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
-        return np.eye(self.size)
+        """Return the map from moduli at the knots, and at rest where one yarn carries all."""
+        whole, share = np.eye(self.size), 1.0 / (1.0 - EVEN)
+        first = self.spline.modulus_of.index
+        for place, name in ((-2, "E2"), (-1, "E1")):
+            whole[place, first(name)], whole[place, place] = -share, share
+        return whole
 
     def to_card(self) -> dict[str, Any]:
         return self.spline.to_card()
 
     def describe(self) -> str:
-        return self.spline.describe()
+        return (
+            f"{self.spline.describe()} E2 and E1 are those at equal loads; dE2 and dE1 are what "
+            "they gain where their load ratio n / sqrt(n1^2 + n2^2) goes from 0 to 1."
+        )
 
 
 def _named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> SplineRatio:
