@@ -148,8 +148,8 @@ class Objective(Protocol):
         """Return (m, parameters) from the solver's slope of the displacements."""
         ...
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
-        """Return (m, names), slopes by the nuisance that only the objective knows."""
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        """Return (m, names), slopes by the nuisance that the objective knows, at its values."""
         ...
 
     def shifted(self, here: History, there: History) -> Objective:
@@ -232,7 +232,7 @@ class OwnObjective:
         columns = [self._along(at, self.inner.scale * change) for change in changes]
         return np.column_stack(columns) / self._unit[:, None]
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         problem = f"leave out {', '.join(names)}: a function of one's own has to allow for them"
         raise InputError(None, "objective", problem)
 
@@ -296,7 +296,8 @@ class Comparison:
         )
         if history.path is not None and history.path_slope is not None:
             self._last = (point, history.path, history.path_slope)
-        return history, self._chain(self.objective.jacobian(history, slope), len(free))
+        by_solver = self.objective.jacobian(history, slope)
+        return history, self._chain(by_solver, len(free), nuisance)
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
         return {
@@ -314,13 +315,13 @@ class Comparison:
         except InputError as error:
             raise SolverFailure(f"there is no such model: {error}", self.solver.name) from None
 
-    def _chain(self, by_solver: Array, free: int) -> Array:
+    def _chain(self, by_solver: Array, free: int, nuisance: Mapping[str, float]) -> Array:
         """Return columns in the order of the unknowns from those in the model's order."""
         of_model = [n for n in self.nuisance if n.model_parameter is not None]
         of_law = [n for n in self.nuisance if n.law_parameter is not None]
         by = {n.name: n.scale for n in (*of_model, *of_law)}
         own = [n.name for n in self.nuisance if n.name not in by]
-        by_objective = self.objective.nuisance_columns(own).T if own else ()
+        by_objective = self.objective.nuisance_columns(own, nuisance).T if own else ()
         columns = dict(zip(own, by_objective, strict=True))
         columns |= {
             name: scale * column

@@ -94,7 +94,7 @@ class StrainObjective:
         own = elongations(slope)
         return self._blocks(own - own[0])
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """Return (2 n, 0): there are no nuisance unknowns."""
         if names:
             raise InputError(None, "nuisance", f"a biaxial path knows no {', '.join(names)}")

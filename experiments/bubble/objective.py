@@ -8,6 +8,7 @@ millimetres the scale is one and e is a sum of RMS errors in mm.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -157,27 +158,45 @@ class FieldObjective:
         """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
         shift = displacement_offset(nuisance)
         moved = [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
-        amounts = {name: own for name, own in (nuisance or {}).items() if name in PLACED and own}
-        if not amounts:
+        amounts = placed_by(nuisance)
+        if not amounts.any():
             return moved
-        values = np.array([amounts.get(name, 0.0) for name in PLACED])
-        return [m + placed @ values for m, placed in zip(moved, self._placed, strict=True)]
+        return [m + placed for m, placed in zip(moved, self._placed(amounts), strict=True)]
+
+    def _placed(self, amounts: Array) -> list[Array]:
+        """Return (n, 3) mm of each target that amounts (4,) of `PLACED` add to model less measured.
+
+        The measured field is turned into the model's frame. Where the model is read at a given
+        place it moves less than at the true one by what the measured field grows up to there.
+        """
+        turned, found = _tilted(amounts[:2])[0], []
+        for target, grown in zip(self.targets, self._grown(amounts[2:]), strict=True):
+            found.append((grown - target.displacement) @ turned + target.displacement)
+        return found
+
+    def _grown(self, shift: Array) -> list[Array]:
+        """Return (n, 3) mm, what each smooth measured field changes by over a shift (2,) mm."""
+        return [
+            (_shapes(rest / size, len(amplitude)) - _shapes((rest - shift) / size, len(amplitude)))
+            @ amplitude
+            for rest, size, amplitude in self._smooth
+        ]
+
+    def _placed_by(self, amounts: Array) -> list[Array]:
+        """Return derivatives (n, 3, 4) mm of `_placed` by the amounts."""
+        turned, by_tilts = _tilted(amounts[:2])
+        found, every = [], zip(self.targets, self._smooth, self._grown(amounts[2:]), strict=True)
+        for target, (rest, size, amplitude), grown in every:
+            columns = [(grown - target.displacement) @ by for by in by_tilts]
+            slopes = _slopes_of(rest - amounts[2:], size, amplitude)
+            found.append(np.stack([*columns, *(one @ turned for one in slopes)], axis=-1))
+        return found
 
     @cached_property
-    def _placed(self) -> list[Array]:
-        """Return (n, 3, 4) mm of each target: what one of each of `PLACED` changes.
-
-        By the measured field, of which the model's hardly differs: of first order in the amounts.
-        """
-        found = []
-        for target in self.targets:
-            assert target.at_rest is not None
-            (dx, dy, dz), none = target.displacement.T, np.zeros(len(target.displacement))
-            by_x, by_y = _slopes(target.at_rest, target.displacement)
-            tilts = [np.stack([none, -dz, dy], axis=1), np.stack([dz, none, -dx], axis=1)]
-            columns = [*(np.pi / 180 * one for one in tilts), by_x, by_y]
-            found.append(np.stack(columns, axis=-1))
-        return found
+    def _smooth(self) -> list[tuple[Array, float, Array]]:
+        """Return places (n, 2) mm, their size, amplitudes of `_shapes`, of each measured field."""
+        known = [(t.at_rest, t.displacement) for t in self.targets if t.at_rest is not None]
+        return [(rest, *_smoothed(rest, moved)) for rest, moved in known]
 
     def differences(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return model less measured (n, 3) mm of each target, without a constant field."""
@@ -266,7 +285,7 @@ class FieldObjective:
                 parts.setdefault(words, []).append(np.stack(columns, axis=-1))
         return {words: self._columns(own) for words, own in parts.items()}
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
         """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `PLACED`."""
         every = (*OFFSETS, *PLACED)
         unknown = [name for name in names if name not in every]
@@ -274,7 +293,8 @@ class FieldObjective:
             raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
         parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
         if any(name in PLACED for name in names):
-            parts = [np.concatenate(both, -1) for both in zip(parts, self._placed, strict=True)]
+            placed = self._placed_by(placed_by(nuisance))
+            parts = [np.concatenate(both, -1) for both in zip(parts, placed, strict=True)]
         return self._columns(parts)[:, [every.index(name) for name in names]]
 
     def mean_absolute(self, displacement: Array, nuisance: Unknowns | None = None) -> float:
@@ -283,25 +303,53 @@ class FieldObjective:
         return float(np.concatenate([np.abs(d).sum(axis=1) for d in parts]).mean())
 
 
-#: Degree of the polynomials in x and y whose slopes are those of a field, and a small step.
-DEGREE, SMALL = 8, 1e-4
+#: Largest degree of the polynomials in x and y whose slopes are those of a field, points that each
+#: of their terms needs, and a small step.
+DEGREE, EACH, SMALL = 8, 3, 1e-4
 
 
 def _slopes(places: Array, values: Array) -> tuple[Array, Array]:
     """Return the slopes (n, 3) of values (n, 3) at places (n, 2) by x and by y."""
-    size = float(np.abs(places).max())
+    return _slopes_of(places, *_smoothed(places, values))
 
-    def shapes(at: Array) -> Array:
-        x, y = (legvander(one, DEGREE) for one in (at / size).T)
-        return np.asarray((x[:, :, None] * y[:, None]).reshape(len(at), -1))
 
-    amplitude = np.linalg.lstsq(shapes(places), values, rcond=1e-6)[0]
-    step = SMALL * size * np.eye(2)
+def _shapes(at: Array, terms: int) -> Array:
+    x, y = (legvander(one, math.isqrt(terms) - 1) for one in at.T)
+    return np.asarray((x[:, :, None] * y[:, None]).reshape(len(at), -1))
+
+
+def _smoothed(places: Array, values: Array) -> tuple[float, Array]:
+    """Return the size (mm) of the places and the amplitudes of `_shapes` through the values."""
+    size, degree = float(np.abs(places).max()), min(DEGREE, math.isqrt(len(places) // EACH) - 1)
+    shapes = _shapes(places / size, (max(degree, 1) + 1) ** 2)
+    return size, np.asarray(np.linalg.lstsq(shapes, values, rcond=1e-6)[0])
+
+
+def _slopes_of(places: Array, size: float, amplitude: Array) -> tuple[Array, Array]:
+    at = places / size
     by_x, by_y = (
-        (shapes(places + one) - shapes(places - one)) @ amplitude / (2 * SMALL * size)
-        for one in step
+        (_shapes(at + one, len(amplitude)) - _shapes(at - one, len(amplitude)))
+        @ amplitude
+        / (2 * SMALL * size)
+        for one in SMALL * np.eye(2)
     )
     return by_x, by_y
+
+
+def placed_by(nuisance: Unknowns | None) -> Array:
+    """Return (4,) the amounts of `PLACED`; zero where one is no unknown."""
+    return np.array([(nuisance or {}).get(name, 0.0) for name in PLACED])
+
+
+def _tilted(degrees: Array) -> tuple[Array, tuple[Array, Array]]:
+    """Return the rotation (3, 3) about y, then x, and its derivatives by (x, y), per degree."""
+    (c, b), (s, a) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    about_y = np.array([[b, 0, a], [0, 1, 0], [-a, 0, b]])
+    by_x = np.array([[0, 0, 0], [0, -s, -c], [0, c, -s]])
+    by_y = np.array([[-a, 0, b], [0, 0, 0], [-b, 0, -a]])
+    degree = np.pi / 180
+    return about_x @ about_y, (degree * by_x @ about_y, degree * about_x @ by_y)
 
 
 #: Of the points on the disk, and of its radius covered: less is taken for a wrong unit.

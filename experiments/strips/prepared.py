@@ -144,7 +144,7 @@ class LoadObjective:
             "a gauge length off by {:+.1%} (measure it)": (slope * self.elongation)[:, None],
         }  # fmt: skip
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """Return (n, 0): a load curve has no nuisance unknowns."""
         if names:
             raise InputError(None, "nuisance", f"a load curve knows no {', '.join(names)}")

@@ -139,7 +139,7 @@ def test_a_problem_says_what_does_not_go_together():
     assert "nuisance of bubble 1" in complaint(FitProblem, (first, second), LAW, unknowns)
     assert "a name of their own" in complaint(FitProblem, (second, second), LAW, unknowns)
     assert "expected comparisons" in complaint(FitProblem, (), LAW, unknowns)
-    assert "knows no tilt" in complaint(second.objective.nuisance_columns, ["tilt"])
+    assert "knows no tilt" in complaint(second.objective.nuisance_columns, ["tilt"], {})
 
 
 def test_what_contracts_asks_for_a_positive_definite_law():

@@ -114,7 +114,7 @@ class LoadObjective:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
         return np.asarray(history.load_slope[-1:] / self.scale[0])
 
-    def nuisance_columns(self, names: Sequence[str]) -> Array:
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """There is no nuisance."""
         return np.empty((1, 0))
 

@@ -28,6 +28,7 @@ from bubblefit.materials.forms.polynomial import (
     QUADRATIC,
     LoadRatio,
 )
+from bubblefit.materials.forms.ratio import SplineRatio
 from bubblefit.materials.forms.spline import PARTS, Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.pieces import by_pieces, increment_modulus, point_modulus
@@ -95,7 +96,11 @@ LAWS = {
     "load-ratio": HypoelasticLaw(
         np.array([20.0, 240.0, 90.0, 600.0, -150.0]), 0.24, RANGE, form=LoadRatio()
     ),
-}
+    "spline-ratio": HypoelasticLaw(
+        np.array([*OF_STRAIN["spline"].beta, 40.0, -150.0]), 0.24, RANGE,
+        form=SplineRatio(Spline.at(KNOTS)),
+    ),
+}  # fmt: skip
 FORMS = pytest.mark.parametrize("name", LAWS)
 NO_RANGE = [UNLIMITED] * 3
 
@@ -167,7 +172,7 @@ def test_the_grid_sees_every_piece(name):
         strain = form.grid(COMPONENTS[modulus], RANGE[COMPONENTS[modulus]])
         moduli = [LAWS[name].modulus(modulus, strain, r) for r in ratios_of(form, modulus)]
         assert part @ LAWS[name].beta == pytest.approx(np.concatenate(moduli))
-    asked = [1, 3, 3] if name == "load-ratio" else [1, 1, 1]
+    asked = [1, 3, 3] if "ratio" in name else [1, 1, 1]
     assert [len(ratios_of(form, modulus)) for modulus in ORDER] == asked
 
 
@@ -399,7 +404,7 @@ THING = Offer("acme", make, ("knee",))
 
 
 def test_ours_are_there_and_say_their_settings():
-    ours = ("constant", "linear", "quadratic", "cubic", "load-ratio", "spline", "trilinear")
+    ours = (*DEGREES, "load-ratio", "spline-ratio", "spline", "trilinear")
     assert form_names()[: len(ours)] == ours
     assert form_settings("cubic") == () and form_settings("spline") == ("knots",)
     assert form_settings("nothere") == ()

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.forms.polynomial import LoadRatio
+from bubblefit.materials.forms.ratio import SplineRatio
+from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import (
@@ -29,6 +31,7 @@ from bubblefit.runs.verification.closed_forms import (
     stress_series,
 )
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.spatial import cKDTree
 
 from ...complaints import complaint
 
@@ -126,19 +129,27 @@ MODELS = {
     "bias": bias_strip(20.0, 21.0, 0.81, increments=4, across=4, along=12),
 }
 TIGHT = 1e-11
+STRAIN_RATIO_LAW = HypoelasticLaw(
+    [12.0, 14.0, 240.0, 160.0, 600.0, 400.0, 120.0, -150.0], 0.24, [0.1, 0.1, 0.3],
+    form=SplineRatio(Spline.at([[0.0, 0.1], [0.0, 0.1], [0.0, 0.3]])),
+)  # fmt: skip
 
 
-@pytest.mark.parametrize("part", MODELS)
-def test_derivatives_through_the_history(part):
-    model = MODELS[part]
-    names = [*(f"beta_{i}" for i in range(5)), "nu12"]
-    history, slope = MembraneSolver(TIGHT).run_with_sensitivity(model, RATIO_LAW, names)
+@pytest.mark.parametrize(
+    ("part", "law"),
+    [(part, RATIO_LAW) for part in MODELS]
+    + [(part, STRAIN_RATIO_LAW) for part in ("bubble", "bias")],
+)
+def test_derivatives_through_the_history(part, law):
+    model, size = MODELS[part], law.form.size
+    names = [*(f"beta_{i}" for i in range(size)), "nu12"]
+    history, slope = MembraneSolver(TIGHT).run_with_sensitivity(model, law, names)
     for j, name in enumerate(names):
         step = 1e-5 if name == "nu12" else 1e-3  # a longer one reaches over kinks of the ratio
-        change = step * (np.arange(6) == j)
+        change = step * (np.arange(size + 1) == j)
         ahead, behind = (
             MembraneSolver(TIGHT).run(model, replace(
-                RATIO_LAW, beta=RATIO_LAW.beta + sign * change[:5], nu12=0.24 + sign * change[5]))
+                law, beta=law.beta + sign * change[:-1], nu12=0.24 + sign * change[-1]))
             for sign in (1, -1)
         )  # fmt: skip
         moved = (ahead.displacement - behind.displacement) / (2 * step)
@@ -148,6 +159,30 @@ def test_derivatives_through_the_history(part):
             pulled = (ahead.load - behind.load) / (2 * step)
             room = 1e-6 * np.abs(pulled).max() + 1e-11 / step
             np.testing.assert_allclose(history.load_slope[:, j], pulled, atol=room)
+
+
+def test_turned_yarns_turn_the_field_and_have_exact_derivatives():
+    whole = BubbleModel(disk_mesh(100.0, 48), 0.81, LEVELS)
+    x, y, _ = whole.mesh.points.T
+    raised = whole.mesh.points.copy()
+    raised[:, 2] = 3e-4 * (1e4 - x**2 - y**2) * (1 + 0.005 * x)
+    curved = replace(whole, mesh=replace(whole.mesh, points=raised), slack=(0.001, 0.0))
+    solver, law, turn = MembraneSolver(TIGHT), HypoelasticLaw.linear(600.0, 300.0, 14.0), 0.15
+    model = curved.with_parameters({"turn": turn})
+    for name, step in {"turn": 1e-4, "slack_warp": 1e-5}.items():
+        _, slope = solver.run_with_sensitivity(model, law, [name])
+        ahead, behind = (
+            solver.run(model.with_parameters({name: sign * step}), law).displacement
+            for sign in (1, -1)
+        )
+        moved = (ahead - behind) / (2 * step)
+        np.testing.assert_allclose(slope[..., 0], moved, atol=1e-6 * np.abs(moved).max())
+    # A quarter turn of a flat disk carries the field along.
+    here = solver.run(whole, law).displacement[-1]
+    there = solver.run(whole.with_parameters({"turn": np.pi / 2}), law).displacement[-1]
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    nearest = cKDTree(whole.mesh.points).query(whole.mesh.points @ turned.T)[1]
+    np.testing.assert_allclose(there[nearest], here @ turned.T, atol=1e-6)
 
 
 def test_a_bubble_hardly_depends_on_the_increments():
