@@ -18,6 +18,7 @@ from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import prepared as preparation
 from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
+from bubblefit.experiments.bubble import test as bubble_test
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
 from bubblefit.experiments.bubble.prepared import INWARD, _same_steps_and_mesh, _sample, resampled
 from bubblefit.experiments.bubble.report import left_at_nodes, write_series
@@ -132,8 +133,9 @@ def test_what_cannot_be_read_or_registered_names_its_key(monkeypatch, stage, err
     def failing(*_: Any, **__: Any) -> None:
         raise error
 
-    monkeypatch.setattr(preparation, "read_fields", lambda *_, **__: ())
-    monkeypatch.setattr(preparation, stage, failing)
+    monkeypatch.setattr(bubble_test, "read_fields", lambda *_, **__: ())
+    where = bubble_test if stage == "read_fields" else preparation
+    monkeypatch.setattr(where, stage, failing)
     assert complaint(preparation._measured, made(), files).startswith(f"{expected}: ")
 
 
