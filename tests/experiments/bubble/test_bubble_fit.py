@@ -20,6 +20,7 @@ from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble import test as bubble_test
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
+from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.prepared import INWARD, _same_steps_and_mesh, _sample, resampled
 from bubblefit.experiments.bubble.report import left_at_nodes, write_series
 from bubblefit.experiments.bubble.section import Sheet
@@ -33,6 +34,7 @@ from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
+from bubblefit.readers.frames import FrameOptions
 from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.runs.setup import prepare_fit
@@ -126,9 +128,7 @@ def made(match_by: str = "surfaces") -> Any:
     ],
 )
 def test_what_cannot_be_read_or_registered_names_its_key(monkeypatch, stage, error, expected):
-    files: Any = SimpleNamespace(
-        files=("a.csv",), options="how", format="x", recorded=None, registration="asked"
-    )
+    files: Any = PointFiles(("a.csv",), FrameOptions(), "x", "asked")  # type: ignore[arg-type]
 
     def failing(*_: Any, **__: Any) -> None:
         raise error
@@ -136,7 +136,8 @@ def test_what_cannot_be_read_or_registered_names_its_key(monkeypatch, stage, err
     monkeypatch.setattr(bubble_test, "read_fields", lambda *_, **__: ())
     where = bubble_test if stage == "read_fields" else preparation
     monkeypatch.setattr(where, stage, failing)
-    assert complaint(preparation._measured, made(), files).startswith(f"{expected}: ")
+    test = SimpleNamespace(**vars(made()), data=files, of_clamp=False)
+    assert complaint(preparation.read_measured, test).startswith(f"{expected}: ")
 
 
 @pytest.mark.parametrize(

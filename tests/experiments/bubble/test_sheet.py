@@ -23,7 +23,7 @@ from bubblefit.experiments.bubble.objective import (
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial, measured_sheet, with_sheet
 from bubblefit.experiments.kinds import FittedTest, Output
-from bubblefit.inference.comparison import Nuisance
+from bubblefit.inference.comparison import Comparison, Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.project.project import read_project
@@ -275,10 +275,10 @@ def fitted(sheet: Sheet) -> tuple[Any, Any]:
         motion[1, 3] = 0.3, 0.4, 1.2
         model = replace(model, rim_motion=motion)
     moved = np.zeros((2, len(Z0), 3))
-    model_at = [FieldTarget(p, moved[k] + [0.3, 0.0, -0.4]) for k, p in enumerate(TWO)]
-    targets = with_places(model_at, MESH.points[:, :2])
+    at_nodes = [FieldTarget(p, moved[k] + [0.3, 0.0, -0.4]) for k, p in enumerate(TWO)]
+    targets = with_places(at_nodes, MESH.points[:, :2])
     objective = FieldObjective(targets, "mm", constant=sheet.constant)
-    comparison = SimpleNamespace(model=model, nuisance=nuisance, objective=objective)
+    comparison = Comparison("b", model, MembraneSolver(), objective, tuple(nuisance))
     history = History(np.array(TWO), moved, np.zeros(3), np.zeros(3))
     test = SimpleNamespace(name="b", sheet=sheet, pressures=TWO, outline=Outline.circle(100.0))
     surface = SimpleNamespace(surface=SURFACE if sheet.measured else None)
