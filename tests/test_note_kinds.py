@@ -171,7 +171,7 @@ class Told(NamedTuple):
 def told_by_fit(folder, patch, notes):
     fit = replace(fits.fit())
     fit.__dict__["notes"] = notes
-    for name in ("_optima", "_moduli"):
+    for name in ("optima", "moduli"):
         patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
     patch.setattr(fit_page, "_pinned", lambda *_: [])
     patch.setattr(report_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
