@@ -41,6 +41,7 @@ from bubblefit.reports.content import Exhibit
 from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, UNKNOWN
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.compare import FOLD
+from bubblefit.runs.estimate import GAP, NOT_ESTIMATED
 from bubblefit.runs.poisson import vary_nu12
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED
@@ -63,6 +64,8 @@ from .note_cases import fits, membrane, programs, series
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
 #: Who makes notes of a kind, and their words.
 CASES = (
+    (NOT_ESTIMATED, fits.notes_of_an_estimate, "other: points lie on a part of the disk only"),
+    (GAP, fits.notes_of_an_estimate, r"chi [3-9]|chi \d\d"),
     (EARLY, membrane.notes_of_bending,
      "the run stopped early: no equilibrium between 6 and 8 mm"),
     (EARLY, programs.notes_of_marc_bending,
@@ -173,6 +176,7 @@ def told_by_fit(folder, patch, notes):
     fit.__dict__["notes"] = notes
     for name in ("optima", "moduli"):
         patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
+    patch.setattr(fit_page, "save", lambda *_: None)
     patch.setattr(fit_page, "_pinned", lambda *_: [])
     patch.setattr(report_of(fit.setup.tests[0].test.kind), "show", lambda *_: Exhibit())
     page = fit.report(folder)

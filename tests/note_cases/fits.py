@@ -14,7 +14,7 @@ from typing import Any
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.errors import Note, SolverFailure
+from bubblefit.errors import InputError, Note, SolverFailure
 from bubblefit.experiments.bubble import findings as bubble_findings
 from bubblefit.experiments.bubble.findings import sheet_warnings
 from bubblefit.inference.assessment import Certainty, certainty
@@ -28,12 +28,14 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs.bootstrap import Bootstrap
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
+from bubblefit.runs.estimate import estimate_of
 from bubblefit.runs.profile import Profile
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..inference import cases
+from ..places import KNOWN
 from ..projects import constant_strips, small
 
 
@@ -154,3 +156,20 @@ def notes_of_certainty(*_: Any) -> Iterable[Note]:
     point = problem.evaluate(unknowns, True)
     assert point is not None
     return certainty(problem, point, cases.LAW, np.full(3, 0.08)).undetermined
+
+
+def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
+    """Of a bubble at wrong pressures, beside a test from which nothing can be estimated."""
+    project = bf.read_project(KNOWN)
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    (prepared,) = setup.tests
+    pressures = tuple(p + 0.01 for p in prepared.test.pressures)
+    test = replace(prepared.test, pressures=pressures, increments=pressures, noise=0.01)
+    fields = tuple(replace(f, pressure=p) for f, p in zip(prepared.fields, pressures, strict=True))
+
+    def refuse(make_solver: Any) -> Any:
+        raise InputError(None, "points", "lie on a part of the disk only")
+
+    other: Any = SimpleNamespace(test=SimpleNamespace(name="other"), virtual_work=refuse)
+    tests = (replace(prepared, test=test, fields=fields), other)
+    return estimate_of(replace(setup, tests=tests)).notes
