@@ -36,6 +36,7 @@ from .forms.base import (
     ratios_of,
 )
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
+from .memory import FIELDS, Memory
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
@@ -158,7 +159,8 @@ def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
 
 #: MPa per unit.
 UNITS = MODULUS_UNITS
-FORMAT, WITH_CERTAINTY = 2, 3
+FORMAT, WITH_CERTAINTY, WITH_HISTORY = 2, 3, 4
+State = Literal["", "first loading", "conditioned"]
 LAW = "hypoelastic orthotropic"
 HELD = "Outside valid_strain a modulus keeps its end value."
 #: What the key `law` of a tri-linear card of format 1 holds.
@@ -169,13 +171,17 @@ SAME_THICKNESS = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MaterialCard:
-    """A law with its thickness (mm), name, source, and its certainty or None."""
+    """A law with its thickness (mm), name, source, and its certainty or None.
+
+    state : of the fabric that the law is of, "first loading" or "conditioned", "" if not known.
+    """
 
     law: HypoelasticLaw
     thickness: float
     name: str = ""
     source: str = ""
     certainty: CardCertainty | None = None
+    state: State = ""
 
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         write_card(self, Path(path), unit)
@@ -230,6 +236,10 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
         **of_form
     }  # fmt: skip
+    if card.state or law.memory is not None:
+        content["format"], content["state"] = WITH_HISTORY, card.state
+    if law.memory is not None:
+        content["memory"] = {f: list(getattr(law.memory, f)) for f in FIELDS}
     if sure is not None:
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}
@@ -315,10 +325,19 @@ class CertaintyFile(Section):
     band: BandFile | None = None
 
 
+class MemoryFile(Section):
+    """Permanent set, unloading, reloading and saturation of warp, fill and shear."""
+
+    permanent_set: Numbers
+    unloading: Numbers
+    reloading: Numbers
+    saturation: Numbers
+
+
 class CardFile(Section):
     """The keys of a card that do not depend on its form."""
 
-    format: Literal[1, 2, 3] = 1
+    format: Literal[1, 2, 3, 4] = 1
     name: str = ""
     source: str = ""
     law: str = ""
@@ -330,6 +349,8 @@ class CardFile(Section):
     thickness_change: ThicknessChange = "constant"
     valid_strain: ValidStrain = Field(default_factory=ValidStrain)
     certainty: CertaintyFile | None = None
+    state: State = ""
+    memory: MemoryFile | None = None
 
 
 @checked
@@ -364,8 +385,13 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
     if len(mpa) != form.size:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
     ends = np.array([file.valid_strain.warp, file.valid_strain.fill, file.valid_strain.shear])
-    law = HypoelasticLaw(np.array(mpa), file.nu12, ends, file.thickness_change, form)
-    return MaterialCard(law, file.thickness_mm, file.name, file.source, _certainty(file, law))
+    if file.format < WITH_HISTORY and (file.state or file.memory):
+        problem = f"a card that has it is of format = {WITH_HISTORY}"
+        raise InputError(None, "memory" if file.memory else "state", problem)
+    memory = None if file.memory is None else Memory(**dict(file.memory))
+    law = HypoelasticLaw(np.array(mpa), file.nu12, ends, file.thickness_change, form, memory)
+    sure = _certainty(file, law)
+    return MaterialCard(law, file.thickness_mm, file.name, file.source, sure, file.state)
 
 
 def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:

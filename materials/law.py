@@ -199,16 +199,16 @@ class HypoelasticLaw:
         self, gradient: ArrayLike, strain_old: ArrayLike | None = None,
         stress_old: ArrayLike | None = None
     ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-        """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), log strain (n, 3), corotated stress (n, 3).
+        """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), state (n, 3 or 9), corotated stress (n, 3).
 
+        The state is log strain, then what a memory keeps; strain_old is that of the last call.
         gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors.
         """
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
         zero = np.zeros((len(f), 3))
-        if self.memory is not None:  # of one increment, which is a first loading
-            return replace(self, memory=None).second_piola_kirchhoff(f, strain_old, stress_old)
-        old = zero if strain_old is None else np.ascontiguousarray(strain_old, dtype=float)
+        given = zero if strain_old is None else np.asarray(strain_old, dtype=float)
+        old = np.pad(given, ((0, 0), (0, self.state - given.shape[1])))
         stress = zero if stress_old is None else np.ascontiguousarray(stress_old, dtype=float)
         return _pull_backs(self.pieces, self.coupling, self.area_power, right, old, stress)
 
@@ -257,7 +257,7 @@ def _increments(pieces, coupling, old, new, stress_old):  # type: ignore[no-unty
 def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
     pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))
-    strain, stress = np.empty((n, 3)), np.empty((n, 3))
+    strain, stress = np.empty((n, old.shape[1])), np.empty((n, 3))
     p, law, pull, work = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     slopes = np.empty(SLOPES)
     for i in range(n):

@@ -64,21 +64,21 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
     free = 1 - pulled
     ends = np.asarray(log_strain, dtype=float)
     strains, stresses = np.empty((len(ends), 3)), np.empty((len(ends), 3))
-    old, stress = np.zeros(3), np.zeros((1, 3))
+    state, stress = np.zeros((1, 3)), np.zeros((1, 3))
     for i, end in enumerate(ends):
-        new = old.copy()
+        new = state[0, :3].copy()
         new[pulled] = end
         for _ in range(ROUNDS):
-            trial, tangent = law.increment(old, new, stress)
+            trial, tangent, _ = law.follow(state, new, stress)
             new[free] -= trial[0, free] / tangent[0, free, free]
             if not abs(trial[0, free]) > 1e-13 * abs(trial[0, pulled]):
                 break
-        trial, _ = law.increment(old, new, stress)
+        trial, _, after = law.follow(state, new, stress)
         if not np.isfinite(trial).all():
             what = f"at {100 * end:.4g} % of log strain of a bar"
             problem = f"a modulus or 1 - nu12 nu21 is not positive {what}"
             raise InputError(None, "beta", problem)
-        old, stress = new, trial
+        state, stress = after, trial
         strains[i], stresses[i] = new, trial[0]
     return strains, stresses
 
@@ -86,7 +86,7 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
 def uniaxial_curve(
     law: HypoelasticLaw, pulled: int, log_strain: ArrayLike, measure: Measure
 ) -> tuple[Array, Array]:
-    """Return strain (n,) and stress (n,), MPa, in `measure` at monotonic log strains."""
+    """Return strain (n,) and stress (n,), MPa, in `measure` at log strains, one after the other."""
     ends = np.asarray(log_strain, dtype=float)
     fine = _refined(ends)
     h, s = bar(law, pulled, fine)
@@ -108,7 +108,7 @@ def trellis_curve(
     """Return shear strain (n,), shear stress (n,) and stress along the yarns (n, 2), MPa.
 
     The last, which curves that do not couple leave out, is 2nd Piola-Kirchhoff stress whatever the
-    measure. angle : (n,) increasing changes of the angle between the yarns, radians.
+    measure. angle : (n,) changes of the angle between the yarns, radians.
     """
     ends = np.asarray(angle, dtype=float)
     fine = _refined(ends)
@@ -117,7 +117,7 @@ def trellis_curve(
     for i, turn in enumerate(fine):
         gradient = np.array([[[1.0, np.sin(turn)], [0.0, np.cos(turn)]]])
         pk2, _, strain, stress = law.second_piola_kirchhoff(gradient, strain, stress)
-        rows[i] = np.concatenate([pk2[0], strain[0], stress[0]])
+        rows[i] = np.concatenate([pk2[0], strain[0, :3], stress[0]])
     if not np.isfinite(rows).all():
         raise InputError(
             None, "beta", "a modulus or 1 - nu12 nu21 is not positive in a trellis shear"

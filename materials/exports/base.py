@@ -112,6 +112,7 @@ def heading(
         # One line each, whatever the card's text holds.
         words = one_line(" ".join(text.split()))
         lines += textwrap.wrap(f"{label}: {words}", WIDTH, subsequent_indent="    ")
+    lines += [f"state of the fabric: {card.state}"] if card.state else []
     lines += [f"units: {units}; thickness {card.thickness:g} mm", *says.lines()]
     lines += band_lines(card)
     ascii_lines = (line.encode("ascii", "replace").decode() for line in lines)
@@ -216,6 +217,7 @@ class Format:
     write: Callable[[MaterialCard, Any], Export]
     options: type = NoOptions
     load_ratios: bool = False
+    unloads: bool = False
 
     def export(self, card: MaterialCard, **given: Any) -> Export:
         """Return the files of a card, and of its band if any; raise InputError if unfit."""
@@ -226,6 +228,12 @@ class Format:
                 "law depend on the ratio of the loads: export its constants, gsa or rfem"
             )
             raise InputError(None, "form", problem)
+        if card.law.memory is not None and not self.unloads:
+            problem = (
+                f"the format {self.name} has no place for unloading: export to ls-dyna-mat34, "
+                "radioss-law58 or abaqus-fabric, or the card without [memory]"
+            )
+            raise InputError(None, "memory", problem)
         check_positive(card)
         export = self.write(card, self.options(**given))
         if card.certainty is None:
@@ -310,6 +318,35 @@ def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -
     equal = min(BIAXIAL, *(float(strains[name][-1]) for name in ("E1", "E2")))
     shear = np.stack([x, y], axis=1)
     return FabricCurves(both[0], both[1], shear, largest, equal, _softer(card.law, equal))
+
+
+#: What a total curve makes of a law's history, without a memory and with one.
+TOTAL = "hypoelasticity: the curves are total ones; unloading is along the same curve"
+FROM_TOP = (
+    "hypoelasticity and reloading: the curves are total ones; unloading is that from the end of "
+    "the card's range, from smaller strains as the program scales or shifts it"
+)
+
+
+def unloading_curves(
+    card: MaterialCard, options: TableOptions, measure: Measure
+) -> dict[str, Array]:
+    """Return strain and stress (n, 2) of warp, fill, shear from the set to the end of the range.
+
+    Empty where the law has no memory. The fabric was loaded to that end for the first time.
+    """
+    law, found = card.law, {}
+    if law.memory is None:
+        return {}
+    for k, (name, modulus) in enumerate(zip(("warp", "fill", "shear"), COMPONENTS, strict=True)):
+        end = float(modulus_table(law, modulus, 2, options.reach).strain[-1])
+        path = np.linspace(end, law.memory.kept(k, end), options.points)
+        if name == "shear":
+            x, y, _ = trellis_curve(law, np.array([trellis_angle(g) for g in path]), measure)
+        else:
+            x, y = uniaxial_curve(law, k, path, measure)
+        found[name] = np.stack([x, y], axis=1)[::-1]
+    return found
 
 
 def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:

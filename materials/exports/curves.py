@@ -21,6 +21,8 @@ from ..responses import MEASURES, Measure, trellis_angle, trellis_curve, uniaxia
 from .base import (
     COMPRESSION,
     DENSITY,
+    FROM_TOP,
+    TOTAL,
     CurveOptions,
     Export,
     FabricCurves,
@@ -33,12 +35,28 @@ from .base import (
     option,
     range_remarks,
     title_of,
+    unloading_curves,
 )
 from .designers import SHEARED
 
 #: Crimp that does not count, and the share of its modulus with which a yarn is pushed.
 CRIMP, FLEX = 1e-4, 1e-3
 POINTS = 121
+#: Number of the first function of Radioss, of six.
+FUNCTION = 101
+FUNCTIONS = (
+    "nominal stress of strips along warp and fill, and of shear by the angle between the yarns, as "
+    "functions; E, B, G0, GT beside them are those nearest to the curves"
+)
+UNLOADS = (
+    "unloading curves of warp, fill and shear from the end of the range, without stress up to the "
+    "permanent set"
+)
+
+
+def from_zero(rows: Array) -> Array:
+    """Return an unloading curve (n, 2) with the strain without stress up to the permanent set."""
+    return np.vstack([np.zeros((1, 2)), [[rows[0, 0], 0.0]], rows[1:]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,24 +109,33 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     gt = g0 * (1 + math.tan(lock) ** 2)
     shear_off = float(np.sqrt(np.mean((tau - g0 * tangent) ** 2)) / tau.max())
     curves: FabricCurves = fabric_curves(card, options, "nominal")
+    unload = unloading_curves(card, options, "nominal")
+    functions = {}
+    if unload:
+        tension = {name: getattr(curves, name)[1:] for name in ("warp", "fill")}
+        both = [*{**tension, "shear": curves.shear}.values(), *map(from_zero, unload.values())]
+        for k in (2, 5):  # of the angle between the yarns, in degrees
+            both[k] = both[k] * [math.degrees(1.0), 1.0]
+        functions = dict(enumerate(both, start=FUNCTION))
     straight = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
     stiff = (
         f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is written"
     )
+    parameters = (
+        f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
+        f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
+        f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear_off:.2g} %, "
+        f"to {math.degrees(lock):.3g} degrees and with the same slope beyond",
+    )
     says = Says(
-        carries=(
-            f"nominal stress of strips along warp and fill as E eps - B eps^2/2, off by "
-            f"{100 * warp.off:.2g} and {100 * fill.off:.2g} % of the largest (RMS)",
-            f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear_off:.2g} %, "
-            f"to {math.degrees(lock):.3g} degrees and with the same slope beyond",
-        ),
+        carries=(FUNCTIONS, UNLOADS) if unload else parameters,
         loses=(
             f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
             f" {curves.uncoupled}",
             *(() if sheared else [unknown]),
-            *([stiff] if straight else ()),
+            *([stiff] if straight and not unload else ()),
             f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
-            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            FROM_TOP if unload else TOTAL,
             *density_remarks(options.density),
             *range_remarks(card, options.reach),
         ),
@@ -116,6 +143,7 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
             "the measure of strain of LAW58 (the change of length over the length is taken), with "
             "one element of each test",
             "/PROP/TYPE16 with the warp as its first direction",
+            *((SCALED,) if unload else ()),
         ),
     )
     text = render(
@@ -130,14 +158,21 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
         gt=gt,
         lock=math.degrees(lock),
         crimp=CRIMP,
+        functions=functions,
         f20=lambda value: f"{value:20.12E}",
     )
     return Export({".rad": text}, says)
 
 
-LAW58 = Format("radioss-law58", law58, Law58Options)
+LAW58 = Format("radioss-law58", law58, Law58Options, unloads=True)
 MATERIAL = 1
 CURVES = {"warp": 101, "fill": 102, "shear": 103}
+UNLOADING = {"warp unloading": 104, "fill unloading": 105, "shear unloading": 106}
+SHIFTED = "unloading from the end of the range, shifted to where it begins"
+SCALED = (
+    "how the program takes an unloading curve to a smaller largest strain (LAW58 scales strain and "
+    "stress, which keeps the share of the set), with a strip of one element that is unloaded twice"
+)
 MEASURE: Measure = "green"
 NAMES = {
     "green": "2nd Piola-Kirchhoff stress by Green-Lagrange strain (shear: engineering, 2 E12)",
@@ -174,6 +209,10 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     measure, slack = options.measure, options.compression == "none"
     curves, law = fabric_curves(card, options, measure), card.law
     strips = {"warp": curves.warp[slack:], "fill": curves.fill[slack:]}
+    unload = {f"{n} unloading": from_zero(rows) for n, rows in
+              unloading_curves(card, options, measure).items()}  # fmt: skip
+    if unload:
+        unload["shear unloading"] = _odd(unload["shear unloading"])
     lost = ("the stiffness of the law in compression",) if slack else ()
     says = Says(
         carries=(
@@ -182,6 +221,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
             "EA, EB, GAB and the Poisson's ratios of no strain, which LS-DYNA needs for its time "
             "step and contact",
             PUSHED[options.compression],
+            *((f"{UNLOADS} (LCUA, LCUB, LCUAB); RL = 0",) if unload else ()),
         ),
         loses=(
             *lost,
@@ -189,7 +229,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
             f"{curves.yarns:.3g} MPa in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
-            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            FROM_TOP if unload else TOTAL,
             *density_remarks(options.density),
             *range_remarks(card, options.reach),
         ),
@@ -198,6 +238,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
             "Green-Lagrange strain for FORM 2, 4, 12 and 14, a converter true strain); "
             "--measure green, nominal or true writes another; a strip of one element that is "
             "stretched far tells",
+            *((SCALED,) if unload else ()),
             "that LCAB is taken as odd in the shear strain, and that CSE acts on curves of FORM 14",
         ),
     )
@@ -206,8 +247,9 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
         "ls-dyna/mat34.k.j2", head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
         title=title_of(card, 80), material=MATERIAL,
         density=DENSITY if options.density is None else options.density, ea=e1, eb=e2,
-        gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1, ids=CURVES,
-        curves={**strips, "shear": _odd(curves.shear)}, cse=float(slack), f10=_f10
+        gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1,
+        ids={**CURVES, **dict.fromkeys(UNLOADING, 0), **(UNLOADING if unload else {})},
+        curves={**strips, "shear": _odd(curves.shear), **unload}, cse=float(slack), f10=_f10
     )  # fmt: skip
     return Export({".k": text}, says)
 
@@ -224,35 +266,51 @@ def _f10(value: float) -> str:
     return f"{value:10.3E}"
 
 
-MAT34 = Format("ls-dyna-mat34", mat34, Mat34Options)
+MAT34 = Format("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
 
 
 def fabric(card: MaterialCard, options: CurveOptions) -> Export:
     """Write *MATERIAL with *FABRIC and three *UNIAXIAL tests, and how to orient it."""
     curves = fabric_curves(card, options, "nominal")
+    # A curve is shifted to where unloading begins: its own strain begins at the set.
+    unload = {
+        name: from_zero(rows)[1:] - [rows[0, 0], 0.0]
+        for name, rows in unloading_curves(card, options, "nominal").items()
+    }
     says = Says(
         carries=(
             "nominal stress by nominal strain of strips along warp and fill, free to contract, "
-            "and shear stress by change of angle: both elastic, path-independent",
+            "and shear stress by change of angle"
+            + ("" if unload else ": both elastic, path-independent"),
+            *((SHIFTED,) if unload else ()),
         ),
         loses=(
             f"nu12 = {card.law.nu12:g}: warp, fill and shear are independent in *FABRIC; "
             + curves.uncoupled,
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
             f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
-            "hypoelasticity: the curves are total ones; unloading is along the same curve",
+            FROM_TOP if unload else TOTAL,
             *density_remarks(options.density),
             *range_remarks(card, options.reach),
         ),
         confirm=(
             "the order stress, strain of the data lines, and the sign and measure of the shear "
             "(radians between the yarns), with one element of each test",
+            *(
+                (
+                    "TYPE=PERMANENT DEFORMATION with DEFINITION=SHIFTED CURVE, with a strip of one "
+                    "element that is unloaded twice",
+                )
+                if unload
+                else ()
+            ),
         ),
     )
     text = render(
         "abaqus/fabric.inp.j2", head=heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
         name=material_name(card), density=DENSITY if options.density is None else options.density,
-        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())], shear=curves.shear.tolist()
+        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())], shear=curves.shear.tolist(),
+        unload={name: rows.tolist() for name, rows in unload.items()}
     )  # fmt: skip
     return Export({".inp": text}, says)
 
@@ -264,4 +322,4 @@ def material_name(card: MaterialCard) -> str:
     return kept if kept[:1].isalpha() else "FABRIC"
 
 
-FABRIC = Format("abaqus-fabric", fabric, CurveOptions)
+FABRIC = Format("abaqus-fabric", fabric, CurveOptions, unloads=True)

@@ -4,19 +4,23 @@ import ctypes
 import dataclasses
 import io
 import json
+import math
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError
-from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.exports.base import NoOptions
 from bubblefit.materials.exports.subroutines import umat
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.memory import Memory
+from bubblefit.materials.pieces import integral_of
 from bubblefit.materials.responses import (
     JUMP,
     REACH,
@@ -669,3 +673,110 @@ def test_the_names_and_lines_are_ones_that_abaqus_takes():
         assert text.isascii()
     for line in export.files[".f"].splitlines():
         assert len(line) <= 72 or (line[72:] == "&" and line[:6].strip() in ("", "&")), line
+
+
+MEMORY = Memory((0.4, 0.5, 0.3), (1.6, 1.7, 1.5), (1.2, 1.1, 1.0), (3.0, 5.0, 1.0))
+REMEMBERS = replace(CARD, law=replace(LAWS["cubic"], memory=MEMORY), state="first loading")
+
+
+def unloaded(component, measure="nominal"):
+    """Return strain and stress from the set to the end of the range, in closed form."""
+    law, end, count = REMEMBERS.law, 0.13, 15
+    kept, up = MEMORY.kept(component, end), MEMORY.unloading[component]
+    x = np.linspace(kept, end, count)
+    s = (x - kept) / (end - kept)
+    own = integral_of(law.pieces, component, 0.0, end) * ((2 - up) * s + (up - 1) * s**2)
+    across = -NU12 * (x if component == 0 else own / E1(0))
+    nominal = np.stack([np.expm1(x), own * np.exp(across)], axis=1)
+    if measure == "green":
+        stretch = np.exp(x)
+        return np.stack([0.5 * (stretch**2 - 1), nominal[:, 1] / stretch], axis=1)
+    return np.stack([x, own], axis=1) if measure == "true" else nominal
+
+
+@pytest.mark.parametrize("measure", ["green", "nominal", "true"])
+def test_mat34_unloads_as_the_memory_does(measure):
+    made = FORMATS["ls-dyna-mat34"].export(REMEMBERS, measure=measure, points=15)
+    text = made.files[".k"]
+    assert "$ state of the fabric: first loading" in text
+    names, curves = read_k(text.replace(" unloading\n", "\n"))
+    assert [names[n] for n in ("lca", "lcb", "lcab", "lcua", "lcub", "lcuab", "rl")] == [
+        101, 102, 103, 104, 105, 106, 0]  # fmt: skip
+    for pulled, number in enumerate((104, 105)):
+        rows, wanted = curves[number], unloaded(pulled, measure)
+        assert (rows[0] == 0).all()
+        np.testing.assert_allclose(rows[1:], wanted, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(rows[-1], curves[number - 3][-1], rtol=1e-6)
+    shear, loading = curves[106], curves[103]
+    np.testing.assert_allclose(shear, -shear[::-1], atol=1e-12)
+    np.testing.assert_allclose(shear[-1], loading[-1], rtol=1e-6)
+    inside = np.interp(shear[:, 0], *loading.T)
+    assert (np.abs(shear[:, 1]) <= np.abs(inside) * (1 + 1e-9)).all()
+
+
+def read_functions(text):
+    found, last = {}, None
+    for line in text.splitlines():
+        if line.startswith("/FUNCT/"):
+            last = found.setdefault(int(line.removeprefix("/FUNCT/")), [])
+        elif last is not None and re.fullmatch(r"[ \d.E+-]{40}", line):
+            last.append([float(v) for v in fixed(line, [20, 20])])
+    return {number: np.array(rows) for number, rows in found.items()}
+
+
+def test_law58_unloads_as_the_memory_does():
+    text = FORMATS["radioss-law58"].export(REMEMBERS, points=15).files[".rad"]
+    lines, curves = text.splitlines(), read_functions(text)
+    cards = [lines[i + 1] for i, line in enumerate(lines) if line.startswith("#  FCT_ID")]
+    assert int(fixed(cards[0], [10, 10, 20])[0]) == 101
+    last = [float(v) for v in fixed(cards[1], [10, 10, 20, 20, 10, 20])]
+    assert last == [104, 105, 1, 1, 106, 1]
+    assert set(curves) == {101, 102, 103, 104, 105, 106}
+    for pulled, number in enumerate((104, 105)):
+        np.testing.assert_allclose(curves[number][1:], unloaded(pulled), rtol=1e-9, atol=1e-9)
+        loading = curves[number - 3]
+        np.testing.assert_allclose(loading[:, 1], strip(pulled, np.log1p(loading[:, 0]))[1],
+                                   rtol=1e-5, atol=1e-9)  # fmt: skip
+    angle = math.degrees(trellis_angle(MEMORY.kept(2, 0.13)))
+    assert curves[106][1] == pytest.approx([angle, 0.0])
+    assert curves[106][-1] == pytest.approx(curves[103][-1], rel=1e-6)
+
+
+def test_abaqus_fabric_unloads_as_the_memory_does():
+    text = FORMATS["abaqus-fabric"].export(REMEMBERS, points=15).files[".inp"]
+    blocks = re.split(r"^\*UNLOADING DATA, DEFINITION=SHIFTED CURVE\n", text, flags=re.M)[1:]
+    curves = []
+    for block in blocks:
+        body = block.split("*")[0].strip().splitlines()
+        curves.append(np.array([[float(v) for v in line.split(",")] for line in body])[:, ::-1])
+    assert len(curves) == 3
+    for pulled in (0, 1):
+        wanted = unloaded(pulled)
+        wanted[:, 0] -= wanted[0, 0]
+        np.testing.assert_allclose(curves[pulled], wanted, rtol=1e-9, atol=1e-9)
+    assert text.count(", TYPE=PERMANENT DEFORMATION") == 3 and text.count("TYPE=ELASTIC") == 2
+
+
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_other_formats_refuse_a_memory(name):
+    if name in ("ls-dyna-mat34", "radioss-law58", "abaqus-fabric"):
+        return
+    with pytest.raises(InputError) as failed:
+        FORMATS[name].export(REMEMBERS)
+    assert failed.value.field == "memory"
+
+
+def test_a_card_keeps_memory_and_state(tmp_path):
+    path = tmp_path / "card.toml"
+    REMEMBERS.write(path)
+    card = read_card(path)
+    assert (card.law.memory, card.state) == (MEMORY, "first loading")
+    text = path.read_text()
+    for old, new, field in (
+        ("format = 4", "format = 3", "memory"), ('"first loading"', '"tenth"', "state"),
+        ("0.4,", "1.4,", "memory.permanent_set"),
+    ):  # fmt: skip
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError) as failed:
+            read_card(path)
+        assert failed.value.field == field
