@@ -253,8 +253,8 @@ class Bubble(Definition):
         points : (m, 3), or (frames, m, 3), or an array a frame, mm, without load. displacements :
         (frames, m, 3), or an array a frame, mm. pressures : (frames,) MPa, rising. Or a DataFrame
         with columns x y z dx dy dz and frame or pressure. radius : mm of the clamped edge, or
-        "clamp" where its points are seen. keys :
-        of [[bubble]] and of [bubble.data.points]. InputError names the argument.
+        "clamp" where its points are seen. keys : of [[bubble]] and of [bubble.data.points].
+        InputError names the argument.
         """
         if hasattr(points, "columns"):
             points, displacements, pressures = _frames_of(points, pressures)
