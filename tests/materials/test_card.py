@@ -146,7 +146,7 @@ WRONG = {
     "thickness_mm": [0.0, -0.81, INF, 10**400, "thin", True], "thickness_change": ["some", 1],
     "name": [7], "source": [[1]], "valid_strain": [0.1], "law": [1], "breaks": [[0.01, 0.03]],
 }  # fmt: skip
-NAMED_WRONG = {"format": [4, "2"], "form": ["quintic", 3, ["cubic"]], "law": ["elastic", ["e"]],
+NAMED_WRONG = {"format": [5, "2"], "form": ["quintic", 3, ["cubic"]], "law": ["elastic", ["e"]],
                "breaks": [BREAKS]}  # fmt: skip
 ROWS_WRONG = [
     *one("valid_strain", weft=[[0.0, 0.1]], warp=[[0.0], [0.0, 0.0], [0.0, 0.1, 0.2]],
