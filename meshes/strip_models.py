@@ -244,3 +244,48 @@ class PatchModel(OfThickness):
 def elongations(displacement: ArrayLike) -> Array:
     """Return (n, 2, ...) elongations of a patch's displacements (n, 4, 3, ...)."""
     return np.asarray(displacement, dtype=float)[:, FAR_CORNER, :2] / SIDE
+
+
+@dataclass(frozen=True, eq=False)
+class TubeModel(OfThickness):
+    """The wall of a long, closed, inflated tube in tension and torsion, all of it strained alike.
+
+    radius : mm at rest; warp along the tube. loads (n, 3): gauge pressure MPa, pull N beside that
+    of the pressure on the ends, torque N mm. The patch has x along the tube and y around it.
+    """
+
+    loads: Array
+    radius: float
+    thickness: float
+
+    def __post_init__(self) -> None:
+        values = np.array(self.loads, dtype=float)
+        if values.ndim != 2 or values.shape[1:] != (3,) or not len(values):
+            raise InputError(None, "loads", f"expected loads (n, 3), got shape {values.shape}")
+        if not np.isfinite(values).all():
+            raise InputError(None, "loads", "expected finite numbers")
+        for name in ("radius", "thickness"):
+            if not getattr(self, name) > 0:
+                problem = f"expected > 0 mm, got {getattr(self, name)}"
+                raise InputError(None, name, problem)
+        object.__setattr__(self, "loads", values)
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+        return Mesh(points, np.array([[0, 1, 2, 3]]), {})
+
+    def strains(self, displacement: ArrayLike) -> Array:
+        """Return (n, 3): change of length and of radius over their own, radius times twist per mm.
+
+        displacement : (n, 4, 3) mm of the patch.
+        """
+        u = np.asarray(displacement, dtype=float) / SIDE
+        return np.stack([u[:, 1, 0], u[:, 3, 1], u[:, 1, 1] / (1.0 + u[:, 3, 1])], axis=1)
+
+    def strain_slopes(self, displacement: ArrayLike, slope: ArrayLike) -> Array:
+        """Return (n, 3, parameters) from slopes (n, 4, 3, parameters) of the displacement."""
+        u, du = (np.asarray(a, dtype=float) / SIDE for a in (displacement, slope))
+        hoop = 1.0 + u[:, 3, 1, None]
+        twist = du[:, 1, 1] / hoop - u[:, 1, 1, None] * du[:, 3, 1] / hoop**2
+        return np.stack([du[:, 1, 0], du[:, 3, 1], twist], axis=1)

@@ -22,6 +22,7 @@ from ..experiments.kinds import (
     FittedTest,
     MakeSolver,
     Masks,
+    PredictedRun,
     PreparedTest,
     Weighting,
     beyond,
@@ -29,7 +30,7 @@ from ..experiments.kinds import (
     strains_of,
     unstable_words,
 )
-from ..experiments.registry import report_of
+from ..experiments.registry import kind_named, report_of
 from ..files import __version__
 from ..inference.comparison import Blocks
 from ..inference.problem import Evaluation, FitProblem
@@ -42,6 +43,7 @@ from .compare import candidates, errors, fit_of, plain
 from .executor import executor_of
 from .fit import FitEvent, stored_fit
 from .folder import Presented, check_asked, check_unused, finished
+from .predictions import predict
 from .progress import listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -449,18 +451,43 @@ def judge_cards(
     cards: Mapping[str, MaterialCard],
     tests: str | Sequence[str] | None = None,
 ) -> Validation:
-    """Judge cards at tests without any fit of the law; raises InputError: another thickness."""
+    """Judge cards at tests without any fit of the law, predicted ones by their measured loads.
+
+    InputError : another thickness, no test to judge them at.
+    """
     for name, card in cards.items():
         if (words := thickness_difference(card, project.fabric.thickness)) is not None:
             raise InputError(project.path, "fabric.thickness", f"{name}: {words}")
-    chosen = project.chosen(tests, fitted=True)
-    setup = prepare_fit(project, cast(Sequence[FittableTest], chosen))
-    judged = [
-        Judged(name, held_out(test, card.law, setup.make_solver))
-        for name, card in cards.items()
-        for test in setup.tests
-    ]
+    every = project.chosen(tests)
+    beside = [
+        test.name for test in every
+        if (kind := kind_named(test.kind).predicted) is not None and kind.measured(test)
+    ]  # fmt: skip
+    judged = []
+    if not beside or any(kind_named(test.kind).fitted for test in every):
+        chosen = project.chosen(tests, fitted=True)
+        setup = prepare_fit(project, cast(Sequence[FittableTest], chosen))
+        judged = [
+            Judged(name, held_out(test, card.law, setup.make_solver))
+            for name, card in cards.items()
+            for test in setup.tests
+        ]
+    if beside:
+        found = predict(project, beside, cards, samples=0)
+        judged += [
+            Judged(run.card, _predicted(run, found.error(i), found.ended(i)))
+            for i, run in enumerate(found.each)
+            if run.predicted
+        ]
     return Validation(project.title, tuple(judged))
+
+
+def _predicted(run: PredictedRun, error: float | None, ended: str) -> HeldOut:
+    """Return the error of a prediction beside what was measured, in % of the largest of that."""
+    name, units = run.test.name, {run.test.name: "% of the largest measured"}
+    if error is None:
+        return not_judged(name, ended, units)
+    return HeldOut(name, error, {name: 100 * error}, units, tuple(run.notes))
 
 
 def _judge(found: Fit, test: PreparedTest) -> HeldOut:

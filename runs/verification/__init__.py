@@ -28,7 +28,7 @@ from ...solvers.base import Solver
 from ...solvers.calculix.solver import CalculixSolver, diagnose
 from ...solvers.membrane.solver import MembraneSolver
 from ..progress import listener
-from .closed_forms import Number, bent_tubes, hencky_membranes, thin_walls
+from .closed_forms import Number, bent_tubes, hencky_membranes, loaded_tubes, thin_walls
 
 SOURCE = "MSC Marc; Jekel et al., Composite Structures 161 (2017)"
 
@@ -238,6 +238,7 @@ def with_calculix() -> Iterator[Number]:
 SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
     "bars": marc_bars, "hencky": hencky_membranes, "abaqus": abaqus_bubbles,
     "marc bubble": marc_bubble, "strips": strips, "thin walls": thin_walls, "bent tube": bent_tubes,
+    "loaded tubes": loaded_tubes,
     "nu12": poisson_ratios, "calculix": with_calculix,
 }  # fmt: skip
 

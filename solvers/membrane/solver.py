@@ -15,7 +15,7 @@ from ...materials.responses import bar
 from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
-from ...meshes.strip_models import PatchModel, UniaxialModel
+from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
 from ..decks import in_words
@@ -41,6 +41,7 @@ ANALYSES: dict[type, Analysis] = {
     InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
     CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
     PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
+    TubeModel: Analysis(strip.prepare_tube, strip.analyse_tube),
     BeamModel: Analysis(beam.prepare, beam.analyse),
 }
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import biaxial_response
-from ...meshes.strip_models import PatchModel, UniaxialModel
+from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..base import History
 from .bubble import Wall
 from .factorisation import Tangent, tangent_for
@@ -32,6 +32,10 @@ from .newton import (
 
 Array = NDArray[np.float64]
 MOST_CORRECTIONS = 12
+#: Newton's iterations of a homogeneous tube, and the largest change of strain in one.
+MOST_ROUNDS, LONGEST_STEP = 60, 0.1
+#: Of its largest force, and of its stiffness: what is left of the residual.
+ROUNDED, ROUNDING = 1e-11, 1e-14
 #: mm of gauge elongation over mm of gauge length.
 GAUGE_TOLERANCE = 1e-10
 #: Increments from which the start of the next one is extrapolated.
@@ -269,5 +273,80 @@ def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[Histor
         model.loads.sum(axis=1), moved, np.concatenate([found.strain.min(axis=0), none]),
         np.concatenate([found.strain.max(axis=0), none]), iterations=patch.iterations,
         unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
+    )  # fmt: skip
+    return history, rates
+
+
+class Whole:
+    """The dense stiffness of one quad, as `assemble` writes it."""
+
+    def __init__(self) -> None:
+        self.slot, self.data = np.arange(144, dtype=np.int64)[None], np.zeros(144)
+
+
+def prepare_tube(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
+    points = np.array(model.mesh.points, dtype=float)
+    quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
+    return Membrane(
+        points, quads, reference_elements(points, quads), model.thickness, law, np.arange(12),
+        Whole(), tolerance, step_limit=np.inf,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[History, Array]:
+    """Return the history of a homogeneous tube, and the derivatives by direct differentiation.
+
+    Unknown are the stretch along, that around and the shear s of lines along the tube, all linear
+    in the patch's displacement. With the stretches a, b, per area at rest, the loads' potential is
+    p R a b^2 / 2 + F a / (2 pi R) + T s / (2 pi R^2 b).
+    """
+    initial_moduli(membrane.law)
+    points, parameters = membrane.reference, asked.parameters
+    to = np.zeros((12, 3))
+    to[0::3, 0], to[1::3, 1], to[1::3, 2] = points[:, 0], points[:, 1], points[:, 0]
+    area, radius = float(membrane.elements.area.sum()), model.radius
+    derivatives = Derivatives(membrane, parameters) if parameters else None
+    record = Record(membrane, len(model.loads))
+    rates = np.zeros((*record.path.shape, len(parameters)))
+    unstable, c, small = [], np.zeros(3), 0.0
+    for i, (pressure, force, torque) in enumerate(model.loads.tolist()):
+        twisting = torque / (2 * np.pi * radius**2)
+        for _ in range(MOST_ROUNDS):
+            membrane.unbalance((to @ c).reshape(4, 3), 0.0, with_tangent=True)
+            a, b, s = 1.0 + c[0], 1.0 + c[1], c[2]
+            push = np.array([
+                0.5 * pressure * radius * b**2 + force / (2 * np.pi * radius),
+                pressure * radius * a * b - twisting * s / b**2, twisting / b,
+            ])  # fmt: skip
+            ab, bs = pressure * radius * b, -twisting / b**2
+            bb = pressure * radius * a + 2 * twisting * s / b**3
+            steep = np.array([[0.0, ab, 0.0], [ab, bb, bs], [0.0, bs, 0.0]])
+            left = to.T @ membrane.residual / area - push
+            stiff = to.T @ membrane.tangent.data.reshape(12, 12) @ to / area - steep
+            if not (np.isfinite(left).all() and np.isfinite(stiff).all() and min(a, b) > 0):
+                break
+            small = ROUNDED * np.abs(push).max() + ROUNDING * np.abs(stiff).max()
+            if np.abs(left).max() <= small:
+                break
+            try:
+                step = np.linalg.solve(stiff, left)
+            except np.linalg.LinAlgError:
+                break
+            c = c - min(1.0, LONGEST_STEP / np.abs(step).max()) * step
+        if not np.abs(left).max() <= small:
+            where = f"{1e3 * pressure:.4g} kPa, {force:.4g} N and {1e-3 * torque:.4g} N m"
+            raise SolverFailure(f"no equilibrium of the tube at {where} (load {i + 1})", "membrane")
+        if np.linalg.eigvalsh(stiff)[0] <= 0:
+            unstable.append(f"{1e3 * pressure:.4g} kPa, {force:.4g} N, {1e-3 * torque:.4g} N m")
+        u = (to @ c).reshape(4, 3)
+        if derivatives is not None:
+            rate = to.T @ derivatives.at_fixed_displacement(u) / area
+            du = -to @ np.linalg.solve(stiff, rate)
+            derivatives.advance(du)
+            rates[i] = du.reshape(4, 3, -1)
+        record.accept(i, u)
+    history = History(
+        model.loads[:, 0], record.path, record.low, record.high, iterations=membrane.iterations,
+        unstable=tuple(unstable),
     )  # fmt: skip
     return history, rates

@@ -11,6 +11,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES
 from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict
+from bubblefit.runs.validation import validate
 from bubblefit.solvers.calculix import cylinder as calculix_cylinder
 from bubblefit.solvers.marc import cylinder as marc_cylinder
 
@@ -208,6 +209,19 @@ def test_a_beam_has_its_wall_by_pressure_and_needs_no_card(tmp_path):
     assert row["card"] == "its wall" and row["load_at_40_mm_N"] > 50
     finer = test.models(what="elements", factor=2)["cylinder"]
     assert finer.size == 0.5 * beam.size
+
+
+def test_validate_judges_a_beam_by_its_measured_loads(tmp_path):
+    path = tmp_path / "beam.toml"
+    path.write_text(BEAM.replace("places = [40.0]", 'measured.files = ["read.csv"]'))
+    (tmp_path / "read.csv").write_text("deflection [mm],load [N]\n0,0\n20,200\n40,400\n")
+    found = predict(read_project(path))
+    card = MaterialCard(HypoelasticLaw.linear(1.0, 1.0, 1.0), 1.0, "card")
+    judged = validate(read_project(path), cards={"card": card})
+    (one,) = judged.judged
+    assert (one.law, one.predicted.test) == ("its wall", "beam")
+    assert one.predicted.error == pytest.approx(found.error(0)) and one.predicted.error > 0
+    assert judged.table()["foretold_rms"][0] == pytest.approx(100 * found.error(0))
 
 
 @pytest.mark.parametrize(

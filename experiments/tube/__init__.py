@@ -1,0 +1,300 @@
+"""An inflated tube in tension and torsion: section [[tube]], data, comparison, candidates.
+
+A long closed tube, warp along it, with the same strain everywhere (`TubeModel`): torsion shears the
+wall as nothing but G12 resists, so that a tube tells G12 where strips and bubbles do not.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, Field
+
+from ...errors import InputError
+from ...files import is_file
+from ...inference.comparison import Comparison, NoiseIs
+from ...materials.law import HypoelasticLaw
+from ...meshes.strip_models import TubeModel
+from ...readers.frames import FrameSource
+from ...readers.sections import Name, Positive, Section, beside
+from ...solvers.base import History
+from .. import kinds
+from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Predicted, Reach, Studied, Weighting
+
+Array = NDArray[np.float64]
+#: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
+LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
+STRAINS = {"axial_percent": 0.01, "hoop_percent": 0.01, "twist_deg_per_m": np.pi / 180e3}
+#: Of one measured strain, unless the project says its own: a camera's, or an encoder's.
+NOISE, PERCENT = 1e-4, 100.0
+PART = "tube"
+#: Of a candidate: radius in mm, hoop strain over the law's range, loads, and values of a strain
+#: that are taken to be independent.
+RADIUS, INFLATED, STEPS, INDEPENDENT = 100.0, 0.3, 15, 5
+
+
+class TubeSection(Section):
+    """Section [[tube]]: an inflated tube pulled and twisted; noise of one strain, in %."""
+
+    name: Name | None = None
+    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    diameter: Positive
+    file: str
+    folder: str = ""
+    noise: Positive | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TubeTest:
+    """Loads (n, 3) as of `TubeModel`, and strains (n, 3) along, around, radius times twist.
+
+    Strains from any zero; NaN in columns that are not measured.
+    """
+
+    name: str
+    place: Place
+    weight: float
+    radius: float
+    loads: Array
+    strain: Array
+    noise: float | None = None
+    path: Path | None = None
+    kind: str = "tube"
+    reads_files: bool = True
+
+    @property
+    def reach(self) -> Reach:
+        """Return the largest shear of lines along the tube; other strains begin before the data."""
+        if not len(self.strain) or np.isnan(self.strain[:, 2]).any():
+            return Reach()
+        return Reach((None, None, float(np.abs(self.strain[:, 2]).max()) or None))
+
+    def models(
+        self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
+    ) -> Mapping[str, TubeModel]:
+        """Return the one model: nothing to refine."""
+        thick = self.place.fabric.thickness if thickness is None else thickness
+        return {PART: TubeModel(self.loads, self.radius, thick)}
+
+    def settings(self) -> Mapping[str, object]:
+        """Return the settings that a result depends on; data count by themselves."""
+        return {"weight": self.weight, "noise": self.noise, "radius": self.radius}
+
+
+def read(section: TubeSection, place: Place, name: str) -> TubeTest:
+    """Read the section of a test, and its file."""
+    radius = 0.5 * section.diameter * place.scales.length
+    folder = place.data_folder or beside(place.path.parent, section.folder)
+    path = folder / section.file
+    noise = None if section.noise is None else section.noise / PERCENT
+    loads, strain = np.empty((0, 3)), np.empty((0, 3))
+    if is_file(path):
+        loads, strain = _columns(path, radius)
+    elif place.need_data:
+        raise place.error("file", f"there is no file {path}; --data DIR names another folder")
+    return TubeTest(
+        name=name, place=place, weight=section.weight, radius=radius, loads=loads, strain=strain,
+        noise=noise, path=path,
+    )  # fmt: skip
+
+
+def _columns(path: Path, radius: float) -> tuple[Array, Array]:
+    try:
+        table = pd.read_csv(path, comment="#", skipinitialspace=True)
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"is not a CSV table: {str(error).splitlines()[0]}") from None
+    known = {*LOADS, *STRAINS}
+    if lacking := [name for name in LOADS if name not in table]:
+        raise InputError(path, lacking[0], f"is missing; columns are: {', '.join(LOADS)}")
+    if not set(STRAINS) & set(table.columns):
+        raise InputError(path, "columns", f"expected one at least of {', '.join(STRAINS)}")
+    if strange := [str(name) for name in table if name not in known]:
+        raise InputError(path, strange[0], f"is no column here; known: {', '.join(sorted(known))}")
+    for name in table:
+        numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+        if len(numbers) < 2 or not np.isfinite(numbers).all():
+            raise InputError(path, str(name), "expected two or more rows of finite numbers")
+    none = np.full(len(table), np.nan)
+    loads = [scale * table[name].to_numpy(float) for name, scale in LOADS.items()]
+    strain = [s * table[n].to_numpy(float) if n in table else none for n, s in STRAINS.items()]
+    strain[2] = radius * strain[2]
+    return np.stack(loads, axis=1), np.stack(strain, axis=1)
+
+
+class TubeObjective:
+    """Residuals (model - measured) / (largest sqrt(n)) of each measured strain.
+
+    The zero of a strain is not known: strains are compared about their means.
+    """
+
+    unit = "%"
+
+    def __init__(self, test: TubeTest, weight: float) -> None:
+        self.model = next(iter(test.models().values()))
+        self.strain = test.strain
+        self.read = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
+        self.least_noise = PERCENT * (NOISE if test.noise is None else test.noise)
+        self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
+        count = len(self.strain)
+        self.sizes = (count,) * len(self.read)
+        largest = np.abs(self.measured).max(axis=0)
+        self._unit = np.maximum(largest, NOISE) * np.sqrt(count) / max(weight, 1e-300)
+
+    @property
+    def measured(self) -> Array:
+        """Return what was measured (n, blocks) about its mean."""
+        return _centred(self.strain[:, self.read])
+
+    @property
+    def scale(self) -> Array:
+        """Return % of strain in one unit of each residual."""
+        return PERCENT * np.repeat(self._unit, self.sizes[0])
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """Return the numbers of the rows: neighbours err as one."""
+        return (np.arange(1.0, 1 + self.sizes[0])[:, None],) * len(self.sizes)
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Return everything measured that the residual depends on."""
+        return self.model.loads, self.strain[:, self.read]
+
+    def modelled(self, history: History) -> Array:
+        """Return the model's strains (n, blocks) about their means."""
+        return _centred(self.model.strains(history.displacement)[:, self.read])
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Return all blocks one after the other."""
+        return self._blocks(self.modelled(history) - self.measured)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return (m, parameters) from the slope of the displacements."""
+        own = self.model.strain_slopes(history.displacement, slope)[:, self.read]
+        return self._blocks(_centred(own))
+
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        """Return (m, 0): there are no nuisance unknowns."""
+        if names:
+            raise InputError(None, "nuisance", f"a tube knows no {', '.join(names)}")
+        return np.empty((sum(self.sizes), 0))
+
+    def shifted(self, here: History, there: History) -> TubeObjective:
+        """Return the objective of a model that shows `here` where this one shows `there`."""
+        other = copy.copy(self)
+        other.strain = self.strain.copy()
+        other.strain[:, self.read] -= self.modelled(here) - self.modelled(there)
+        return other
+
+    def rms(self, history: History) -> Array:
+        """Return the RMS error of each block, %."""
+        off = self.modelled(history) - self.measured
+        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
+
+    def _blocks(self, values: Array) -> Array:
+        rows = values / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
+        return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))
+
+
+def _centred(values: Array) -> Array:
+    return np.asarray(values - values.mean(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedTube:
+    """A tube with its data."""
+
+    test: TubeTest
+    objective_is = "sum of the RMS errors of the measured strains over their largest"
+    known: HypoelasticLaw | None = None
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        """Return nothing: one tube."""
+        return {}
+
+    def reach(self, masks: Masks) -> Reach:
+        """Return the reach of the test, which is matched whole."""
+        return self.test.reach
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+    ) -> tuple[Comparison, ...]:
+        """Return the one comparison."""
+        test = self.test
+        count = int((~np.isnan(test.strain).any(axis=0)).sum())
+        weight = weighting.weight / count if weighting.relative else 1.0
+        objective = TubeObjective(test, weight)
+        return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """Return the same comparison: there is no mesh to refine."""
+        return self.comparisons(make_solver, weighting)
+
+    def data_files(self) -> Sequence[kinds.DataFile]:
+        """Return the file."""
+        own = self.test.path
+        count = len(self.test.loads)
+        return [] if own is None else [kinds.DataFile(own, FrameSource("csv"), count, {})]
+
+
+def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
+    """Return torsion of an inflated tube, up to the shear that the law is known for."""
+    own = [test for test in planning.present if isinstance(test, PreparedTube)]
+    noise_is = "assumed" if planning.noise is None else "given"
+    return [kinds.Candidate("torsion of a tube", partial(_twisted, own, planning), noise_is)]
+
+
+def _twisted(own: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
+    """Return a tube that is inflated, then twisted, with the strains that the law gives."""
+    radius = own[0].test.radius if own else RADIUS
+    law, thick, ends = planning.law, planning.place.fabric.thickness, planning.ends
+    pressure = _integral(law, "E2", INFLATED * ends[1]) * thick / radius
+    torque = 2 * np.pi * radius**2 * thick * _integral(law, "G12", ends[2])
+    turns = np.linspace(0.0, torque, STEPS)
+    loads = np.column_stack([np.full(STEPS, pressure), np.zeros(STEPS), turns])
+    model = TubeModel(loads, radius, thick)
+    strain = model.strains(planning.make_solver("membrane").run(model, law).displacement)
+    noise = planning.noise or kinds.Precision(PERCENT * NOISE, 1.0, INDEPENDENT).at(STEPS)
+    test = TubeTest(
+        name="torsion of a tube", place=planning.place, weight=1.0, radius=radius, loads=loads,
+        strain=strain, noise=noise / PERCENT,
+    )  # fmt: skip
+    return PreparedTube(test)
+
+
+def _integral(law: HypoelasticLaw, name: str, end: ArrayLike) -> float:
+    """Return the stress (MPa) that a modulus gives up to a strain."""
+    strain = np.linspace(0.0, float(np.asarray(end)), 50)
+    return float(np.trapezoid(law.modulus(name, strain), strain))
+
+
+class Tube:
+    """An inflated tube in tension and torsion."""
+
+    name: str = "tube"
+    title: str = "an inflated tube in tension and torsion"
+    section: type[BaseModel] = TubeSection
+    folder_key: str = "folder"
+    fitted: bool = True
+    predicted: Predicted | None = None
+    studied: Studied | None = None
+    read = staticmethod(read)
+    candidates = staticmethod(candidates)
+
+    def prepare(self, test: TubeTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTube:
+        """Return the test, which was read with its data."""
+        return PreparedTube(test)
+
+
+KIND: Kind = Tube()
