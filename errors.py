@@ -38,11 +38,7 @@ class BubblefitError(Exception):
 
 
 class InputError(BubblefitError):
-    """A project, card, mesh or data file that is not usable.
-
-    path : the file at fault, or None when the input did not come from a file. field : the key,
-    column or line at fault. problem : what is wrong, what was expected and what to do.
-    """
+    """An unusable input: its file or None; its key, column or line; what is wrong, what to do."""
 
     def __init__(self, path: Path | str | None, field: str, problem: str) -> None:
         self.path, self.field, self.problem = path, field, problem
@@ -127,11 +123,7 @@ class NoFeasibleStart(BubblefitError):
 
 
 class SolverFailure(BubblefitError):
-    """An analysis that did not end well; there is no result.
-
-    reason : one line: what happened, at which load. exit_number : the solver's own, where it has
-    one. log_tail : last lines of the solver's log. scratch : folder kept for inspection, or None.
-    """
+    """An analysis without a result: one-line reason, exit number, log, scratch folder or None."""
 
     exit_code = 4
 
@@ -253,10 +245,7 @@ def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
 
 
 def lines(notes: Sequence[Note]) -> list[str]:
-    """Return the notes as lines for the terminal.
-
-    Notes that more than a few things share but for their numbers are one line; notes.csv has each.
-    """
+    """Return lines for the terminal; notes that many things share but for numbers are one."""
     alike: dict[tuple[NoteKind, str], list[Note]] = {}
     for note in notes:
         alike.setdefault((note.kind, NUMBERS.sub("#", note)), []).append(note)

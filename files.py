@@ -1,11 +1,9 @@
 """Files and what lies around them: reading, writing, templates, plug-ins, caches of compiled code.
 
-Untrusted files are read only where they are regular, no larger than expected, and within a time
-limit. Files are written whole or not at all. Templates may be a user's own, or lie beside a project
-from somebody else: they are rendered in a sandbox, which gives them values and nothing to change.
-Plug-ins are looked up by name without importing anything; one that does not work gives one line
-that names its distribution, and breaks nothing else. Heavy libraries are imported where they are
-used, so that `import bubblefit` stays quick.
+Untrusted files are read only where regular, no larger than expected, and within a time limit; files
+are written whole or not at all. Templates may be somebody else's: a sandbox gives them values and
+nothing to change. Plug-ins are looked up without being imported; one that does not work gives one
+line that names its distribution. Heavy libraries are imported where they are used.
 """
 
 from __future__ import annotations
@@ -60,11 +58,7 @@ KERNELS = (
 
 
 def content_of(path: Path | str, most: int = LARGEST) -> bytes:
-    """Read the whole of a regular file of at most `most` bytes; links are followed.
-
-    Raises InputError : a device, a pipe, a name with a NUL in it, a file that is too large.
-    OSError : no such file, no permission, a folder.
-    """
+    """Read a whole regular file; InputError if there is none such, or too large; OSError."""
     too_large = InputError(path, "", f"has more than {most // 2**20} MiB; is it the right file?")
     check_regular(path)
     # A pipe may have taken its place by now.
@@ -101,10 +95,7 @@ def is_file(path: Path) -> bool:
 
 
 def check_regular(path: Path | str) -> None:
-    """Check that a path does not lead to a device or a pipe, which may never end.
-
-    Raises InputError : it does, or no file can have such a name. OSError : there is no such file.
-    """
+    """Raise InputError for a device, a pipe, or a name that no file can have; or OSError."""
     try:
         mode = os.stat(path).st_mode
     except ValueError:
@@ -124,11 +115,9 @@ def checksum(path: Path | str) -> str:
 
 
 def process_context() -> Any:
-    """Return the context of multiprocessing in which processes are started.
+    """Return the context of multiprocessing: the program's choice, else fork on Linux.
 
-    It is the one that the program has chosen (`multiprocessing.set_start_method`). Otherwise fork
-    on Linux, where compiled kernels and data are there already and no script needs a guard around
-    its main part, and spawn elsewhere.
+    With fork, compiled kernels and data are there already and no script needs a guard.
     """
     import multiprocessing
 
@@ -158,10 +147,8 @@ def one_blas_thread() -> Iterator[None]:
 def ends(call: Callable[[], object], seconds: float) -> bool:
     """Return whether a call ends within `seconds`, in any way but a crash of its process.
 
-    It is tried in a process of its own; errors are left to the caller's own call. A daemonic
-    process (a worker of a cluster) may not start another, and nothing is tried there.
-
-    call : picklable where processes are spawned.
+    Tried in a process of its own (`call` is picklable where these are spawned), errors left to the
+    caller's own call. A daemonic process may start none: nothing is tried there.
     """
     import multiprocessing
 
@@ -199,9 +186,7 @@ def output_errors(path: Path | str) -> Iterator[None]:
 def replacing(path: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside `path` that takes its place when the block ends well.
 
-    The parent folder is made. A reader sees the old file or the new one, never half of one.
-
-    Raises OutputError : the folder cannot be written or the disk is full.
+    The parent folder is made. OutputError : the folder cannot be written or the disk is full.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
@@ -216,10 +201,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Write a file whole, in UTF-8, onto the disk; OutputError as of `replacing`.
-
-    Bytes of a file's name that are no text in UTF-8 are shown as question marks.
-    """
+    """Write a file whole, onto the disk; bytes that are no UTF-8 as "?"; OutputError."""
     text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     with replacing(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as stream:
         stream.write(text)
@@ -269,10 +251,7 @@ def remove_unfinished(folder: Path | str) -> None:
 
 
 def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environment:
-    """Return a sandboxed environment in which a missing variable is an error.
-
-    html : whether values are escaped.
-    """
+    """Return a sandboxed environment, missing variables errors; html : escape the values."""
     import jinja2
     from jinja2.sandbox import ImmutableSandboxedEnvironment
 
@@ -287,10 +266,7 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
 
 
 def render(template: str, /, **context: Any) -> str:
-    """Return the text of `template` (a path below templates/) with the values of `context`.
-
-    Raises jinja2.UndefinedError : the template asks for a variable that the context does not have.
-    """
+    """Return the text of a template below templates/; a missing variable is an UndefinedError."""
     import jinja2
 
     return environment(jinja2.FileSystemLoader(TEMPLATES)).get_template(template).render(context)
@@ -310,11 +286,7 @@ class PlugIn:
     entry: EntryPoint
 
     def load(self, what: str = "", needs: Sequence[str] = ()) -> Any:
-        """Import the object that the entry point names.
-
-        what : what it should be, in a word, for the complaint: "form". needs : attributes that it
-        must have. Raises PlugInFailure : it cannot be imported, or lacks one of `needs`.
-        """
+        """Import the object of the entry point; PlugInFailure: it cannot be, or lacks `needs`."""
         try:
             thing = self.entry.load()
         # A module may do anything when it is imported, sys.exit included.
@@ -327,11 +299,7 @@ class PlugIn:
         return thing
 
     def failure(self, what: str, error: BaseException | None = None) -> PlugInFailure:
-        """Return an error of one line that names the distribution.
-
-        what : what the plug-in does, "fails its check". error : what it raised; its class and the
-        first line of its message are shown.
-        """
+        """Return an error that names the distribution, `what` it does, and what it raised."""
         cause = ""
         if error is not None:
             first = (str(error).splitlines() or [""])[0]
@@ -359,10 +327,7 @@ def plug_in_named(group: Group, name: str) -> PlugIn | None:
 
 
 def names_with(group: Group, ours: Iterable[str]) -> tuple[str, ...]:
-    """Return our own names in their order, then those that plug-ins add, sorted.
-
-    A plug-in never takes the place of one of ours: look a name up among ours first.
-    """
+    """Return our own names in order, then those that plug-ins add, sorted; ours come first."""
     ours = tuple(ours)
     return (*ours, *sorted({plug_in.name for plug_in in plug_ins(group)} - {*ours}))
 

@@ -71,10 +71,7 @@ class CardCertainty:
         return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
 
     def band(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> tuple[Array, Array]:
-        """Return (n,) MPa each, lower and upper end of 95 % of a modulus; none is below zero.
-
-        They are the fit's own where the card has them, else by `sigma`.
-        """
+        """Return (n,) MPa each, lower (>= 0) and upper end of 95 %: the fit's, else by `sigma`."""
         if name in self.bands:
             strains, *ends = self.bands[name]
             return band_at(strains, ends, strain, law.modulus(name, strain))
@@ -189,11 +186,7 @@ class MaterialCard:
     def export(
         self, name: str, folder: Path | str = ".", *, overwrite: bool = False, **options: Any
     ) -> list[Path]:
-        """Write the material for another program, as `bubblefit export`; return the files.
-
-        name : of the format. options : of the format. InputError : no such format or option, or a
-        law that the format cannot hold. OutputError : a file is there already.
-        """
+        """Write the material for another program; InputError: unfit; OutputError: file there."""
         # Formats take cards, and one of them is a solver's own: they are found at run time.
         formats = import_module("bubblefit.solvers.registry").FORMATS
         if name not in formats:

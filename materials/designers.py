@@ -295,11 +295,7 @@ def constants_of_law(
     law: HypoelasticLaw, thickness: float, lowest: float, highest: float, shear_strain: float,
     options: Options = USUAL, ratios: Sequence[str] = RATIOS
 ) -> LawConstants:  # fmt: skip
-    """Evaluate a law as a test of five ratios is evaluated.
-
-    lowest, highest : kN/m, of the larger load of each ratio. shear_strain : up to which G is
-    averaged.
-    """
+    """Evaluate a law by five ratios, of loads lowest to highest kN/m, G up to shear_strain."""
     if not 0 <= lowest < highest:
         problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
         raise InputError(None, "loads", problem)

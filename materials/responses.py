@@ -56,11 +56,7 @@ ROUNDS = 50
 
 
 def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array, Array]:
-    """Return log strain and Cauchy stress (n, 3), MPa, of a bar pulled step by step.
-
-    pulled : 0 warp, 1 fill. log_strain : (n,) of it. InputError : a modulus is not positive on the
-    way.
-    """
+    """Return log strain and Cauchy stress (n, 3), MPa, of a bar; pulled : 0 warp, 1 fill."""
     free = 1 - pulled
     ends = np.asarray(log_strain, dtype=float)
     strains, stresses = np.empty((len(ends), 3)), np.empty((len(ends), 3))
@@ -377,10 +373,7 @@ class ModulusTable:
 def modulus_table(
     law: HypoelasticLaw, name: str, points: int = POINTS, reach: float = REACH
 ) -> ModulusTable:
-    """Return the table of one modulus: `points` equally spaced strains, and the ends of pieces.
-
-    reach : the end where the law has no range.
-    """
+    """Return a modulus at equally spaced strains and ends of pieces; reach : if it has no range."""
     if points < 2:
         raise InputError(None, "points", f"expected at least 2, got {points}")
     if not 0 < reach < UNLIMITED:

@@ -173,10 +173,7 @@ def wrinkled(
     away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
     strain_slope: Array,
 ) -> bool:  # fmt: skip
-    """Find a wrinkle in one direction: he, s_new, and strain_slope, the derivative of he by h.
-
-    away : angle and size of the larger principal strain from the total strain to the slack one.
-    """
+    """Find a wrinkle between the `away` angles: he, s_new, and the derivative of he by h."""
     n, m, inverse = np.empty(3), np.empty(3), np.empty((2, 2))
     # First the normal of the smaller principal stress that the taut fabric would have.
     angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))

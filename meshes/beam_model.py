@@ -54,10 +54,7 @@ class TubeWall(Protocol):
 
 @dataclass(frozen=True)
 class PlainWall:
-    """Stiffness per width, N/mm: along, around, shear; poisson: strain around over along.
-
-    wrinkles : it goes slack where it would be compressed.
-    """
+    """Stiffness per width (N/mm): along, around, shear; wrinkles : it is slack in compression."""
 
     axial: float
     hoop: float
@@ -225,10 +222,7 @@ class TubeSection:
         return math.pi * self.radius * (self.wall.shear + self.pressure * self.radius)
 
     def resultants(self, strain: Array, curvature: Array) -> tuple[Array, Array, Array]:
-        """Return N (m,) N, M (m,) N mm, positive in sagging, and derivatives (m, 2, 2).
-
-        strain, curvature (m,) of the axis, from the inflated tube; 1/mm.
-        """
+        """Return N (m,) N, M (m,) N mm sagging, derivatives (m, 2, 2); curvature in 1/mm."""
         rest, starts = self._at_rest
         turn = 2 * math.pi / AROUND * (0.5 + np.arange(AROUND))
         heights = self.radius * np.cos(turn)

@@ -27,10 +27,7 @@ RING_TO_CORE = 1.2
 
 
 def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
-    """Mesh the quarter x, y >= 0 of the unit disk with n^2 + 2 n m quads.
-
-    n : divisions of the core. m : layers of the ring; the 2 n + 1 nodes of the rim lie evenly.
-    """
+    """Mesh x, y >= 0 of the unit disk: n divisions of the core, m rings, 2 n + 1 rim nodes."""
     core, ring = _core_and_ring(n, m)
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     # The core's two far sides, from the x axis to the y axis, are the ring's first layer.
@@ -167,10 +164,7 @@ def monomials(count: int) -> list[tuple[int, int]]:
 
 
 def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
-    """Return the first `count` modes at points (n, 2) mm, (n,) each: z0_1, z0_x, z0_y, z0_xx ...
-
-    A mode is (1 - r^2) x^a y^b, all lengths over the radius (mm): z0_1 is a paraboloid's height.
-    """
+    """Return `count` modes (1 - r^2) x^a y^b at points (n, 2) mm over the radius: z0_1, z0_x ..."""
     x, y = points[:, 0] / radius, points[:, 1] / radius
     dome = 1.0 - x**2 - y**2
     return {
@@ -276,11 +270,7 @@ ATTEMPTS = 5  # at the size of triangle that gives the count wanted
 
 
 def quarter_disk_by_gmsh(elements: float) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Mesh the quarter by gmsh, unstructured, to see if a result depends on the mesh.
-
-    Triangles, each cut into three quads: worst scaled Jacobian 0.6, where gmsh's recombining of
-    triangles gave 0.3 to 0.5 (4.15, 50 to 200 quads) and two of its algorithms did not end.
-    """
+    """Mesh the quarter by gmsh, unstructured: triangles, each cut into three quads."""
     gmsh = _loaded()
     # A caller's own gmsh session is left as it was.
     started = not gmsh.isInitialized()

@@ -39,10 +39,7 @@ def meshio_of(
     mesh: Mesh, displacement: ArrayLike, point_data: Mapping[str, ArrayLike],
     cell_data: Mapping[str, ArrayLike],
 ) -> meshio.Mesh:  # fmt: skip
-    """Return the mesh displaced by (n, 3) mm, which is also its point data `displacement`.
-
-    point_data, cell_data : (n, ...), (m, ...). ValueError : a field without one row a node.
-    """
+    """Return the mesh displaced by (n, 3) mm with its data; ValueError : not one row a node."""
     import meshio
 
     u = np.asarray(displacement, dtype=float)
@@ -64,10 +61,7 @@ def snapped(points: Array, near: float) -> Array:
 
 
 def with_mirror_image(points: Array, quads: Numbers, axis: int) -> tuple[Array, Numbers, Numbers]:
-    """Return points, quads and their image in the plane where coordinate `axis` is exactly zero.
-
-    The given quads come first; (n',) the given point that each node is or mirrors comes third.
-    """
+    """Return points, quads and their image in the plane x[axis] = 0, and each node's original."""
     off = points[:, axis] != 0
     image = np.arange(len(points))
     image[off] = len(points) + np.arange(np.count_nonzero(off))

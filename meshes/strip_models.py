@@ -150,11 +150,7 @@ def straight_strip(
     width: float = WIDTH, increments: int = INCREMENTS, across: int = QUADS["straight"][0],
     along: int = QUADS["straight"][1]
 ) -> UniaxialModel:  # fmt: skip
-    """Return a warp or fill test: half of the width over the gauge length (Fig. 3.5; 40 quads).
-
-    gauge_length, final_length : mm, of the virtual strain gauge (Table 3.1). width : of the whole
-    strip.
-    """
+    """Return half of a warp or fill test over the gauge (mm; Fig. 3.5, Table 3.1; 40 quads)."""
     if direction not in ("warp", "fill"):
         raise InputError(None, "direction", f"expected 'warp' or 'fill', got {direction!r}")
     mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
@@ -169,10 +165,7 @@ def bias_strip(
     length: float = GRIP_DISTANCE, angle: float = 45.0, increments: int = INCREMENTS,
     across: int = QUADS["bias"][0], along: int = QUADS["bias"][1]
 ) -> UniaxialModel:  # fmt: skip
-    """Return a bias test: the whole strip between the grips (Fig. 3.6; 300 quads).
-
-    length : mm between the grips. angle : degrees from the pull to the warp yarn.
-    """
+    """Return a whole bias test, `length` mm; angle : degrees from pull to warp (Fig. 3.6)."""
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)
     return UniaxialModel(mesh, yarn_direction(angle), thickness, levels, GRIPS)

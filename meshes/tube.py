@@ -25,10 +25,7 @@ NEAR = 1e-9  # in radii
 
 
 def angles(n: int, seam: float) -> Array:
-    """Return angles (4 n + 1,) of the rows of nodes from the bottom (0) to the top (pi).
-
-    Equal but for the lowest quarter, where a row is put on the edge of the seam, at `seam`.
-    """
+    """Return angles (4 n + 1,) from the bottom (0) to the top (pi), even but for one at `seam`."""
     step = math.pi / (4 * n)
     angle = np.linspace(0.0, math.pi, 4 * n + 1)
     if seam:
@@ -41,18 +38,13 @@ def angles(n: int, seam: float) -> Array:
 def of_equal_area(angle: Array, radius: float) -> float:
     """Return how far (mm) from the axis nodes at these angles enclose the area of the circle.
 
-    An inscribed polygon has too little area (2.6 % with 16 sides), too little gas in it, and too
-    little force on a cross-section. Half of the polygon with its corners at r has r^2/2 times the
-    sum of the sines of the angles between them, half of the circle pi/2 radius^2.
+    An inscribed polygon of 16 sides has 2.6 % too little area, gas and force on a cross-section.
     """
     return radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))
 
 
 def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Numbers]:
-    """Return points, quads row by row, and the grid of node numbers (along, around).
-
-    radius : mm, of the nodes, as `of_equal_area` returns it.
-    """
+    """Return points, quads row by row, node numbers (along, around); radius : mm, of the nodes."""
     circle = radius * snapped(np.stack([np.sin(angle), -np.cos(angle)], axis=1), NEAR)
     points = np.concatenate(
         [np.tile(circle, (len(z), 1)), np.repeat(z, len(angle))[:, None]], axis=1
@@ -91,10 +83,7 @@ SAMPLES = 20
 
 @dataclass(frozen=True)
 class Refinement:
-    """Small elements around a place on the axis, and a row of nodes (set `name`) exactly there.
-
-    position : mm from the middle. reach : mm to either side where elements are small. size : mm.
-    """
+    """Elements of `size` mm up to `reach` mm around `position`, and there a row, the set `name`."""
 
     name: str
     position: float
@@ -115,11 +104,7 @@ class Refinement:
 
 
 def rows(end: float, size: float, refinements: Sequence[Refinement] = ()) -> Array:
-    """Return positions (rows,) from 0 to `end`, `size` apart (mm) and closer at the refinements.
-
-    Among them are 0, `end` and every refinement; InputError : one is beyond the end or near
-    another.
-    """
+    """Return positions (mm) from 0 to `end`, closer at refinements; InputError : these too near."""
     places = sorted({0.0, float(end)} | {float(r.position) for r in refinements})
     for r in refinements:
         if r.position > end:

@@ -1,8 +1,4 @@
-"""Readers of measured files.
-
-Each finds the format of a file by its content, unless `format` names it, and raises InputError that
-names the file, the line and the column. They are imported when asked for.
-"""
+"""Readers of measured files, by content or `format`; InputError names file, line and column."""
 
 from __future__ import annotations
 

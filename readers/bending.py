@@ -122,10 +122,7 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """Errors of a model's curve at the readings that it reaches: N, positive where too stiff.
-
-    relative : rms over the largest load read. beyond : readings after the model's last deflection.
-    """
+    """Errors (N, positive: too stiff) of a model's curve; relative : rms over the largest load."""
 
     rms: float
     mean: float

@@ -161,10 +161,7 @@ def read_load_curves(
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
-    """Return the specimens of a series that lists them one after the other without names.
-
-    One starts where the elongation falls below half of the largest before: not for cyclic tests.
-    """
+    """Return specimens listed without names: one starts where the elongation halves."""
     u, starts, reached = curve.elongation, [0], 0.0
     for i, value in enumerate(u):
         if 0 < reached and value < 0.5 * reached:

@@ -1,7 +1,4 @@
-"""Displacement fields of a bubble from image correlation, and surfaces through measured points.
-
-Polynomial surfaces are those of the thesis, section 4.2, Eq. 4.4; spheres those of Eq. A.6.
-"""
+"""Displacement fields of a bubble, and surfaces through points: Eq. 4.4, spheres of Eq. A.6."""
 
 from __future__ import annotations
 
@@ -58,11 +55,7 @@ def read_fields(
     options: FrameOptions | None = None,
     frames: Sequence[int] | None = None,
 ) -> tuple[DisplacementField, ...]:
-    """Read one frame a pressure.
-
-    A first frame in which nothing moves is left out where there is one frame too many in one file.
-    pressures : MPa. options : stands in place of columns to length_scale. frames : numbers from 0.
-    """
+    """Read a frame a pressure (MPa), without a first unmoved one too many in one file."""
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
@@ -269,10 +262,7 @@ def points_of(frame: Frame) -> Array:
 
 
 def fit_sphere(points: Array, path: Path | None = None) -> Sphere:
-    """Fit the sphere with the least sum of squared distances from points (n, 3) in mm.
-
-    Points farther off than four robust standard deviations are left out, until none is.
-    """
+    """Fit a sphere to points (n, 3) mm by least squares of distance, but for those 4 sigma off."""
     if len(points) < LEAST_POINTS:
         raise InputError(path, "", f"expected {LEAST_POINTS} points or more, got {len(points)}")
     spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

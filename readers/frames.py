@@ -1,8 +1,4 @@
-"""Frames of image correlation (DIC): reference places and displacements, and their columns.
-
-The words of headings are those of DaVis, VIC-3D, ARAMIS, MatchID, DICe and pyALDIC-3D exports (the
-readers in `formats` name sources), and of plain tables in English and German.
-"""
+"""Frames of image correlation (DIC): places at rest, displacements; headings as `formats` cite."""
 
 from __future__ import annotations
 
@@ -125,10 +121,7 @@ def read_frames(
 def _moved_from(
     files: Sequence[Path | str], reference: Path, options: FrameOptions, format: str | None
 ) -> tuple[Frame, ...]:
-    """Return frames of which each file holds the places, and one more those at rest.
-
-    Points are paired by their numbers; without, as many rows are the same points.
-    """
+    """Return frames of files of places less those at rest, paired by numbers, else row by row."""
     columns = {key: name for key, name in (options.columns or {}).items() if key in PLACES}
     asked = replace(options, quantities=PLACES, columns=columns, reference=None, coordinates=None)
     rest, *more = read_frames([reference], asked, format)
@@ -299,11 +292,7 @@ class FrameRows:
 
 
 def frame_of(rows: FrameRows, options: FrameOptions, path: Path, format: str) -> Frame:
-    """Return the frame of the rows: reference places and displacements in mm.
-
-    Rows that a flag rejects, with a sigma below zero, or zero throughout are left out and counted.
-    One row of zeros is a point in a frame in which nothing moves.
-    """
+    """Return the frame of the rows in mm, without flagged, negative sigma, or all zero ones."""
     notes = list(rows.notes)
     values = {name: _in_mm(rows, name, options, path) for name in rows.values}
     keep, dropped = _kept(rows, values)

@@ -1,7 +1,6 @@
 """Load over strain of a specimen through all its cycles, and the branches of the history.
 
-A turn of the load counts by its share of the rise or fall before it, so that small cycles beside a
-large one are found; noise, overshoot of the machine's control and the ends of holds are no cycles.
+A turn counts by its share of the rise or fall before it: noise and overshoot are no cycles.
 """
 
 from __future__ import annotations
@@ -46,10 +45,7 @@ SLOW, FEWEST = 0.2, 4
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Load (n,) N and strain (n,), as recorded; time (n,) s and travel (n,) mm, or None.
-
-    travel : of the machine. measured : "extensometer" or "grips", where the strain was measured.
-    """
+    """Load (n,) N, strain (n,); time (s) and machine's travel (mm) or None; where strain was."""
 
     path: Path
     load: Array
@@ -133,10 +129,7 @@ def _strain(found: MachineTable, column: str, unit: str | None) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class Cycle:
-    """Rows of one cycle: loading from `start` to `peak`, unloading from there to `end`.
-
-    number : from 1. unloaded : whether it unloads; a record may end, or a specimen break, before.
-    """
+    """Rows of a cycle, from 1: loading from `start` to `peak`, unloading from there to `end`."""
 
     number: int
     start: int

@@ -61,10 +61,7 @@ def read_machine_table(
 def column_of(
     found: MachineTable, quantity: str, named: Mapping[str, str], needed: Sequence[str] = NEEDED
 ) -> str:
-    """Return the name of the column that holds a quantity; "" where it may be absent and is.
-
-    Times are looked for where named or needed; of several elongations the nearest to the strip.
-    """
+    """Return the column of a quantity, the nearest to the strip; "" where it may be absent."""
     names = [str(name) for name in found.table.cells.columns]
     may_lack = quantity not in (*named, *needed)
     if quantity == "time" and may_lack:
@@ -119,10 +116,7 @@ def source_of(
 def measured(
     found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
 ) -> Array:
-    """Return one column (rows,) in mm or N; its unit is the file's, which must not be another.
-
-    kind : length or load. units : mm or N per unit. asked : the caller's unit, None for none.
-    """
+    """Return a column (rows,) in mm or N; `asked`, the caller's unit, must be the file's."""
     path, at, known = found.table.path, f"line {found.header}, column {column!r}", ", ".join(units)
     if asked is not None and asked not in units:
         raise InputError(None, f"{kind}_unit", f"expected one of {known}, got {asked!r}")
@@ -238,10 +232,7 @@ def channel_values(
 def in_unit(
     readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
 ) -> Array:
-    """Return readings (rows,), converted by `units`; `own` is the unit that the file names.
-
-    Raises InputError: no, an unknown or two units, a scale for what needs none.
-    """
+    """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units."""
     known, said = ", ".join(units), scale_of(own, units) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale

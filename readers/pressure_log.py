@@ -124,10 +124,7 @@ def straightest(h: Array, pressures: Sequence[Array]) -> int:
 
 
 def misfit_of(p: Array, h: Array, rest: float) -> float:
-    """Return the share of the variances that rising functions leave, 1 without variance.
-
-    p : (frames,) MPa, NaN beyond the log. h : (frames,) mm, 0 at rest. rest : MPa, at rest.
-    """
+    """Return the share of variance that rising functions leave, 1 without variance."""
     inside = np.isfinite(p)
     if inside.sum() < max(LEAST_FRAMES, WITHIN * len(h) - 1):
         return 1.0
@@ -168,10 +165,7 @@ def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> A
 def offset_misfits(
     times: Array, heights: Array, log_times: Array, pressures: Array
 ) -> tuple[Array, Array]:
-    """Return offsets (s), rising, closer together about the best; and the misfit at each.
-
-    times, heights : (frames,) s and mm, all known. log_times, pressures : (k,) s, rising, and MPa.
-    """
+    """Return offsets (s), rising, closer together about the best; and the misfit at each."""
     order = np.argsort(times, kind="stable")
     t, h = times[order], heights[order]
     h = np.where(h > _rest_height(h), h, 0.0)
@@ -447,11 +441,7 @@ FEW_NUMBERS = 5
 
 
 def picture_numbers(files: Sequence[Path], own: Sequence[float | None]) -> tuple[Array, list[str]]:
-    """Return numbers (frames,) of the pictures, the first 0, and doubts about them.
-
-    own : those that the files give their frames; else they are the rising ones in the names. Frames
-    without are counted.
-    """
+    """Return numbers (frames,) of the pictures from 0, `own` or in the names; doubts of them."""
     rising = [np.array(own, dtype=float)] if None not in own else []
     if not rising and len(files) == len(own):
         bare = [_PRESSURE.sub("", str(file.with_suffix(""))) for file in files]
@@ -495,11 +485,7 @@ VOLTS, LONGEST = ("V", "mV"), 1000
 
 
 def values_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> Array:
-    """Return the value that `channel.column` names: of a column, or of a line above the numbers.
-
-    Such as `# pressure [kPa] = 35.5` or `Pressure;35,5;kPa`. Of a column that has frames beside it,
-    one value a frame.
-    """
+    """Return what `channel.column` names: a column, or a line above the numbers."""
     name = channel.column or ""
     lines = read_lines(path, "", any_encoding=True)  # with comments: a value may stand in one
     found = _in_column(path, lines, name) or _above(path, lines, name, (*units, *VOLTS))
@@ -537,10 +523,7 @@ def _in_column(path: Path, lines: Lines, name: str) -> tuple[list[float], str, s
 def _constants(
     path: Path, lines: Lines, separator: str | None, name: str, column: int, frame: int | None
 ) -> tuple[list[float], str, str]:
-    """Return the value of a column in each frame by its number, its unit and place.
-
-    lines : begin with the names. frame : column of the number, None in a file of one frame.
-    """
+    """Return a column's value in each frame (`frame`: column of its number), its unit and place."""
     unit, head = split_unit(name)[1], lines[0][0]
     found: dict[float, tuple[float, int]] = {}
     for number, text in lines[1:]:

@@ -1,8 +1,4 @@
-"""Formats of data files: which there are, how a file's is found, and how one is added.
-
-A format is one module of `formats`, or of another distribution (entry point `bubblefit.readers`),
-that says how a file is recognised by its content and how it is read. Nothing else names it.
-"""
+"""Formats of data files: each a module of `formats`, or a plug-in (`bubblefit.readers`)."""
 
 from __future__ import annotations
 
@@ -32,10 +28,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Format:
-    """One format of data files.
-
-    read : see `Content`. recognises : by path and first `HEAD` bytes; None takes all others.
-    """
+    """One format of data files; read : see `Content`; recognises : by path and head; None: all."""
 
     name: str
     content: Content

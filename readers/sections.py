@@ -47,7 +47,6 @@ Pair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
 #: Ends of a range of strain: warp, fill, shear.
 StrainTriple = Annotated[list[Strain], Field(min_length=3, max_length=3)]
 
-
 #: What pydantic calls one of several sorts of values that a key may have.
 ONE_OF = re.compile(r"constrained-\w+$|literal\[")
 
@@ -74,10 +73,7 @@ def dotted(location: Sequence[str | int]) -> str:
 def first_error(
     path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
 ) -> InputError:
-    """Return the first finding; unknown keys first, as they explain missing ones.
-
-    at : dotted key of the table that was checked, "" for the whole file.
-    """
+    """Return the first finding, unknown keys first; at : dotted key of the table, "" the file."""
     errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
     problem = _problem(errors[0], file)
     if len(errors) > 1:
@@ -131,10 +127,7 @@ def model_of(section: type[BaseModel], dotted: str) -> type[BaseModel]:
 
 
 def in_base_units(section: type[BaseModel], said: Mapping[str, Any], scales: Any) -> dict[str, Any]:
-    """Return what a table says with the numbers of marked keys in mm, N and MPa.
-
-    scales : mm and MPa per unit, by the names of `Unit`.
-    """
+    """Return a table with marked numbers in mm, N and MPa; scales : by the names of `Unit`."""
     whole = dict(said)
     for key, value in said.items():
         if (field := section.model_fields.get(key)) is None:

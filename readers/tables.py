@@ -1,7 +1,4 @@
-"""Tables in text files: their cells and lines, what columns are called, and the units they name.
-
-Errors name the file, the column and the line.
-"""
+"""Tables in text files: cells and lines, what columns are called, and the units they name."""
 
 from __future__ import annotations
 
@@ -73,10 +70,7 @@ class TextTable:
         return value
 
     def stamps(self, column: str) -> NDArray[np.float64] | None:
-        """Return times of a wall clock, (rows,) s since the first day's midnight; None of others.
-
-        Of stamps without a date, one half a day earlier than the one before is of the next day.
-        """
+        """Return wall-clock times, (rows,) s since the first midnight; None of others."""
         text = [cell.strip() for cell in self.text(column)]
         if not text or not is_stamp(text[0]):
             return None
@@ -177,10 +171,7 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
 
 
 def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> list[tuple[int, str]]:
-    """Read the lines that are neither blank nor a comment, with their numbers from 1.
-
-    any_encoding : take UTF-16 with its mark, and Latin-1 where UTF-8 does not fit.
-    """
+    """Read the lines, from 1, but blanks and comments; any_encoding : UTF-16 and Latin-1 too."""
     save = "save it as a comma-separated table"
     try:
         content = content_of(path)
@@ -234,7 +225,6 @@ _COMMA = re.compile(r"[+-]?\d*+,\d++([eE][+-]?\d++)?")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}((,\d{3})+|(\.\d{3})+)")
 _BELOW_1000 = re.compile(r"[+-]?\d{1,3}")
 
-
 #: "1 013,5", "1'013.5": no mark of decimals stands before three digits here.
 _BLANKS = re.compile(r"(?<=\d)[ '’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 
@@ -253,10 +243,7 @@ def _is_thousands(cell: str) -> bool:
 
 
 def are_thousands(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether all cells are whole numbers of which some have marks of thousands.
-
-    Beyond doubt with whole numbers above 99 and no mark among them: they would fall below ten.
-    """
+    """Return whether all are whole numbers, some with marks of thousands, some plain above 99."""
     other = "," if decimal == "." else "."
     marked = [cell for cell in cells if other in cell]
     plain = [cell for cell in cells if other not in cell and cell.casefold() not in HOLES]
@@ -533,10 +520,7 @@ def _measured_on_strip(plain: str) -> bool:
 
 
 def distance_to_strip(name: str) -> int:
-    """Return where a column of elongation was measured: 0 on the strip, 2 by the machine, else 1.
-
-    2 is the crosshead or piston for certain, 1 what is not known by the name.
-    """
+    """Return where an elongation was measured: 0 on the strip, 2 by the machine, else 1."""
     if _measured_on_strip(split_unit(name)[0].casefold()):
         return 0
     return 2 if _words(name) & OF_THE_MACHINE else 1

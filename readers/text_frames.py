@@ -1,9 +1,4 @@
-"""The points of a frame from a table in a text file.
-
-Header, row of units, separator and decimal mark are found by the meaning of the names. Whole
-columns are read by pandas; what does not fit it is read cell by cell, so that an error names its
-line.
-"""
+"""Points of a frame from text: columns by pandas, else cell by cell so that errors name lines."""
 
 from __future__ import annotations
 
@@ -57,10 +52,7 @@ TOP, SAMPLE = 300, 500
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Layout of the numbers in a file; separator None for blanks, header the line of the names.
-
-    below : count of rows of means and the like, which are not in the body.
-    """
+    """Layout of a file; separator None: blanks; header: line of names; below: rows left out."""
 
     separator: str | None
     headings: Sequence[Heading]
@@ -376,8 +368,7 @@ def read_text_rows(
 ) -> list[FrameRows]:
     """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
-    names : the format's names of some quantities; the user's come first. status : a column of
-    states, and the values of good rows. upper : see `frames.columns_of`.
+    names : the format's names, after the user's. status : a column of states, its good values.
     """
     own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
     named = {**(names or {}), **own}

@@ -20,11 +20,7 @@ SIZE = 10.0
 
 @dataclass(frozen=True)
 class Bar:
-    """A uniaxial test of Valmex 7318 computed with MSC Marc (Composite Structures, 2017).
-
-    modulus: E of log strain, constant term first, GPa; elongation: engineering strain at the
-    end; stress: Marc's end stress, MPa.
-    """
+    """A bar of Valmex 7318 in Marc (Composite Structures, 2017): E in GPa, end stress in MPa."""
 
     model: str
     direction: str
@@ -69,10 +65,7 @@ def stress_of(model: UniaxialModel, history: History) -> float:
 
 
 def strip_stresses(solver: Solver) -> tuple[float, ...]:
-    """Return the end stresses (MPa) of BARS by a solver's own uniaxial analysis.
-
-    Raises SolverFailure : it does not take a `UniaxialModel`, or a strip does not end well.
-    """
+    """Return the end stresses (MPa) of BARS by a solver's own strips; SolverFailure if none."""
     found = []
     for bar in BARS:
         model = bar_model(bar)

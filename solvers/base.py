@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 EARLY = NoteKind("stopped early", mark=4)
 SNAP = NoteKind("snap", mark=2)
 
-
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
@@ -121,11 +120,7 @@ class History:
         return np.array([self._strained(u, at) for u in self.displacement])
 
     def stress(self, at: Places = "elements") -> Array:
-        """Return Cauchy stress (MPa) along the turned warp and fill, and shear, shaped as `strain`.
-
-        The law is integrated along the increments that the solver kept; a tension field carries no
-        compression.
-        """
+        """Return Cauchy stress (MPa) along turned warp and fill, and shear, shaped as `strain`."""
         mesh, law = self.mesh, self.law
         if law is None:
             raise InputError(None, "law", "is not known here: simulate(...) and fit.history() do")
@@ -242,11 +237,7 @@ class Solver(Protocol):
 
     @property
     def identity(self) -> str:
-        """Return what a result depends on beside model and law: name, version, settings.
-
-        Files (templates, blocks of a site) count by content. A result is resumed only where this is
-        the same.
-        """
+        """Return what results depend on beside model and law; files count by content."""
         ...
 
     def run(
@@ -295,10 +286,7 @@ class DifferentiatingSolver(Solver, Protocol):
         self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
         guess: Array | None = None,
     ) -> tuple[History, Array]:  # fmt: skip
-        """Run; return also d displacement / d parameters, (frames, nodes, 3, len(parameters)).
-
-        parameters : some of `parameters_of`; every entry of the law's beta unless given.
-        """
+        """Run; return d displacement / d parameters too, (frames, nodes, 3, parameters)."""
         ...
 
 
@@ -384,10 +372,7 @@ def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
 
 @dataclass(frozen=True)
 class Announcement:
-    """One line, or a state that begins or is over.
-
-    of : what is in this state, until an announcement of it without words; "" : no state.
-    """
+    """One line, or a state `of` something that lasts until an announcement of it without words."""
 
     words: str
     of: str = ""
@@ -430,9 +415,8 @@ def cell_blocks(
 ) -> list[tuple[str, NDArray[Any]]]:  # fmt: skip
     """Return meshio's blocks of elements of one type, their nodes counted from 0.
 
-    numbers : (n,) of the nodes in the file, increasing. names : by the file's type: meshio's name,
-    and its order of the nodes where it differs. Raises InputError : a type that `names` does not
-    have, a node that is not there.
+    numbers : (n,) of the nodes, increasing. names : meshio's name by type, and its order of nodes.
+    InputError : an unknown type or node.
     """
     cells: list[tuple[str, list[Any]]] = []
     for kind, nodes in elements:
@@ -449,11 +433,7 @@ def cell_blocks(
 
 
 def log_strain(mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None) -> Array:
-    """Return (frames, quads, 4, 3) log strain (eps1, eps2, gamma12) at the quads' Gauss points.
-
-    displacements : (frames, nodes, 3) mm. warp : (3,) direction of the warp; the mesh's, or x,
-    unless given.
-    """
+    """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's."""
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
     warp = mesh.warp if warp is None else warp
     yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))

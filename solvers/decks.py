@@ -33,10 +33,8 @@ def render(
 ) -> str:  # fmt: skip
     """Return the deck that template `name` of `solver` makes of `context`.
 
-    folder : the user's own templates; `name` must be there, and may include or extend ours.
-    instead : files of the user's in place of templates that `name` includes. Raises InputError :
-    the template is missing or unreadable, asks for a variable that does not exist, or has a mistake
-    in its syntax or arithmetic; says in which line.
+    folder : the user's own templates; `name` must be there. instead : files in place of templates
+    that `name` includes. InputError : missing, unreadable, or wrong in which line.
     """
     folders = [TEMPLATES / solver]
     if folder is not None:
@@ -142,11 +140,7 @@ def in_words(name: str, version: str, **settings: object) -> str:
 
 
 def templates_mark(folder: Path | None) -> str:
-    """Return the SHA-256 of the templates in a folder and of the files there that they include.
-
-    Names below the folder and contents count, not the folder's place or its other files (it may be
-    the project's own). "" without a folder; InputError where a template cannot be read.
-    """
+    """Return the SHA-256 of a folder's templates and files they include, names and contents."""
     if folder is None:
         return ""
     waiting = sorted(path.relative_to(folder) for path in folder.rglob("*.j2") if path.is_file())
@@ -176,11 +170,7 @@ def _program_mark(path: Path, *_: int) -> str:
 
 @functools.cache
 def code_mark(module: str) -> str:
-    """Return the SHA-256 of the code that makes decks and reads results.
-
-    That is `FOLDERS`, and of a plug-in every Python file of its package, or its module. module : of
-    the solver's class.
-    """
+    """Return the SHA-256 of `FOLDERS` and of a plug-in's package or `module`."""
     files = {path.relative_to(ROOT).as_posix(): path for name in FOLDERS
              for path in (ROOT / name).rglob("*")}  # fmt: skip
     top = module.partition(".")[0]

@@ -1,14 +1,9 @@
 """Licences of an external program: counted while it runs, requested again where one is denied.
 
-On one machine there are as many files as licences, each locked by a run that holds one. The locks
-are the kernel's: however a process ends, its lock is released. The program inherits the open file
-(not on Windows), so that a licence is not free before the program has ended, too. Users share the
-files, which are empty and never removed.
-
-In a cluster a Dask scheduler leases licences (not Dask's resources of workers, which are each
-worker's own). A lease that is not renewed, because its holder died, is free again after
-`distributed.scheduler.locks.lease-timeout`, 30 s unless the cluster says otherwise: a dead worker's
-program has ended by then.
+On one machine each is a file locked by the run that holds it and by the program, which inherits the
+open file (not on Windows): the kernel releases it however they end. Users share the files, which
+are empty and never removed. In a cluster a Dask scheduler leases licences. A lease that is not
+renewed is free again after `distributed.scheduler.locks.lease-timeout`, 30 s by default.
 """
 
 from __future__ import annotations
@@ -56,11 +51,7 @@ _clients: dict[tuple[str, int], Any] = {}
 
 
 def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
-    """Return the solver with a licence for every run; itself where licences do not matter.
-
-    name : by which its licences are counted. given : options of licences; InputError for an
-    impossible value.
-    """
+    """Return the solver with a licence for every run (itself if none matters); name : of these."""
     plain = {key: value for key, value in given.items() if key != SCHEDULER}
     settings = licence_settings(name, plain)
     if not solver.external or (settings.licences is None and settings.wait <= 0):
@@ -79,10 +70,7 @@ def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
 
 
 class LicensedSolver(WrappedSolver):
-    """A solver that runs only while it has a licence, one for all programs of a run.
-
-    scheduler : address of the Dask scheduler that counts licences too.
-    """
+    """A solver that runs only with a licence; scheduler : the address of Dask that counts too."""
 
     def __init__(
         self, solver: Solver, settings: LicenceSettings, scheduler: str | None = None
@@ -122,13 +110,9 @@ class _Program:
 
 @contextmanager
 def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> Iterator[None]:
-    """Hold a licence of the program `name` from when one is free; none where they are not counted.
+    """Hold a licence of the program `name`, of the machine, then of the cluster: no deadlock.
 
-    First of the machine's, then of the cluster's where a scheduler counts too: in this order
-    everywhere, so that there is no deadlock.
-
-    Raises InputError : nothing can be counted there. BubblefitError : the scheduler does not
-    answer.
+    InputError : nothing can be counted there. BubblefitError : the scheduler does not answer.
     """
     if settings.licences is None:
         yield
@@ -159,13 +143,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
 
 
 def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
-    """Run; where the program was denied a licence, try again until the time for that is over.
-
-    Pauses double up to ten times the first one, each longer or shorter by chance, so that runs that
-    were denied together do not try together again.
-
-    Raises SolverFailure : as `run`; a licence was denied until the time was over (`LicenceDenied`).
-    """
+    """Run; where a licence was denied, try again in time, after longer and random pauses."""
     begun, pause, tries = time.monotonic(), settings.licence_retry, 1
     while True:
         try:
@@ -199,11 +177,7 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
 def locked(
     name: str, count: int, folder: Path | None, waiting: Callable[[], None]
 ) -> Iterator[int]:
-    """Hold one of `count` licences of the program `name`; yield the number of the open file.
-
-    folder : of the files, made where needed; one for the machine unless given. waiting : called now
-    and then while there is none. Raises InputError : the files cannot be made or locked.
-    """
+    """Hold one of `count` licences; yield its open file; call `waiting` while there is none."""
     place = FOLDER if folder is None else folder
     pause = SOON_S
     while True:
@@ -251,10 +225,7 @@ def _any(place: Path, name: str, count: int) -> int | None:
 
 
 def _opened(path: Path) -> int:
-    """Open the file, and make it where it is not there.
-
-    Not both at once: the kernel refuses that for another user's file in a folder of all users.
-    """
+    """Open or make the file, not both at once: the kernel refuses that in a folder of all users."""
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0)
     while True:
         try:
@@ -279,10 +250,7 @@ def _opened(path: Path) -> int:
 def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> Iterator[None]:
     """Hold one of `count` licences of the program `name` in the cluster of a scheduler.
 
-    waiting : called now and then while there is none.
-
-    Raises InputError : another count is in use in this cluster, or Dask is not installed.
-    BubblefitError : the scheduler does not answer.
+    InputError : another count there, or no Dask. BubblefitError : the scheduler does not answer.
     """
     distributed = dask()
     try:
@@ -308,10 +276,7 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
 
 
 def _connection(distributed: Any, address: str) -> tuple[Any, Any]:
-    """Return a connection to the scheduler and its event loop: a worker's, or a client's.
-
-    The client raises OSError where nothing answers.
-    """
+    """Return a connection to the scheduler and its event loop; OSError where nothing answers."""
     with suppress(ValueError):  # this is no worker
         worker = distributed.get_worker()
         return worker.scheduler, worker.loop

@@ -1,10 +1,9 @@
 """Parts that move as prescribed: grips of a strip, supports and collar of a cylinder.
 
-A solver that cannot drive the gauge of a strip, for an equation would put the force at its nodes,
-drives grips. Grips that are the gauge are driven as in the model. Others follow the path on which
-the membrane opens the gauge under the same law (or an even stretch, run once to correct it). The
-solver's own gauge then differs a little, and its results are interpolated to the model's
-elongations. Contact needs faces to meet: supports and collar are solids of prescribed nodes.
+A solver that cannot drive the gauge of a strip drives grips, along the path on which the membrane
+opens the gauge under the same law (or an even stretch, run once to correct it); its results are
+interpolated to the model's elongations. Supports and collar are solids of prescribed nodes, as
+contact needs faces.
 """
 
 from __future__ import annotations
@@ -33,11 +32,7 @@ AS_WANTED = 1e-9
 
 
 def held_dofs(directions: Sequence[int]) -> tuple[int, ...]:
-    """Return a shell's degrees of freedom held where the membrane's directions are (from 0).
-
-    One direction: a plane of symmetry, where the shell does not turn about the other two axes.
-    More: a pinned edge, which may turn.
-    """
+    """Return a shell's held degrees of freedom (from 0): of one direction, a plane of symmetry."""
     turns = {0: (4, 5), 1: (3, 5), 2: (3, 4)}
     return (*directions, *(turns[directions[0]] if len(directions) == 1 else ()))
 
@@ -45,11 +40,9 @@ def held_dofs(directions: Sequence[int]) -> tuple[int, ...]:
 def grip_pulls(
     model: UniaxialModel, law: HypoelasticLaw, opened: Callable[[Array], Array], solver: str
 ) -> tuple[Array, bool]:
-    """Return pulls (increments,) mm of the solver's grips, and whether they are the gauge.
+    """Return pulls (increments,) mm of the grips, and whether they are the gauge; SolverFailure.
 
     opened : runs the strip at given pulls and returns how far its gauge opened, (increments,) mm.
-
-    Raises SolverFailure : that run did not end well, or its gauge gets shorter.
     """
     driven = direct(model)
     if driven is not None:
@@ -85,11 +78,7 @@ def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
 
 
 def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) -> Array:
-    """Return pulls (increments + 1,) at which the gauge of a first run was as it should be.
-
-    They go on beyond its end as steeply as there. pulls, opened : (increments,) mm, of the first
-    run and of its gauge.
-    """
+    """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right."""
     gauge, pull = np.insert(opened, 0, 0.0), np.insert(pulls, 0, 0.0)
     if not (np.diff(gauge) > 0).all():
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
@@ -103,12 +92,9 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
 
 
 def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:
-    """Return `values` (increments of the run, ...) at the model's elongations, by a cubic spline.
+    """Return `values` (increments, ...) at the model's elongations by a cubic spline.
 
-    The increments of the run lie near the model's, so that it bridges next to nothing. opened :
-    (increments of the run,) mm, elongation of the gauge.
-
-    Raises SolverFailure : the gauge does not reach its length, or gets shorter on the way.
+    opened : (increments,) mm of the gauge. SolverFailure : it does not get there, or shrinks.
     """
     levels, gauge = np.array(model.elongations), np.insert(opened, 0, 0.0)
     if len(opened) == len(levels) and (
@@ -136,15 +122,12 @@ def _onward(pulls: Array) -> Array:
 #: mm: length beyond a plane of symmetry, and thickness of a body.
 OVER, THICK = 20.0, 10.0
 
-
 #: Degrees around a support, from the axis of the cylinder, and around a quarter collar from the
 #: top; elements around and across of a support, around and along a collar, and along its fillet:
 #: few where a body is straight, many where it is round (benchmarks/bench_calculix.py collar).
 SUPPORT_ARC, COLLAR_ARC = (165.0, 15.0), (60.0, -9.0)
 
-
 SUPPORT_COUNTS, COLLAR_COUNTS, FILLET_COUNT = (48, 3), (24, 2), 6
-
 
 #: Degrees that the fillet turns, short of a face across the axis.
 FILLET_TURN = 75.0
@@ -164,10 +147,7 @@ class RigidBody:
 
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
-    """Return the upper part of the support at z = span / 2 under a cylinder of `radius` (mm).
-
-    top : mm, height of its crest.
-    """
+    """Return the upper part of the support at z = span / 2, its crest at `top` mm."""
     r = 0.5 * supports.diameter
 
     def place(turn: Array, x: Array, face: int) -> Array:
@@ -181,12 +161,9 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
 
 
 def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
-    """Return the upper part of the collar on the side x, z >= 0, `above` (mm) the cylinder.
+    """Return the upper part of the collar on x, z >= 0, `above` (mm) the cylinder's points (n, 3).
 
-    It goes down that far until one of its faces meets the cylinder. They are flat, chords of the
-    ring, and meet it earlier than the ring would at the same height.
-
-    cylinder : (n, 3) mm, points of the inflated cylinder.
+    It goes down that far until one of its faces, chords of the ring, meets the cylinder.
     """
     body = _ring(collar)
     up = above - way_down(body.faces, cylinder)
@@ -194,10 +171,7 @@ def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
 
 
 def way_down(faces: Array, points: Array) -> float:
-    """Return how far (mm) a ring of flat faces around the z axis goes down to meet a point.
-
-    faces : (n, 4, 3) mm, corners counter-clockwise seen from inside. points : (m, 3) mm, inside.
-    """
+    """Return how far (mm) flat faces (n, 4, 3) around z go down to points (m, 3) inside."""
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     least = np.inf

@@ -101,12 +101,9 @@ def run_process(
 ) -> Outcome:  # fmt: skip
     """Run `command` in `folder` to its end, its output (both streams) going to `log`.
 
-    timeout : s; then the program is killed with all that it has started. environment : added to
-    ours. watch : called about twenty times a second while it runs. Raises InputError : the program
-    cannot be started (not there, no permission, another machine's). Unwanted : see `unless`. An
-    interruption (Ctrl-C, an error in `watch`) kills the program as well. Where this process is
-    killed outright, a shell that waits for it kills the program's process group; on a system
-    without groups or /bin/sh the program runs to its end.
+    timeout : s; then all that it started is killed. environment : added to ours. watch : called
+    about twenty times a second. InputError : it cannot be started. Unwanted : see `unless`. An
+    interruption kills the program as well, and where this process is killed outright, a shell does.
     """
     begun, timed_out = time.monotonic(), False
     kept: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
@@ -168,10 +165,7 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
 
 
 def disk_full(folder: Path, lines: Iterable[str], outcome: Outcome) -> str:
-    """Return the sign that the disk of a run was full, "" without one.
-
-    lines : printed by the program.
-    """
+    """Return the sign, in lines of the program and of the folder, that the disk was full, or ""."""
     if outcome.signal_name == "SIGXFSZ":
         return "a file would be larger than allowed"
     for line in lines:
@@ -208,10 +202,7 @@ def _started_by(number: int) -> set[psutil.Process]:
 
 @contextmanager
 def _watched() -> Iterator[Callable[[int], None]]:
-    """Yield a function that has a process group killed where this process is killed outright.
-
-    A shell waits for the end of a pipe that only this process holds open.
-    """
+    """Yield a function that lets a shell kill a process group once this process is killed."""
     read, held = os.pipe()
     watcher = None
 
@@ -248,10 +239,7 @@ def check(address: str) -> None:
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """Yield a client of the scheduler; InputError where none answers or Dask is not installed.
-
-    Dask logs every lost connection, with tracebacks; meanwhile it is silenced.
-    """
+    """Yield a client of the scheduler, Dask's logs silenced; InputError where none answers."""
     distributed = dask()
     loggers = [logging.getLogger(name) for name in LOGGERS]
     before = [logger.level for logger in loggers]

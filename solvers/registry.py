@@ -58,11 +58,7 @@ class PlugIn(plugins.PlugIn):
     """A solver of another distribution, named in every `SolverFailure` on its account."""
 
     def make(self, **options: Any) -> Solver:
-        """Return a new solver from the factory that the entry point names.
-
-        Raises SolverFailure : it cannot be imported, is no factory, fails, or returns no solver.
-        InputError : an option that the factory does not take or rejects.
-        """
+        """Return a new solver of the factory; SolverFailure: it is none or fails; InputError."""
         factory = self.factory()
         try:
             inspect.signature(factory).bind(**options)
@@ -124,11 +120,9 @@ def solver_sections() -> dict[str, type[SolverSettings]]:
 
 
 def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the options of each solver by name, of ours also without a table.
+    """Return the options of each solver by name, of ours also without a table; InputError.
 
-    path : the project's file; paths in its tables are relative to its folder. tables : [solver] of
-    the project. Of a plug-in's only keys of licences are checked here. Raises InputError : an
-    unknown key or solver, an impossible value.
+    tables : [solver] of the project `path`. Of a plug-in's only keys of licences are checked here.
     """
     found: dict[str, dict[str, Any]] = {}
     for name, section in solver_sections().items():
@@ -165,13 +159,10 @@ def _started(name: str) -> tuple[str, ...]:
 
 
 def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) -> Solver:
-    """Return a new solver made with `options`: ours, else that of a plug-in.
+    """Return a new solver made with `options`: ours, else that of a plug-in; licences apply.
 
-    Options of licences apply to every external solver, which does not see them itself.
-
-    cache : of the runs of other programs; None: everything is run. Raises InputError : there is
-    none of that name (lists them), or an option is wrong. SolverFailure : a plug-in that does not
-    work; names its distribution.
+    cache : None: everything is run. InputError : none of that name, a wrong option. SolverFailure :
+    a plug-in that does not work; names its distribution.
     """
     make: Callable[..., Solver]
     if name in SOLVERS:  # a plug-in cannot take the place of one of ours
@@ -199,11 +190,9 @@ def usable_solver(
     name: str, options: Mapping[str, Any] | None = None, path: Path | None = None,
     key: str = "fit.solver", cache: RunCache | None = None,
 ) -> Solver:  # fmt: skip
-    """Return a new solver that is installed and carries the law; more of them by `solver_named`.
+    """Return a new solver that is installed and carries the law; else SolverFailure, InputError.
 
-    options : as from `solver_settings`. path, key : the project that names it, and where. cache :
-    as of `solver_named`. Raises InputError : there is no such solver, or an option is wrong (says
-    in which file). SolverFailure : it is not installed, or does not carry the law.
+    path, key : the project that names it, and where. cache : as of `solver_named`.
     """
     try:
         solver = solver_named(name, cache, **(options or {}))
@@ -224,11 +213,7 @@ def usable_solver(
 
 
 def checked(name: str, solver: Solver) -> SolverCheck:
-    """Return the solver's `check`.
-
-    Raises SolverFailure : the check of a plug-in fails; names its distribution. InputError : an
-    option that the check rejects.
-    """
+    """Return the solver's `check`; SolverFailure where that of a plug-in fails; InputError."""
     try:
         return solver.check()
     except BubblefitError:
@@ -258,12 +243,10 @@ def command_line() -> list[Override]:
 def overridden(
     name: str, options: Mapping[str, Any], given: Mapping[str, Any], settings: Sequence[str] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """Return the options of the solver `name`, overridden by the command line.
+    """Return the options of the solver `name`, overridden by the command line; InputError.
 
-    options : as from `solver_settings`. given : by the name of an option of `command_line`; None:
-    not given. settings : each "KEY=VALUE", the value as in a project file (text needs no quotes);
-    paths are relative to the current folder. Raises InputError : an option of another solver; an
-    unknown setting.
+    given : by the name of an option of `command_line`. settings : each "KEY=VALUE", the value as in
+    a project file (text needs no quotes); paths are relative to the current folder.
     """
     mine = {option: value for option, value in given.items() if value is not None}
     for option in mine:
@@ -290,10 +273,7 @@ def overridden(
 
 
 def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
-    """Diagnose the embedded solver, then our others, then every plug-in.
-
-    programs : by the option that names a solver's program (`ccx`, `marc`), the one to look at.
-    """
+    """Diagnose the embedded solver, our others (programs : by option), then every plug-in."""
     ours = [make for make in SOLVERS.values() if isinstance(make, Offer)]
     ours.sort(key=lambda offer: offer.program is not None)  # the embedded ones have no program
     found = []

@@ -1,10 +1,7 @@
 """Cached runs of external solvers that ended well, under a digest of what they depend on.
 
-A file a run, named by its key, in folders by the key's first two digits. A file appears whole
-under its name, so that any number of processes and machines may share the folder, also on a network
-file system: there is no lock and no database. It is neither diskcache, whose SQLite writes ahead
-into a file that cannot be shared over a network, nor joblib, which unpickles what it finds
-(tests/solvers/test_run_cache.py).
+A file a run, named by its key; it appears whole under its name, so that processes and machines may
+share the folder, also on a network file system: no lock, no database, nothing unpickled.
 """
 
 from __future__ import annotations
@@ -63,11 +60,7 @@ NOT_WRITTEN = ("seconds", "from_cache", "model", "law")
 
 
 def digest_of(*things: object) -> str:
-    """Return the SHA-256 of this version of bubblefit and of things, by content.
-
-    Numbers, words, None, arrays, and mappings (in any order), sequences and dataclasses of such;
-    TypeError for anything else.
-    """
+    """Return the SHA-256 of this version and of plain things, by content; TypeError for others."""
     digest = hashlib.sha256(__version__.encode())
     for part in _parts(things):
         # Lengths in front: "ab", "c" is not "a", "bc".
@@ -187,10 +180,7 @@ class RunCache:
         return sorted(found, key=lambda entry: (entry.used, entry.path))
 
     def prune(self, size: int | None = None, older: float | None = None) -> list[Entry]:
-        """Drop and return the least recently used runs until `size` bytes are left.
-
-        older : s; drop also what was not used for so long. OutputError : one cannot be removed.
-        """
+        """Drop the least recently used runs to `size` bytes, those `older` (s) too; OutputError."""
         entries, now = self.entries(), time.time()
         left, gone = sum(entry.size for entry in entries), []
         for entry in entries:
@@ -233,10 +223,7 @@ class RunCache:
 
 
 def run_cache(said: bool | str | Path = True) -> RunCache | None:
-    """Return the cache in use; None where the project or the environment turns it off.
-
-    said : by the project: whether there is one, or its folder; the environment overrides it.
-    """
+    """Return the cache in use, None if off; said : by the project, below the environment."""
     named = os.environ.get(VARIABLE, "")
     if said is False or named.lower() == OFF:
         return None
@@ -258,11 +245,7 @@ class Damaged(ValueError):
 
 
 def to_bytes(history: History, key: str, seconds: float) -> bytes:
-    """Return the history with its key and its seconds, behind a checksum of all.
-
-    Raises ValueError, TypeError : a plug-in's own sort of history, objects in place of numbers,
-    numbers that are not finite.
-    """
+    """Return history, key and seconds behind a checksum; ValueError, TypeError: not to be kept."""
     if type(history) is not History:
         raise TypeError(f"{type(history).__name__} is not a History")
     arrays: dict[str, Any] = {}
@@ -288,10 +271,7 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
 
 
 def from_bytes(content: bytes, key: str) -> History:
-    """Return the history that `to_bytes` wrote under this key, every number as it was.
-
-    Damaged : cut off, changed, of another layout, or of another key; says which.
-    """
+    """Return the history that `to_bytes` wrote under this key; Damaged : says which."""
     start = len(TITLE) + hashlib.sha256().digest_size
     if not content.startswith(TITLE):
         raise Damaged("it is not a run that was kept, or of another version")
@@ -335,12 +315,7 @@ def _numbers(value: Any, name: str) -> Any:
 
 
 def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> Solver:
-    """Return the solver with a cache before it, or as it is where that is of no use.
-
-    That is one that runs in this process, one that starts from a guess of its own path (it
-    differentiates), and one that has to keep the folders of its runs. options : those of the
-    solver that change a result.
-    """
+    """Return the solver with a cache before it; as it is if embedded, differentiating or `keep`."""
     embedded = not solver.external or isinstance(solver, DifferentiatingSolver)
     if embedded or getattr(solver, "keep", False):
         return solver
@@ -349,11 +324,7 @@ def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> S
 
 
 class Once(WrappedSolver):
-    """A solver that looks into a cache before it runs.
-
-    A run that fails is not cached: the cause (a licence, memory, a full disk) may be gone the next
-    time, and its folder is kept for inspection.
-    """
+    """A solver that looks into a cache first; runs that fail are not kept, nor their cause."""
 
     def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
         super().__init__(solver)

@@ -1,8 +1,7 @@
 """Scratch folders of external solvers: fresh for every run, in memory where there is room.
 
-A folder of a run under way holds a file that names the machine, its boot and the process, and that
-this process has locked for as long as it lives: so the folders of killed processes are found and
-removed. A folder without that file is a run that is kept for inspection.
+One under way holds a file locked by its process, whose number it names: the folders of killed
+processes are found and removed. A folder without that file is kept for inspection.
 """
 
 from __future__ import annotations
@@ -61,9 +60,7 @@ def run_folder(
 ) -> Iterator[Path]:
     """Make the folder of one run: removed after a good end unless `keep`, kept after a failure.
 
-    logs : name of the log in the folder whose tail a failure carries, where it has none yet.
-
-    Raises SolverFailure : that of the run, with the folder and the log. OutputError : no folder.
+    logs : whose tail a failure carries. SolverFailure : that of the run. OutputError : no folder.
     """
     with _undisturbed():
         folder = fresh_folder(name, parent)
@@ -148,10 +145,7 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Delay interruptions, which reach only the main thread, to the end of the block.
-
-    A mask of signals would not do: another thread of the process then takes them.
-    """
+    """Delay interruptions of the main thread; a mask would give them to another thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -202,10 +196,7 @@ def clear(folder: Path) -> None:
 
 
 def sweep(places: Iterable[Path]) -> list[Path]:
-    """Remove and return the folders that dead processes have left in these places.
-
-    Never that of a living process, of another user, or of another machine, nor one that is kept.
-    """
+    """Remove and return the folders that dead processes of this user and machine left there."""
     gone = []
     for place in dict.fromkeys(places):
         with suppress(OSError):

@@ -29,11 +29,9 @@ SCHEDULER = "licence_scheduler"
 
 @dataclass(frozen=True)
 class Override:
-    """An option of the command line for one of a solver's settings.
+    """An option of the command line for a setting, its `name` and help; solvers share one.
 
-    name : of the setting, and of the option without its dashes. what : for the help; solvers that
-    share an option share this. values : possible ones. metavar : in the help. path : whether it is
-    a file or folder. look : of an option that names the solver's program: its help in `doctor`.
+    values : possible ones. path : a file or folder. look : its help in `doctor`, of a program.
     """
 
     name: str
@@ -47,10 +45,8 @@ class Override:
 class SolverSettings(Section):
     """A table [solver.NAME] of a project file.
 
-    paths : keys of files or folders beside the project file. programs : likewise, but a bare name
-    is a program on the PATH. started : keys that name a program to run, and how: see
-    `check_programs`. overrides : options of the command line. uncounted : keys that change no
-    result, nor do places of files, which count by content.
+    paths : keys of files or folders beside the project. programs : likewise, or on the PATH.
+    started : keys that name a program to run. uncounted : keys that change no result, as paths.
     """
 
     paths: ClassVar[tuple[str, ...]] = ()
@@ -79,14 +75,10 @@ class SolverSettings(Section):
 def check_programs(
     path: Path, solver: str, table: Mapping[str, Any], started: Iterable[str], advice: str = ""
 ) -> None:
-    """Check that a project names programs to run only where its user permits that.
+    """Check that a project names programs only where its user permits that; InputError.
 
-    A bare name of a solver's own program (ccx_2.20, run_marc2023) is always permitted: it is looked
-    up on the user's PATH.
-
-    path : of the project. table : [solver.NAME] as it is written. started : its keys that name
-    programs. advice : what else the user may do. Raises InputError : such a key is there, and the
-    file is in none of the folders of `PROGRAMS_FROM`.
+    A bare name of a solver's own program (ccx_2.20, run_marc2023) is looked up on the user's PATH.
+    table : [solver.NAME]. started : its keys of programs. advice : what else the user may do.
     """
 
     def known(value: Any) -> bool:
@@ -108,12 +100,9 @@ def check_programs(
 class LicenceSettings(Section):
     """Number of simultaneous runs, and what is done where one gets no licence.
 
-    licences : simultaneous runs of all processes and users that lock the same files; not counted
-    unless given. licence_folder : of these files, one for the machine unless given. licence_wait :
-    s of further tries after a licence was denied; 600 where they are counted, else 0.
-    licence_retry : s until the first further try; later pauses are longer, each a little by chance.
-    licence_denied : words in the program's log that mean a denied licence, beside those that the
-    solver itself knows.
+    licences : of all that lock the files in licence_folder (one for the machine unless given).
+    licence_wait : s of further tries; 600 where counted, else 0. licence_retry : s until the first;
+    later pauses are longer. licence_denied : words in the program's log, beside known ones.
     """
 
     licences: Annotated[int, Field(ge=1, le=100_000)] | None = None
@@ -147,10 +136,7 @@ def split(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
 def licence_settings(
     name: str, given: Mapping[str, Any], path: Path | None = None
 ) -> LicenceSettings:
-    """Return the checked settings of the solver `name`; InputError for an impossible value.
-
-    path : of the project; the folder of licences is relative to its folder.
-    """
+    """Return checked settings of solver `name`, folders beside the project `path`; InputError."""
     plain = {key: str(v) if isinstance(v, Path) else v for key, v in given.items()}
     try:
         settings = LicenceSettings.model_validate(plain)
@@ -167,9 +153,7 @@ def licence_settings(
 class Offer:
     """A solver by name, made when it is called with its options.
 
-    name : in project files and of --solver. package : its folder, as a package, whose module
-    `solver` has the class and `diagnose(named)`, a list of `Diagnosis` (`named`: a program to look
-    at, or None). solver : name of the class. settings : schema of its table in a project.
+    package : whose module `solver` has the class, and `diagnose(named)`, a list of `Diagnosis`.
     """
 
     name: str

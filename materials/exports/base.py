@@ -31,7 +31,6 @@ from ..responses import (
 LOSES = NoteKind("loses")
 CONFIRM = NoteKind("to confirm")
 
-
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
 #: Strains a modulus at which a card is looked at.

@@ -1,10 +1,9 @@
 """Export total curves to explicit programs: Abaqus *FABRIC, LS-DYNA *MAT_FABRIC, Radioss LAW58.
 
 Of LAW58 (FABR_A) yarns obey sigma = E eps - B eps^2/2, and the angle a between them tau = G0 tan(a)
-up to the locking angle, from there on with GT / (1 + tan^2). Columns as in OpenRadioss' reader (cfg
-radioss2017, matl58_fabr_a; starter hm_read_mat58). Left to itself the reader takes crimps S of 0.1,
-by which a yarn is 16 % softer at 5 % of strain than its modulus says; they are written small enough
-not to count.
+up to the locking angle, from there on with GT / (1 + tan^2). Columns as in OpenRadioss' reader
+(matl58_fabr_a, hm_read_mat58), whose own crimps S of 0.1 make a yarn 16 % softer at 5 % of strain:
+they are written small enough not to count.
 """
 
 import math

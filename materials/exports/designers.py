@@ -1,7 +1,6 @@
-"""Export linear constants per width, for programs that designers of membranes type them into.
+"""Export linear constants per width: Oasys GSA (its theory, "Fabric Material"), Dlubal RFEM.
 
-Oasys GSA takes stiffnesses per width (its reference on theory, "Fabric Material"); Dlubal RFEM
-force over area and a thickness: the stiffness per width over that thickness (Dlubal, FAQ 004396).
+RFEM takes force over area: the stiffness per width over a thickness (Dlubal, FAQ 004396).
 """
 
 from collections.abc import Sequence
@@ -155,7 +154,6 @@ WHICH_NU = (
     "which of both Poisson's ratios the program means: pull a strip along the warp and compare its "
     "width"
 )
-
 
 #: What it is, of warp and fill, and its unit.
 Row = tuple[str, Sequence[float | None], str]

@@ -1,8 +1,6 @@
 """Plain tables with a row of names: frames (a row a point), load polynomials (a row a direction).
 
-Of frames, separator, decimal mark, rows of names and of units are found (`text_frames`). Load
-polynomials have the columns direction, gauge_length_mm, final_length_mm, c1, c2 ... and perhaps c0,
-data_scatter_N.
+Load polynomials: direction, gauge_length_mm, final_length_mm, c1, c2 ..., c0, data_scatter_N.
 """
 
 from __future__ import annotations

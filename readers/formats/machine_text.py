@@ -1,10 +1,9 @@
 """A test machine's export as text: header row, unit row, separator and decimal mark are found.
 
-The layouts that MTS TestSuite and TestWorks, Instron Bluehill and ZwickRoell testXpert write:
-some lines about the test and the specimen, one row of names, mostly one row of units, numbers;
-separated by commas, semicolons or tabs; the decimal mark a point or a comma. A table of results may
-stand above the readings, and the readings of several specimens one block after the other, each with
-its names: of several tables the one with most rows is read, and all blocks with the same names.
+As MTS TestSuite and TestWorks, Instron Bluehill and ZwickRoell testXpert write it: lines about the
+test, a row of names, mostly one of units, numbers. A table of results may stand above the readings,
+and specimens one block after the other: of several tables the one with most rows is read, and all
+blocks with the same names.
 """
 
 from __future__ import annotations
@@ -212,12 +211,7 @@ def nothing_found(
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
-    """Read the first table with a column of each of the quantities asked for.
-
-    Raises InputError: no such table, nothing below it, two units for one column (also where its
-    names come again), rows longer than the header, a decimal mark that may be a mark
-    of thousands.
-    """
+    """Read the first table with all quantities asked for; InputError: none, or in doubt."""
     named, quantities = options.columns, options.quantities
     lines = read_lines(path, options.comment, any_encoding=True)
     found: list[tuple[int, Rows, int, str]] = []
@@ -289,10 +283,7 @@ def table_of(
 
 
 def _without_holes(rows: Rows, names: list[str], options: TableOptions) -> tuple[Rows, list[int]]:
-    """Return the rows without those in which a reading is marked as lost, and the lines of these.
-
-    All rows are kept where more than half are such, and empty cells, which may be mistakes.
-    """
+    """Return rows without those of lost readings, and the lines of these; all if most are."""
     needed: list[int] = []
     for quantity in options.quantities:
         which = columns_of(names, quantity, options.columns)
@@ -316,10 +307,7 @@ def _stacked(
     above: Sequence[str],
     options: TableOptions,
 ) -> tuple[list[str], Rows, tuple[str, ...]]:
-    """Return names, rows and a note of specimens side by side as of one below the other.
-
-    Names and rows are as given where there is one. above : the row above, perhaps of their titles.
-    """
+    """Return names, rows, note of specimens side by side as if below each other; above : titles."""
     loads = columns_of(names, "load", options.columns)
     apart = {b - a for a, b in pairwise(loads)}
     if "elongation" not in options.quantities or len(apart) != 1:

@@ -1,8 +1,6 @@
 """Workbooks (.xlsx, .xlsm): the sheet with a table of the quantities asked for, as values.
 
-A workbook is an untrusted archive: nothing in it is run. Of a formula the value is read that was
-stored with it; macros, links and pictures are not looked at. Its size is limited before and after
-unpacking.
+Untrusted: size is limited, formulas give their stored value, macros, links, pictures nothing.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
 """The inflated and bent cylinder in CalculiX: solids, decks, gas, results.
 
-Mesh: one layer of solids, and on the seam another, twice as thick, outside. The seam's layers all
-lie outside because the gas must meet a surface without steps: on the faces of a step inside,
-unloaded, the pressure would be out of balance by enough to bend the cylinder. Shells will not do:
-where they meet at an angle, at the edge of a cap, CalculiX ties rotations together, and Newton's
-method stalls as soon as contact comes in.
+Mesh: one layer of solids, on the seam another outside, twice as thick: a step inside, unloaded by
+gas, would bend the cylinder. Where shells meet at an angle CalculiX ties rotations together, and
+Newton's method stalls with contact.
 
-Bending: total time of the step is the collar's way in mm (`REST` later), in increments as contact
-allows. CalculiX knows no gas: `analyse` runs the deck again with better pressures over the way.
+Bending: total time of the step is the collar's way in mm (`REST` later). CalculiX knows no gas:
+`analyse` runs the deck again with better pressures over the way.
 """
 
 from __future__ import annotations
@@ -38,7 +36,6 @@ from .sheets import NEAR, whole_times
 
 #: Kinds of notes that are made here.
 GAS = NoteKind("gas")
-
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -76,13 +73,11 @@ PASSES, SETTLED = 4, 3e-4
 
 @dataclass(frozen=True, eq=False)
 class SolidMesh:
-    """Solids of eight nodes, inner face first, numbered from 0.
+    """Solids of eight nodes, inner face first, numbered from 0; points (n, 3) mm.
 
-    points (n, 3) mm; elements (m, 8), quad by quad the layer that the gas touches, then the seam's;
-    inner, outer: (nodes of the surface mesh,) the two nodes of that layer that stand for each of
-    its nodes, their mean being where it is; element sets `tube` and `caps` (by material), `inside`
-    (their inner faces hold the gas) and `outside` (quad by quad, their outer faces are the
-    cylinder's); node sets as the surface mesh has them, through all layers.
+    elements (m, 8), quad by quad the inner layer, then the seam's; inner, outer: the two nodes of
+    that layer whose mean stands for each node of the surface; element sets `tube`, `caps`, `inside`
+    (its inner faces hold the gas), `outside` (its outer faces are the cylinder's).
     """
 
     points: Array
@@ -98,10 +93,7 @@ class SolidMesh:
 
 
 def solid_mesh(model: CylinderModel) -> SolidMesh:
-    """Return the solids on both sides of the model's middle surface.
-
-    InputError: the rest is not of one thickness, or the seam not three times as thick.
-    """
+    """Return the solids about the middle surface; InputError: a seam not three times as thick."""
     mesh = model.mesh
     count, quads = len(mesh.points), np.asarray(mesh.quads)
     numbers = np.arange(len(quads))
@@ -151,10 +143,7 @@ def cylinder_decks(
     model: CylinderModel, law: HypoelasticLaw, solids: SolidMesh,
     bending: Mapping[str, Any] | None = None, folder: Path | None = None,
 ) -> dict[str, str]:  # fmt: skip
-    """Return the text of each input file by name; InputError: a template that cannot be used.
-
-    bending : of `bending_context`; inflation alone unless given. folder : the user's templates.
-    """
+    """Return the text of each file; bending : of `bending_context`; InputError: of a template."""
     mesh: dict[str, Any] = {
         "element": ELEMENT, "points": solids.points.tolist(),
         "elements": (solids.elements + 1).tolist(), "element_sets": _named(solids.element_sets),
@@ -226,11 +215,9 @@ def gas_pressure(gas: ClosedGas, volumes: Array) -> Array:
 
 
 def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) -> Array:
-    """Return gauge pressures (n,) MPa for the next pass, from the volumes at the `given` ones.
+    """Return pressures (n,) MPa for the next pass, by Newton's method on gas(V(p)) = p.
 
-    One step of Newton's method on gas(V(p)) = p, the cylinder at any deflection as compliant as
-    the inflated one (`slope`, dV/dp in mm^3/MPa). With the gas' own pressure instead the error
-    falls to a quarter in each pass only.
+    slope : dV/dp in mm^3/MPa of the inflated cylinder, taken at any deflection.
     """
     stiffness = np.array([gas.stiffness(float(v)) for v in volumes])
     return np.asarray(given + (gas_pressure(gas, volumes) - given) / (1.0 + stiffness * slope))
@@ -239,11 +226,7 @@ def better_pressure(gas: ClosedGas, volumes: Array, given: Array, slope: float) 
 def bending_context(
     model: CylinderModel, solids: SolidMesh, inflated: Array, gas: GasCurve | None = None
 ) -> dict[str, Any]:
-    """Return what the template is given for step 2.
-
-    inflated : (nodes of the solids, 3) mm of displacement of the inflated cylinder. gas : pressure
-    over deflection; that of inflation unless given. InputError: a whole cylinder.
-    """
+    """Return what the template is given for step 2; InputError: a whole cylinder."""
     if model.copies != 4:
         raise InputError(None, "symmetry", "CalculiX bends a quarter; mesh it as 'quarter'")
     radius = float(np.abs(model.mesh.points[:, 1]).max())
@@ -311,10 +294,7 @@ def volumes(model: CylinderModel, displacements: Array) -> Array:
 def inflation_history(
     path: Path, model: CylinderModel, solids: SolidMesh, iterations: int
 ) -> History:
-    """Return the middle surface and the whole volume at every pressure; `load` is the pressure.
-
-    SolverFailure: the file is not there, damaged, or does not hold every increment.
-    """
+    """Return the middle surface and whole volume at every pressure; else SolverFailure."""
     displacement, _ = whole_times(path, len(model.inflation), len(solids.points))
     middle = np.ascontiguousarray(solids.middle(displacement))
     pressure = np.array(model.inflation)
@@ -327,12 +307,9 @@ def inflation_history(
 
 @dataclass(frozen=True, eq=False)
 class BentCylinder:
-    """The inflated state, then every increment of bending that converged.
+    """The inflated state, then every converged increment of bending; forces on the whole, N.
 
-    deflection (n,) mm that the collar has gone down since it met the inflated cylinder;
-    displacement (n, nodes, 3) mm of the middle surface; forces of the cylinder's contacts on
-    the whole (n, 3) N, `supports` and `collar`; volume (n,) mm^3 of the whole; iterations of the
-    run; whether it stopped early, and why.
+    deflection : (n,) mm of the collar since it met the inflated cylinder. volume : mm^3, the whole.
     """
 
     deflection: Array
@@ -348,11 +325,9 @@ def bent_cylinder(
     path: Path, model: CylinderModel, solids: SolidMesh, iterations: int,
     converged: Collection[tuple[int, int]] | None = None, why: str = "",
 ) -> BentCylinder:  # fmt: skip
-    """Read what the result file of a deck with both steps holds of bending.
+    """Read what a result file holds of bending; SolverFailure: nothing, or not to its end.
 
-    converged : steps and increments that converged, of a run that stopped early, and `why`; None:
-    it ended well. SolverFailure: the file is not there or damaged, or holds nothing of bending; or
-    the run ended and the last deflection is missing.
+    converged : steps and increments of a run that stopped early, and `why`; None: it ended well.
     """
     ended, inflated = converged is None, float(len(model.inflation))
     count = len(solids.points)
@@ -393,10 +368,7 @@ def bent_cylinder(
 
 
 def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> History:
-    """Return inflated state and reported deflections, interpolated by cubics; `load` in N.
-
-    gas : the pressure that the deck had. SolverFailure: it stopped before the first deflection.
-    """
+    """Return inflated state and reported deflections; SolverFailure: it stopped before them."""
     reached = float(bent.deflection[-1])
     wanted = np.array([0.0, *model.deflections])
     wanted = np.minimum(wanted[wanted <= reached * (1 + NEAR)], reached)
@@ -419,22 +391,16 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
 
 
 def _between(x: Array, values: Array, wanted: Array) -> Array:
-    """Interpolate values (n, ...) at x (n,), n > 1, at the `wanted` places.
-
-    Cubics with slopes from neighbours only: linear in the values, so that forces in balance stay
-    so, and what happens at one increment (a wrinkle) spreads no further than the next.
-    """
+    """Interpolate (n, ...) by cubics with slopes from neighbours: forces in balance stay so."""
     slopes = np.gradient(values, x, axis=0)
     return np.asarray(CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
-    """Inflate and bend a cylinder with a constant mass of gas.
+    """Inflate and bend a cylinder with a constant mass of gas, by passes at better pressures.
 
-    The deck has the gas' pressure over the collar's way, and the volumes found give that for the
-    next pass. The history's is the one the deck had; a remark says how far it is from the gas'. A
-    run that stops early is reported up to there. SolverFailure: inflation did not end well, or
-    bending not even its first reported deflection.
+    The history has the deck's pressure; a remark says how far that is from the gas'. A run that
+    stops early is reported up to there. SolverFailure: not to the first deflection.
     """
     if model.cords:
         problem = "cords are for the solver membrane: CalculiX's deck has no tension-only members"

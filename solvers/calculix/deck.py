@@ -1,7 +1,6 @@
 """Write what the decks of all models share: shells, material, control of Newton's method.
 
-CalculiX counts displacements from the nodes of the deck, which are where the sheet is without
-stress; the model counts them from its reference surface. The two differ by the sheet's slack.
+CalculiX counts displacements from the sheet without stress, the model from its reference.
 """
 
 from __future__ import annotations
@@ -25,17 +24,13 @@ from .library import MATERIAL, STATE_VARIABLES
 #: Kinds of notes that are made here.
 TILT = NoteKind("tilted sheet")
 
-
 Element = Literal["S4", "S8R"]
 ELEMENTS: tuple[Element, ...] = ("S8R", "S4")
 
 
 @dataclass(frozen=True, eq=False)
 class ShellMesh:
-    """Nodes (n, 3) mm, elements (m, 4 or 8) and sets, numbered from 0; corners come first.
-
-    `corners` : how many nodes are the mesh's own; the others are midsides.
-    """
+    """Nodes (n, 3) mm, elements (m, 4 or 8) and sets, from 0; the mesh's own `corners` first."""
 
     points: NDArray[np.float64]
     elements: NDArray[np.intp]
@@ -44,11 +39,7 @@ class ShellMesh:
 
 
 def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
-    """Return the mesh as S4, or as S8R with a midside node on every edge.
-
-    A midside between two rim nodes is moved out onto the rim's circle or ellipse; a midside whose
-    two ends are in a set is in the set when the edge bounds the mesh. InputError: another element.
-    """
+    """Return the mesh as S4, or as S8R with midside nodes, those of the rim moved onto it."""
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
     if element == "S4":
         return ShellMesh(points, quads, mesh.node_sets, len(points))
@@ -84,11 +75,9 @@ def deck_files(
     deck: str, name: str, shells: ShellMesh, element: str, tolerances: tuple[float, float],
     context: Mapping[str, Any], folder: Path | None = None,
 ) -> dict[str, str]:  # fmt: skip
-    """Return the text of `job.inp`, of template `deck`, and of the mesh.
+    """Return the text of `job.inp` of template `deck`, and of the mesh; InputError: of these.
 
-    name : of the test, for its title. tolerances : largest residual force over the mean force, and
-    largest correction over the largest change, of a converged increment. context : what only this
-    deck's template is given. folder : the user's templates; InputError: one that cannot be used.
+    tolerances : largest residual force over the mean, and correction over the largest change.
     """
     mesh = {
         "element": element,
@@ -139,10 +128,7 @@ class Run(Protocol):
     def __call__(
         self, files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None
     ) -> T:
-        """Return what `read` makes of the results, or `rescue` of those of a bad end.
-
-        files : text of each input file by name. SolverFailure: it did not end well.
-        """
+        """Return what `read` makes of the results, or `rescue` of a bad end; else SolverFailure."""
 
 
 @dataclass(frozen=True)
@@ -211,13 +197,11 @@ def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
 
 
 def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
-    """Return node and direction (from 1) of the rim's unknowns, and their paths; none if it stays.
+    """Return node and direction (from 1) of the rim's unknowns, and their paths (time, mm).
 
-    A path is a list of (total time, displacement in mm from the node without stress). A step is 1
-    long, and its first increment (`FIRST_OF_STEP`) has to leave the rim where it is: where a
-    prescribed displacement changes in it, CalculiX begins with a linear iteration, from which a
-    membrane under pressure does not recover. SolverFailure: the mesh has lines of symmetry; a rim
-    that is moved where shells must not turn crashes CalculiX 2.20.
+    The first increment of a step (`FIRST_OF_STEP`) leaves the rim: CalculiX begins with a linear
+    iteration, from which a membrane under pressure does not recover. SolverFailure: lines of
+    symmetry; a rim moved where shells must not turn crashes CalculiX 2.20.
     """
     if model.rim_motion is None and not any(model.slack):
         return []
@@ -254,11 +238,7 @@ def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Arra
 
 
 def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:
-    """Return a note where the tilt of the sheet lowers its stiffness by more than 2 %.
-
-    Warp and fill are x and y of the deck, not laid onto every shell: where a shell stands at a
-    slope s, its stiffness along the slope is lower by 2 s^2.
-    """
+    """Return a note where a slope s of the sheet, by 2 s^2, costs it over 2 % of its stiffness."""
     corner = shells.points[shells.elements[:, :4]]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     slope = float((np.hypot(normal[:, 0], normal[:, 1]) / np.abs(normal[:, 2])).max())

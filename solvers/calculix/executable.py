@@ -32,10 +32,7 @@ SECONDS = 30.0
 
 @dataclass(frozen=True)
 class Executable:
-    """A ccx: path, version ("?" when it does not tell), how it was found.
-
-    external: it can load material libraries; None when that cannot be seen (a wrapper script).
-    """
+    """A ccx; version "?": does not tell; external: loads libraries, None: not to be seen."""
 
     path: Path
     version: str
@@ -46,9 +43,8 @@ class Executable:
 def find_ccx(named: Path | str | None = None) -> Executable:
     """Return `named`, else BUBBLEFIT_CCX, else the one `make calculix` built, else one on the PATH.
 
-    Of those on the PATH, the first one that can load material libraries. What somebody named is
-    taken or refused, never passed over. InputError: it is not there or is no program.
-    SolverFailure: there is none, or it cannot load material libraries.
+    What somebody named is taken or refused. InputError: it is no program. SolverFailure: there is
+    none, or none that can load material libraries.
     """
     without = None
     for candidate in every_ccx(named):
@@ -159,10 +155,7 @@ class Increment:
 
 
 def increments(sta: Path) -> list[Increment]:
-    """Read the increments that converged so far; half a line at the end is left for the next look.
-
-    Attempts that were given up are marked with a U in the file and left out here.
-    """
+    """Read the increments that converged so far, without attempts given up or half a line."""
     try:
         text = sta.read_text(encoding="ascii", errors="replace")
     except OSError:
@@ -209,11 +202,7 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
 
 
 def collapsed(folder: Path, job: str, outcome: Outcome) -> bool:
-    """Return whether CalculiX itself gave up, its increment as small as it may be.
-
-    What converged until then is a result that ends early. After any other bad end (killed, out of
-    time, disk full, an element inside out, an error) there is none.
-    """
+    """Return whether CalculiX gave up: what converged is a result, unlike at other bad ends."""
     text = log_tail(folder / f"{job}.log", 400)
     if outcome.timed_out or outcome.signal_name or disk_full(folder, text.splitlines(), outcome):
         return False

@@ -1,10 +1,8 @@
 """CalculiX result files (.frd), text and binary, read frame by frame and to the last byte.
 
-Records are told by their first columns (cgx manual, "Result Format"): 1C, 1U, 1P headers, 2C
-nodes, 3C elements, 100C one result of one increment, 9999 the end. Data lines of the text form
-have fixed columns without separators; the binary forms (flag 2: float32, flag 3: float64) have
-fixed records. Either way a block's size follows from its header, and a file that does not hold
-what its headers announce, or stops before 9999, is refused: a killed analysis leaves such a file.
+Records (cgx manual, "Result Format"): 1C, 1U, 1P headers, 2C nodes, 3C elements, 100C one result of
+one increment, 9999 the end; text in fixed columns, or binary (flag 2: float32, 3: float64). A file
+that does not hold what its headers announce, or stops before 9999, is refused.
 """
 
 from __future__ import annotations
@@ -48,10 +46,7 @@ class FrdMesh:
 
 @dataclass(eq=False)
 class FrdFrame:
-    """An increment: total time, step and increment, and fields by name (nodes of the mesh, c).
-
-    NaN where a field has no value at a node.
-    """
+    """An increment: total time, step, increment, fields by name (nodes, c), NaN: no value."""
 
     time: float
     step: int
@@ -60,10 +55,7 @@ class FrdFrame:
 
 
 class FrdFile:
-    """A result file, checked as it is read: `mesh`, then `frames()` one by one.
-
-    InputError: no such file, not a result file, truncated or corrupt (which byte).
-    """
+    """A result file, `mesh`, then `frames()`; InputError: none, or corrupt (which byte)."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -76,11 +68,7 @@ class FrdFile:
         self._first = self._at
 
     def frames(self, ended: bool = True) -> Iterator[FrdFrame]:
-        """Yield every increment, in the file's order; steps may be missing or repeated.
-
-        ended : the analysis ended, and the file with its mark. If it did not, the file may stop
-        after any whole result, and the increment that this one belongs to is the last.
-        """
+        """Yield every increment in order; `ended`: with its mark; if not, all whole results."""
         self._at, self._held = self._first, 0
         frame: FrdFrame | None = None
         step = increment = 0
@@ -238,11 +226,7 @@ class FrdFile:
 
 
 def read(filename: Path | str) -> meshio.Mesh:
-    """Return mesh and last increment for `meshio.read("job.frd")`; NaN where a node has no value.
-
-    `field_data` holds time, step and increment. InputError: truncated or corrupt. (meshio itself
-    would end the program on a ReadError.)
-    """
+    """Return mesh and last increment for `meshio.read("job.frd")`; InputError: not whole."""
     from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
 
     file = FrdFile(filename)

@@ -1,8 +1,6 @@
 """The law as a material library: `law.c`, compiled on first use and kept by content.
 
-A file carries a law's moduli into it, whatever their number. A deck cannot: CalculiX copies the
-constants of a material into a field of 21 numbers (2.20; 2.21 makes it as long as it must be) and
-writes on beyond its end without a word.
+A file carries its moduli: CalculiX 2.20 has room for 21 constants, and writes on beyond them.
 """
 
 from __future__ import annotations
@@ -34,10 +32,9 @@ def law_number(law: HypoelasticLaw) -> int:
 
 
 def law_text(law: HypoelasticLaw) -> str:
-    """Return the file: title and number; how many pieces E1, E2 and G12 have; a line a piece.
+    """Return the file: title and number; counts of pieces of E1, E2, G12; a line a piece.
 
-    A piece is the strain up to which it holds and four coefficients (MPa, highest power of the
-    strain first), those of E1 before those of E2 and of G12.
+    A piece is the strain up to which it holds and four coefficients (MPa, highest power first).
     """
     return f"{TITLE} {law_number(law)}\n{_numbers(law)}"
 
@@ -73,19 +70,14 @@ def constants(
     law: HypoelasticLaw, normal_modulus: float | None = None, transverse_shear: float | None = None,
     angle: float = 0.0, normal_axis: int = 3, whole_times: bool = False, whole_until: int = 0,
 ) -> tuple[float, ...]:  # fmt: skip
-    """Return the constants (9,) of `*USER MATERIAL`, as `law.c` has them.
+    """Return the constants (9,) of `*USER MATERIAL`, in the order of `law.c`.
 
-    nu12, area power, normal modulus (MPa), transverse shear modulus (MPa), angle (degrees), normal
-    axis, whole times; number of the law in `law_files`, pieces of its moduli. No multiple of 8, of
-    which CalculiX reads one more line, and never above 21, of which it writes beyond a field.
-
-    normal_modulus, transverse_shear : MPa; the larger of E1 and E2, and G12, at no strain unless
-    given. angle : from the first in-plane axis to the warp, degrees, turning about the normal.
-    normal_axis : 3 without `*ORIENTATION` (warp from global x, fill from y) or with a rectangular
-    one (from its axis 1, axis 2); 1 with a cylindrical one: the normal is radial, and warp is axial
-    and fill hoop at angle 0. whole_times : commit strain and stress only where the total time is a
-    whole number, so that the law's increments are the deck's steps of length 1, whatever increments
-    they took. whole_until : instead: so up to this total time, and then at every increment.
+    No multiple of 8, of which CalculiX reads one more line, and never above 21. normal_modulus,
+    transverse_shear : MPa; the larger of E1 and E2, and G12, at no strain unless given. angle :
+    degrees from the first in-plane axis to the warp. normal_axis : 3 without `*ORIENTATION` or with
+    a rectangular one; 1 with a cylindrical one: warp is axial and fill hoop at angle 0. whole_times
+    : commit strain and stress only at whole total times, so that the law's increments are the
+    deck's steps. whole_until : so up to this time, then at every increment.
     """
     if normal_modulus is None:
         normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
@@ -119,11 +111,7 @@ def compiler() -> list[str]:
 
 
 def material_library(cache: Path | None = None) -> Path:
-    """Return the path of libBUBBLEFIT.so, compiled when it is not in the cache yet.
-
-    Its folder belongs into LD_LIBRARY_PATH for ccx. SolverFailure: no compiler, or it does not
-    accept the source. OutputError: the cache cannot be written.
-    """
+    """Return libBUBBLEFIT.so, compiled if need be; SolverFailure: no compiler; OutputError."""
     command = compiler()
     source = SOURCE.read_bytes()
     digest = hashlib.sha256(source)

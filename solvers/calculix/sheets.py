@@ -56,10 +56,7 @@ SHARES = {2: (0.5, 0.5), 3: (1 / 6, 1 / 6, 2 / 3)}
 
 
 def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
-    """Return displacement and nodal force at the total times 1 to `count`, (count, nodes, 3) each.
-
-    SolverFailure: the file is not there, damaged, or does not hold every one of them.
-    """
+    """Return displacement and force, (count, nodes, 3), at times 1 to `count`; or SolverFailure."""
     try:
         file = FrdFile(path)
         place = np.searchsorted(file.mesh.numbers, np.arange(1, nodes + 1))
@@ -98,10 +95,7 @@ def bubble_decks(
     model: BubbleModel, law: HypoelasticLaw, shells: ShellMesh, element: str,
     folder: Path | None = None,
 ) -> dict[str, str]:  # fmt: skip
-    """Return the text of `job.inp` and the mesh, of shells on the model's reference surface.
-
-    `folder` has the user's templates; InputError: one that cannot be used.
-    """
+    """Return the text of `job.inp` and of the mesh; InputError: a template that cannot be used."""
     supports = {
         name: held_dofs(directions)
         for name, directions in model.supports.items()
@@ -128,10 +122,7 @@ def bubble_decks(
 
 
 def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
-    """Return displacements, support forces and strains; `shells` are those without stress.
-
-    SolverFailure: the file is not there, damaged, or does not hold every increment.
-    """
+    """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
     u, nodal = whole_times(path, len(model.increments), len(shells.points))
     keep, levels = model.reported, np.array(model.increments)
     reactions: dict[str, Array] = {
@@ -162,10 +153,7 @@ class StripRun:
 
 
 def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
-    """Pull a strip, its grips driven by `pulls`, to the model's elongations of the gauge.
-
-    SolverFailure: a run that did not end well, a gauge that did not reach its length.
-    """
+    """Pull a strip to the gauge's elongations; SolverFailure: no good end, or not so far."""
     shells = setup.shells(model.mesh)
 
     def decks(pulls: Array) -> dict[str, str]:
@@ -211,10 +199,7 @@ def strip_run(path: Path, model: UniaxialModel, shells: ShellMesh, count: int) -
 def strip_history(
     run: StripRun, model: UniaxialModel, shells: ShellMesh, iterations: int
 ) -> History:
-    """Return load, displacement and reactions where the gauge has the model's elongations.
-
-    SolverFailure: the gauge does not reach its length, or gets shorter on the way.
-    """
+    """Return load, displacement, reactions at the gauge's elongations; else SolverFailure."""
 
     def at_levels(values: Array) -> Array:
         return at_elongations(run.gauge, model, values, "calculix")

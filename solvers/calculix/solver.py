@@ -51,14 +51,11 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
 
 
 class CalculixSolver:
-    """CalculiX as a subprocess.
+    """CalculiX as a subprocess; ccx : by `find_ccx` unless given.
 
-    ccx : the program; found by `find_ccx` unless given. templates : the user's own folder of
-    templates. element : "S8R" or "S4". timeout : s, of one run, unless `run` is given another.
-    scratch : folder for scratch folders; memory, else the temporary folder, unless given. keep :
-    also those of runs that end well. threads : of one run; starts run side by side already.
-    progress : called with every increment that converged. Raises InputError : an element there is
-    not, a template folder that is not there.
+    templates : the user's own folder. element : "S8R" or "S4". timeout : s, of one run. scratch :
+    folder for scratch folders; memory, else the temporary folder, unless given. keep : also those
+    of good runs. threads : of one run. InputError : an unknown element, no such template folder.
     """
 
     name = "calculix"
@@ -114,11 +111,7 @@ class CalculixSolver:
         self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:  # fmt: skip
-        """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
-
-        SolverFailure: it did not end well; the scratch folder is kept and named. InputError: a
-        template that cannot be used, a ccx that cannot be started.
-        """
+        """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
 
         place, seconds = scratch or self.scratch, timeout or self.timeout
 
@@ -169,14 +162,12 @@ class CalculixSolver:
 
 SECONDS = 120.0
 
-
 #: Corners of a bar, in the order of C3D8.
 NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 
 
 def bar_deck() -> str:
-    """Return the deck: every bar pulled along x, the fabric turned so that its direction lies
-    there."""
+    """Return the deck: every bar pulled along x, its direction of the fabric turned there."""
     bars = [
         {
             "index": index,
@@ -194,11 +185,7 @@ def bar_deck() -> str:
 
 
 def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> tuple[float, ...]:
-    """Return the end stresses (MPa) of BARS by this ccx, each within TOLERANCE of Marc's.
-
-    SolverFailure: no compiler, ccx does not end well, or a stress is wrong. OutputError: no
-    temporary folder.
-    """
+    """Return the end stresses (MPa) of BARS by this ccx; SolverFailure beyond TOLERANCE."""
     library = material_library() if library is None else library
     try:
         with tempfile.TemporaryDirectory(prefix="bubblefit-bars-") as folder:
@@ -259,10 +246,7 @@ def _end_stresses(text: str) -> tuple[float, ...]:
 
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
-    """Return all there are (`named`: one more, by path).
-
-    One that is not there at all is an entry without a path, expected only if it was named.
-    """
+    """Return all there are (`named`: one more); an absent one, expected if named, has no path."""
     try:
         candidates = every_ccx(named)
     except BubblefitError as error:

@@ -15,22 +15,13 @@ from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import enclosed_volume
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import collar_body, support_body
-from .deck import (
-    Run,
-    deck_text,
-    fabric_context,
-    fixed,
-    node_sets,
-    supports,
-    time_table,
-)
+from .deck import Run, deck_text, fabric_context, fixed, node_sets, supports, time_table
 from .settings import MarcSettings
 from .sheets import NO_FORCES, REACTION, by_time, displacements, pressure_context, whole_times
 
 #: Kinds of notes that are made here.
 UNCONFIRMED = NoteKind("unconfirmed")
 UNBALANCED = NoteKind("unbalanced forces")
-
 
 Array = NDArray[np.float64]
 
@@ -42,10 +33,7 @@ UP = [0.0, 1.0, 0.0]
 
 
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
-    """Return support and collar: name, table of the path, patches (n, 12) towards the cylinder.
-
-    inflated : (nodes, 3) mm of displacement. InputError: a whole cylinder.
-    """
+    """Return support and collar, patches (n, 12) towards the cylinder; InputError: it is whole."""
     if model.copies != 4:
         problem = "Marc's deck bends a quarter; mesh it as 'quarter'"
         raise InputError(None, "symmetry", problem)
@@ -62,10 +50,7 @@ def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]
 
 
 def paths(inflation: int, deflections: Sequence[float]) -> tuple[list[float], list[float]]:
-    """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ...
-
-    inflation : increments of it; one more brings the support up, then the collar goes down.
-    """
+    """Return heights (mm) of support and collar over their places, at times 0, 1, 2, ..."""
     bent = len(deflections)
     support = [-BELOW] * (inflation + 1) + [0.0] * (1 + bent)
     collar = [0.0] * (inflation + 2) + [-(ABOVE + d) for d in deflections]
@@ -79,20 +64,14 @@ TONNES = 1e-12  # t/mm^3 in a kg/m^3
 
 
 def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Return the deck of inflation by a pressure, the bottom held in height at the supports.
-
-    InputError: a template that cannot be used, a law that Marc's shells do not carry.
-    """
+    """Return the deck of inflation, the bottom held at the supports; InputError as `deck_text`."""
     return _deck(model, law, settings, None)
 
 
 def bending_deck(
     model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, inflated: Array
 ) -> str:
-    """Return the deck of a cavity's inflation, and of bending with a constant mass of gas.
-
-    inflated : (nodes, 3) mm of displacement. InputError: as `inflation_deck`; a whole cylinder.
-    """
+    """Return the deck of a cavity's inflation and bending; inflated : (nodes, 3) mm; InputError."""
     gas, density = model.gas, TONNES * model.gas.density
     cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
     return _deck(model, law, settings, {"gas": cavity, "bodies": contact_bodies(model, inflated)})
@@ -138,8 +117,7 @@ BALANCE = 0.02
 
 
 def inflated(path: Path, model: CylinderModel) -> Array:
-    """Return the displacement (nodes, 3) mm at the end of inflation; SolverFailure as
-    `whole_times`."""
+    """Return the displacement (nodes, 3) mm after inflation; SolverFailure as `whole_times`."""
     return displacements(whole_times(path, model.mesh, len(model.inflation)))[-1]
 
 
@@ -148,10 +126,8 @@ def cylinder_history(
 ) -> History:
     """Return the inflated cylinder, then every reported deflection; `load` of the collar in N.
 
-    The cavity's pressure is not in the file: it is that of a constant mass in the volume found.
-    ended : the run ended well. If not, the history ends with the last increment that the file
-    holds whole, and a remark says so. SolverFailure: the file is not there or damaged, holds no
-    forces or no increment of bending; or the run ended and one is missing.
+    The cavity's pressure is that of a constant mass in the volume found. ended : if not, the
+    history ends with the last whole increment. SolverFailure: nothing usable, or not to the end.
     """
     filled = len(model.inflation)
     wanted = {filled: 0.0} | {
@@ -227,10 +203,7 @@ def _forces(
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
-    """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse.
-
-    SolverFailure: a run that did not end well. InputError: as `bending_deck`.
-    """
+    """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
     if model.cords:
         problem = "cords are for the solver membrane: Marc's deck has no tension-only members"
         raise InputError(None, "cord", problem)

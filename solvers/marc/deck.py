@@ -53,10 +53,7 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
 def schedule(
     settings: MarcSettings, cases: Sequence[tuple[str, int, Sequence[str]]]
 ) -> dict[str, Any]:
-    """Return load cases of so many increments of the model each, with their conditions.
-
-    Every increment of the model is cut into as many as make `settings.increments` in all.
-    """
+    """Return load cases of increments, each cut so that `settings.increments` come together."""
     units = sum(count for _, count, _ in cases)
     cuts = max(1, math.ceil(settings.increments / units))
     return {
@@ -102,11 +99,7 @@ def deck_text(
     sets: Sequence[dict[str, Any]], cases: Sequence[tuple[str, int, Sequence[str]]],
     tables: Sequence[dict[str, Any]], held: Sequence[dict[str, Any]], **context: Any,
 ) -> str:  # fmt: skip
-    """Return the deck of a `fabric_context`, of node sets, load cases, tables over time, supports.
-
-    All supports hold before the first increment, too. context : what only this deck's template is
-    given. InputError: a template or a file of the site's that cannot be used, as `law_context`.
-    """
+    """Return the deck, `context` for its template; InputError: a template, or as `law_context`."""
     whole = {
         "version": __version__,
         "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
@@ -131,8 +124,7 @@ SAME = 9
 
 
 def set_lines(numbers: Numbers) -> list[str]:
-    """Return members of a set (from 0, sorted) as Marc reads them: `a to b` for runs, ` c` to go
-    on."""
+    """Return members (from 0, sorted) as Marc reads them: `a to b` for runs, ` c` to go on."""
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
@@ -146,10 +138,7 @@ def set_lines(numbers: Numbers) -> list[str]:
 
 
 def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
-    """Return a `define` of the deck; kind "node" or "element".
-
-    InputError: a name that Marc could not read, or a set of nothing.
-    """
+    """Return a `define`, kind "node" or "element"; InputError: a bad name, nothing in it."""
     if not re.fullmatch(r"[a-z0-9_]{1,28}", name):
         problem = f"{name!r}: Marc takes at most 28 letters, digits and _; rename the set"
         raise InputError(None, f"{kind} set", problem)
@@ -159,10 +148,7 @@ def named_set(kind: str, name: str, numbers: Numbers) -> dict[str, Any]:
 
 
 def fabric_frames(mesh: Mesh, warp: Array) -> tuple[Array, Array]:
-    """Return unit vectors of warp and fill in the plane of each quad, (quads, 3) each.
-
-    InputError: a warp direction normal to a quad.
-    """
+    """Return unit warp and fill in the plane of each quad, (quads, 3); InputError: warp normal."""
     corner = mesh.points[mesh.quads]
     normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -226,7 +212,4 @@ class Run(Protocol):
     def __call__(
         self, deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None
     ) -> T:
-        """Return what `read` makes of the results, or `rescue` of those of a bad end.
-
-        units : total time at the end of the deck. SolverFailure: it did not end well.
-        """
+        """Return what `read` makes of the results to time `units`, or `rescue` of a bad end."""

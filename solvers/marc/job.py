@@ -36,10 +36,7 @@ Tell = Callable[[Progress], None]
 
 
 def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
-    """Return the command of Marc on `job`.dat in the current folder, in the foreground.
-
-    subroutine : file name of user code, which Marc compiles, where the law needs it.
-    """
+    """Return the command of Marc on `job`.dat, in the foreground; subroutine : user code's file."""
     older = settings.options == "older"
     words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
     if older:
@@ -65,11 +62,7 @@ def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
 
 
 def find_marc(settings: MarcSettings) -> Path | None:
-    """Return where run_marc is; None where only the loaded modules know.
-
-    InputError: the one that was named is not there or is no program. SolverFailure: there is none
-    on the PATH.
-    """
+    """Return run_marc, None: only modules know it; InputError: not there; SolverFailure: none."""
     given = Path(os.path.expanduser(settings.executable))
     if os.sep in settings.executable:
         if not given.is_file():
@@ -118,11 +111,7 @@ class Increment:
 
 
 def increments(sts: Path) -> list[Increment]:
-    """Read increments that ended so far, repeated ones as often as they are there.
-
-    Half a line at the end is left for the next look; lines that are not of 13 numbers are the
-    header and the end.
-    """
+    """Read increments so far, repeated ones too; lines that are not of 13 numbers are none."""
     text = _text(sts)
     found = []
     for line in text[: text.rfind("\n") + 1].splitlines():
@@ -138,10 +127,7 @@ def increments(sts: Path) -> list[Increment]:
 
 
 def exit_number(*files: Path) -> int | None:
-    """Return the last exit number in the first of the files that has one; None: it never ended.
-
-    Of nine digits at most: Marc's have four.
-    """
+    """Return the last exit number (Marc's have four digits) in the first file with one, or None."""
     for file in files:
         numbers = _EXIT.findall(_text(file))
         if numbers:
@@ -183,10 +169,7 @@ _REFUSED = re.compile(
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of a job: `problem` in one line, None when well; what Marc said of it.
-
-    licence: it never began, for want of a licence. iterations, repeated: of all increments.
-    """
+    """The end of a job: `problem` None when well; licence: denied; iterations, repeated: of all."""
 
     problem: str | None
     number: int | None
@@ -197,11 +180,7 @@ class Ending:
 
     @property
     def collapse(self) -> bool:
-        """Return whether Marc itself gave up, its time step as small as it may be.
-
-        What it wrote until then is a result that ends early; after any other bad end (killed, out
-        of time, an element inside out) there is none.
-        """
+        """Return whether Marc itself gave up: what it wrote until then is a result."""
         said = self.problem is not None and self.problem.startswith(MEANINGS[NO_SMALLER])
         return self.number == NO_SMALLER and said
 
@@ -211,9 +190,8 @@ def ending(
 ) -> Ending:
     """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
 
-    screen : name of the file with what run_marc printed. timeout : s, that it had. time : total
-    time at its end when it ends well. The return code of run_marc is not asked: scripts around
-    Marc give any.
+    screen : file with what run_marc printed. time : total, at a good end. Return codes are not
+    asked: scripts around Marc give any.
     """
     done = increments(folder / f"{job}.sts")
     number = exit_number(
@@ -286,10 +264,8 @@ def run_job(
 ) -> tuple[T, Ending]:  # fmt: skip
     """Run a job in a fresh scratch folder below `parent`; return what `read` makes of its results.
 
-    rescue : of those of a run that stopped early. timeout : s; the settings' unless given. tell :
-    called with every increment that ended. SolverFailure: it did not end well; the scratch folder
-    is kept and named. LicenceDenied: it never began, for want of a licence. InputError: a Marc that
-    is not there or cannot be started.
+    rescue : of those of a run that stopped early. SolverFailure: no good end; names the kept
+    folder. LicenceDenied: it never began. InputError: a Marc that is not there.
     """
     find_marc(settings)
     seconds, subroutine = (
@@ -327,10 +303,7 @@ def run_job(
 
 
 def set_earlier_aside(folder: Path) -> None:
-    """Rename what is older than the deck: it is not this job's answer.
-
-    The folder is fresh, but a site's script may copy files into it, from a place of its own.
-    """
+    """Rename what is older than the deck: a site's script may copy old files into the folder."""
     begun = (folder / f"{JOB}.dat").stat().st_mtime_ns
     for name in WRITTEN:
         path = folder / f"{JOB}.{name}"

@@ -30,19 +30,12 @@ Word = Annotated[str, Field(pattern=r"^[^\s\x00]+$")]
 class MarcSettings(ExternalSettings):
     """Every setting of MSC Marc, with its default.
 
-    executable : `run_marc`, by path or by name. version : of Marc, for the record.
-    options : names of run_marc's options, "current" (-j, -nte, -nts) or "older" (-jid, -nprocd).
-    processors, threads : of one run. arguments : more of them, to the end of the command.
-    environment : variables of the run. modules : what `module load` is given before it.
-    law : NLELAST with tables, or HYPOELASTIC with HYPELA2, whose source says what own_state and
-    symmetric mean.
-    element : 139 thin shell, 75 thick shell, 18 membrane.
-    increments : least number of Marc increments of an analysis; 0: as many as the model has.
+    options : "current" (-j, -nte, -nts) or "older" (-jid, -nprocd) names. arguments : more, to the
+    end of the command. modules : what `module load` is given before it. law : NLELAST with tables,
+    or HYPOELASTIC with HYPELA2, whose source says what own_state and symmetric mean. element : 139
+    thin shell, 75 thick shell, 18 membrane. increments : least number; 0: the model's.
     pressure_type, pressure_sign : code of the pressure on shells, and the sign that inflates.
-    include : files that stand in for blocks of the deck, by the name of the block.
-    templates : folder of whole decks of the site's own.
-    timeout : s, of one run.
-    scratch, keep : where runs are made, and whether the good ones stay.
+    include : files that stand in for blocks of the deck. templates : folder of whole decks.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
@@ -97,11 +90,7 @@ class MarcSettings(ExternalSettings):
 
 
 def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
-    """Return settings from those `given` (None: not), over the site's file, over the defaults.
-
-    named : the executable, or the site's file if it ends in .toml; BUBBLEFIT_MARC unless given.
-    InputError: a file or a value that cannot be used.
-    """
+    """Return settings, those `given` over the site's file (named or BUBBLEFIT_MARC); InputError."""
     site = named or os.environ.get(VARIABLE, "")
     values: dict[str, Any] = {}
     if site.endswith(".toml"):
@@ -128,10 +117,7 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
 
 
 def site_settings(path: Path) -> dict[str, Any]:
-    """Return the keys of a site's file, with its paths made absolute.
-
-    InputError: no such file, not TOML, a key that there is not.
-    """
+    """Return the keys of a site's file, its paths absolute; InputError: no file, not TOML."""
     try:
         content = toml_of(path)
     except OSError as error:

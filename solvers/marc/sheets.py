@@ -32,7 +32,6 @@ from .t19 import T19File
 #: Kinds of notes that are made here.
 NO_REACTIONS = NoteKind("no reactions")
 
-
 Array = NDArray[np.float64]
 WARP = np.array([1.0, 0.0, 0.0])
 #: The set of all nodes.
@@ -49,11 +48,7 @@ NO_FORCES = (
 def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
 ) -> History:
-    """Inflate a bubble.
-
-    SolverFailure: a run that did not end well; a sheet with slack, or a rim that moves, which these
-    decks do not have. InputError: as `bubble_deck`.
-    """
+    """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
     if any(model.slack) or model.rim_motion is not None:
         raise SolverFailure(
             "takes no slack sheet and no rim that moves, use another solver", "marc"
@@ -63,10 +58,7 @@ def analyse_bubble(
 
 
 def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Return the deck of an inflation; total time counts the model's increments.
-
-    InputError: a template that cannot be used, a law that Marc's shells do not carry.
-    """
+    """Return the deck of an inflation, total time the increments; InputError as `deck_text`."""
     warp = WARP if model.mesh.warp is None else model.mesh.warp
     fabric = fabric_context(model.mesh, warp, model.thickness)
     sets = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
@@ -86,11 +78,7 @@ def pressure_context(settings: MarcSettings) -> dict[str, float]:
 def analyse_strip(
     model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
 ) -> History:
-    """Pull a strip, its grips driven by `pulls`.
-
-    SolverFailure: a run that did not end well, a gauge that did not reach its length. InputError:
-    as `strip_deck`.
-    """
+    """Pull a strip, its grips driven by `pulls`; SolverFailure: no good end, or not so far."""
 
     def gauge(pulls: Array) -> Array:
         deck, count = strip_deck(model, law, settings, pulls), len(pulls)
@@ -104,10 +92,7 @@ def analyse_strip(
 def strip_deck(
     model: UniaxialModel, law: HypoelasticLaw, settings: MarcSettings, pulls: Array
 ) -> str:
-    """Return the deck of a pull; `pulls` (increments,) mm of the pulled end, along -y.
-
-    InputError: a template that cannot be used, a law that Marc's shells do not carry.
-    """
+    """Return the deck of a pull; `pulls` (increments,) mm along -y; InputError as `deck_text`."""
     mesh = model.mesh
     fabric = fabric_context(mesh, model.warp, model.thickness)
     # In its plane a strip neither bends nor twists.
@@ -123,11 +108,7 @@ def strip_deck(
 
 
 def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
-    """Return vectors by name at total times 1 to `count`, (nodes, components) each.
-
-    SolverFailure: the file is not there, damaged, of another mesh, or lacks one of the times or
-    its displacements.
-    """
+    """Return vectors by name at times 1 to `count`, (nodes, components); SolverFailure: not all."""
     try:
         found = by_time(path, mesh)
         for time in range(1, count + 1):
@@ -139,10 +120,7 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
 
 
 def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, Array]]:
-    """Return vectors by name at every whole time that has displacements.
-
-    ended : as for `T19File.frames`. InputError: not there, damaged, or of another mesh.
-    """
+    """Return vectors by name at whole times, `ended` as `T19File.frames`; InputError: damaged."""
     file = T19File(path)
     nodes = len(mesh.points)
     if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):
@@ -196,11 +174,7 @@ def opened(path: Path, model: UniaxialModel, count: int) -> Array:
 def strip_history(
     path: Path, model: UniaxialModel, count: int, driven: bool, iterations: int
 ) -> History:
-    """Return load, displacement and reactions where the gauge has the model's elongations.
-
-    driven : the grips are the gauge, so that it has them already. SolverFailure: as `whole_times`;
-    no reactions, a gauge that does not reach its length.
-    """
+    """Return load, displacement, reactions at the gauge's elongations; driven: grips are gauge."""
     frames = whole_times(path, model.mesh, count)
     u, forces = displacements(frames), reactions(frames)
     if forces is None:

@@ -28,7 +28,6 @@ from .settings import VARIABLE, MarcSettings, marc_settings
 #: Kinds of notes that are made here.
 REPEATED = NoteKind("repeated increments")
 
-
 #: Settings that change what the deck or the subroutine says, or what Marc makes of them.
 MATTERING = (
     "law", "element", "increments", "pressure_type", "pressure_sign", "own_state", "symmetric",
@@ -43,12 +42,7 @@ ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]
 
 
 class MarcSolver:
-    """A licensed MSC Marc as a subprocess.
-
-    marc : run_marc, or a file of the site's settings (.toml); BUBBLEFIT_MARC, else run_marc on the
-    PATH, unless given. progress : called with every increment that ended. settings : those of
-    `MarcSettings` by name; None: not given. Raises InputError : a setting that cannot be used.
-    """
+    """A licensed MSC Marc; marc : run_marc or a site's .toml, else BUBBLEFIT_MARC, else PATH."""
 
     name = "marc"
     external = True
@@ -92,10 +86,7 @@ class MarcSolver:
                 if key in self.settings.model_fields_set}  # fmt: skip
 
     def check(self) -> SolverCheck:
-        """Return whether there is a run_marc.
-
-        That it carries the law, `doctor` and docs/how-to/marc.md show.
-        """
+        """Return whether there is a run_marc; that it carries the law, `doctor` shows."""
         try:
             find_marc(self.settings)
         except SolverFailure as failure:
@@ -106,12 +97,7 @@ class MarcSolver:
         self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
     ) -> History:  # fmt: skip
-        """Inflate, pull or bend the model, `timeout` s for a run, in a folder below `scratch`.
-
-        SolverFailure: it did not end well; the scratch folder is kept and named. LicenceDenied: it
-        never began, for want of a licence. InputError: a template or file that cannot be used, a
-        Marc that cannot be started.
-        """
+        """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
         settings, repeats, early = self.settings, 0, ""
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
 
@@ -145,10 +131,7 @@ SECONDS = 600.0
 
 
 def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
-    """Return the end stresses (MPa) of BARS by this Marc, each within TOLERANCE of the published.
-
-    SolverFailure: a bar did not end well, or its stress is wrong.
-    """
+    """Return the end stresses (MPa) of BARS by this Marc; SolverFailure beyond TOLERANCE."""
     stresses = tuple(end_stress(solver, bar, timeout) for bar in BARS)
     for bar, stress in zip(BARS, stresses, strict=True):
         if not abs(stress / bar.stress - 1) < TOLERANCE:

@@ -1,9 +1,6 @@
-"""Marc's formatted post file (.t19), read to its last mark.
+"""Marc's formatted post file (.t19), read to its last mark; layout: docs/reference/marc-deck.md.
 
-Blocks between `=beg=NNNNN (name)` and `=end=`; fields of 13 columns, six a line, each record on
-lines of its own; the model first, then an increment between `****` and `----`, again and again,
-and `++++` at the end. A file that does not hold what its blocks announce, or stops before its end
-mark, is refused: a job that was killed leaves such a file. Layout: docs/reference/marc-deck.md.
+A file that does not hold what its blocks announce, or stops before its end, is refused.
 """
 
 from __future__ import annotations
@@ -27,11 +24,7 @@ _BEGIN = re.compile(r"=beg=(\d{3})(\d{2})\b")
 
 
 class Records:
-    """A place in a file, and the reading from there; every step is checked.
-
-    InputError: the file cannot be read, or ends where it must not, or holds what it must not;
-    which line.
-    """
+    """A place in a file, and checked reading from there; InputError says which line."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.at = path, 0
@@ -154,10 +147,7 @@ class T19Frame:
 
 
 class T19File:
-    """A post file, checked as it is read: `mesh`, then `frames()` one by one.
-
-    InputError: no such file, not a formatted post file, truncated or corrupt (which line).
-    """
+    """A post file, `mesh`, then `frames()`; InputError: none, truncated or corrupt (which line)."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
@@ -169,11 +159,7 @@ class T19File:
         self._first = self._file.at
 
     def frames(self, ended: bool = True) -> Iterator[T19Frame]:
-        """Yield every increment, in the file's order.
-
-        ended : the job ended, and the file with its mark. If it did not, the file may stop
-        anywhere, and the last whole increment is the last.
-        """
+        """Yield every increment in order; `ended`: with its mark; if not, all whole ones."""
         self._file.at = self._first
         while True:
             try:
@@ -268,11 +254,7 @@ class T19File:
 
 
 def read(filename: Path | str) -> meshio.Mesh:
-    """Return mesh and last increment for `meshio.read("job.t19")`; `field_data`: time, increment.
-
-    InputError: truncated or corrupt, or an element type that is not known here. (meshio itself
-    would end the program on a ReadError.)
-    """
+    """Return mesh, last increment for `meshio.read("job.t19")`; InputError: not whole."""
     from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
 
     file = T19File(filename)
