@@ -128,13 +128,9 @@ class SolverFailure(BubblefitError):
     exit_code = 4
 
     def __init__(
-        self,
-        reason: str,
-        solver: str = "membrane",
-        exit_number: int | None = None,
-        log_tail: str = "",
-        scratch: Path | None = None,
-    ) -> None:
+        self, reason: str, solver: str = "membrane", exit_number: int | None = None,
+        log_tail: str = "", scratch: Path | None = None,
+    ) -> None:  # fmt: skip
         self.reason, self.solver, self.exit_number = reason, solver, exit_number
         self.log_tail, self.scratch = log_tail, scratch
         text = f"{solver}: {reason}"

@@ -44,15 +44,9 @@ MOST_PARTS = 100
 #: Every file with compiled functions. An edit of one must reach the compiled code of all, while
 #: numba's own cache looks only at the file in which a function stands.
 KERNELS = (
-    "materials/pieces.py",
-    "materials/memory.py",
-    "materials/point_law.py",
-    "materials/wrinkles.py",
-    "materials/law.py",
-    "materials/responses.py",
-    "meshes/mesh.py",
-    "solvers/membrane/kernel.py",
-)
+    "materials/pieces.py", "materials/memory.py", "materials/point_law.py", "materials/wrinkles.py",
+    "materials/law.py", "materials/responses.py", "meshes/mesh.py", "solvers/membrane/kernel.py",
+)  # fmt: skip
 
 # Reading
 
@@ -256,13 +250,9 @@ def environment(loader: jinja2.BaseLoader, html: bool = False) -> jinja2.Environ
     from jinja2.sandbox import ImmutableSandboxedEnvironment
 
     return ImmutableSandboxedEnvironment(
-        loader=loader,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=html,
-    )
+        loader=loader, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, autoescape=html,
+    )  # fmt: skip
 
 
 def render(template: str, /, **context: Any) -> str:

@@ -110,11 +110,9 @@ def band_at(
 
 
 def certainty_of(
-    law: HypoelasticLaw,
-    coefficients: Array,
-    words: str = "",
+    law: HypoelasticLaw, coefficients: Array, words: str = "",
     bands: Mapping[str, Array] | None = None,
-) -> CardCertainty:
+) -> CardCertainty:  # fmt: skip
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
     relative = np.vstack(

@@ -6,16 +6,11 @@ from importlib import import_module
 from typing import Any
 
 _PLACES = {
-    "format_names": "registry",
-    "read_bending_curves": "bending",
-    "read_field": "fields",
-    "read_fields": "fields",
-    "read_frames": "frames",
-    "read_load_curves": "curves",
-    "read_machine_loads": "machine_tables",
-    "read_published_polynomials": "curves",
+    "format_names": "registry", "read_bending_curves": "bending", "read_field": "fields",
+    "read_fields": "fields", "read_frames": "frames", "read_load_curves": "curves",
+    "read_machine_loads": "machine_tables", "read_published_polynomials": "curves",
     "read_surfaces": "fields",
-}
+}  # fmt: skip
 __all__ = [*_PLACES]
 
 

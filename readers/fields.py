@@ -74,11 +74,9 @@ def read_fields(
 
 
 def read_field(
-    path: Path | str,
-    pressure: float,
-    options: FrameOptions | None = None,
+    path: Path | str, pressure: float, options: FrameOptions | None = None,
     format: str | None = None,
-) -> DisplacementField:
+) -> DisplacementField:  # fmt: skip
     """Read the field of one file, at a pressure in MPa."""
     return read_fields([path], [pressure], options=options, format=format)[0]
 

@@ -57,17 +57,10 @@ class LoadHistory:
 
 
 def read_history(
-    path: Path | str,
-    *,
-    columns: Mapping[str, str] | None = None,
-    length: float | None = None,
-    load_unit: str | None = None,
-    strain_unit: str | None = None,
-    length_unit: str | None = None,
-    decimal: Literal[".", ","] | None = None,
-    sheet: str | None = None,
-    format: str | None = None,
-) -> LoadHistory:
+    path: Path | str, *, columns: Mapping[str, str] | None = None, length: float | None = None,
+    load_unit: str | None = None, strain_unit: str | None = None, length_unit: str | None = None,
+    decimal: Literal[".", ","] | None = None, sheet: str | None = None, format: str | None = None,
+) -> LoadHistory:  # fmt: skip
     """Read a whole load history: a plain table, or the export of an Instron, Zwick or MTS machine.
 
     columns : the file's own names of `QUANTITIES`. The strain is that of the column nearest to the

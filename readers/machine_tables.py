@@ -100,12 +100,9 @@ def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> t
 
 
 def source_of(
-    found: MachineTable,
-    columns: Mapping[str, str],
-    asked: Mapping[str, str | None],
-    format: str | None,
-    notes: Sequence[str] = (),
-) -> FrameSource:
+    found: MachineTable, columns: Mapping[str, str], asked: Mapping[str, str | None],
+    format: str | None, notes: Sequence[str] = (),
+) -> FrameSource:  # fmt: skip
     """Return the record of what was read: columns by quantity, units of those that name none."""
     taken = {quantity: column for quantity, column in columns.items() if column}
     units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}

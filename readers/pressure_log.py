@@ -307,12 +307,9 @@ class FrameChoice:
 
 
 def choose_frames(
-    pressures: Array,
-    asked: Sequence[float] | None = None,
-    count: int | None = None,
-    tolerance: float | None = None,
-    in_time: bool = False,
-) -> FrameChoice:
+    pressures: Array, asked: Sequence[float] | None = None, count: int | None = None,
+    tolerance: float | None = None, in_time: bool = False,
+) -> FrameChoice:  # fmt: skip
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
     pressures : (frames,) MPa, NaN where unknown. asked : MPa, rising. tolerance : MPa; 2 % of the
@@ -392,12 +389,9 @@ def _searched(pattern: str, path: Path) -> re.Match[str] | None:
 
 
 def number_in_name(
-    path: Path,
-    units: Mapping[str, float],
-    pattern: str | None = None,
-    unit: str | None = None,
+    path: Path, units: Mapping[str, float], pattern: str | None = None, unit: str | None = None,
     field: str = "",
-) -> float:
+) -> float:  # fmt: skip
     """Return the number in a file's name, times what its unit is in `units`.
 
     pattern : with one group; None takes the one number before a unit (`step_012_35.5kPa.csv`).

@@ -79,13 +79,9 @@ def cells_of(text: str, separator: str | None) -> list[str] | None:
 
 
 def find_layout(
-    path: Path,
-    quantities: Sequence[str],
-    named: Mapping[str, str],
-    comment: str,
-    decimal: str | None = None,
-    upper: bool = False,
-) -> TextLayout:
+    path: Path, quantities: Sequence[str], named: Mapping[str, str], comment: str,
+    decimal: str | None = None, upper: bool = False,
+) -> TextLayout:  # fmt: skip
     """Find the layout of a file, by its own names of some quantities; names may be a comment."""
     lines = read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
@@ -174,12 +170,9 @@ Flag = tuple[int, Sequence[int] | None]
 
 
 def flag_columns(
-    path: Path,
-    layout: TextLayout,
-    columns: Mapping[str, int],
-    options: FrameOptions,
+    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions,
     status: tuple[str, Sequence[int]] | None,
-) -> list[Flag]:
+) -> list[Flag]:  # fmt: skip
     """Return the flags that are named, else those of `status` and the headings."""
     names = [heading.name for heading in layout.headings]
     asked: list[tuple[str | None, Sequence[int] | None]]
@@ -357,15 +350,10 @@ def text_reader(format: str, **settings: Any) -> Callable[[Path, FrameOptions], 
 
 
 def read_text_rows(
-    path: Path,
-    options: FrameOptions,
-    *,
-    comment: str | None = None,
-    upper: bool = False,
-    camera_axes: bool = False,
-    names: Mapping[str, str] | None = None,
+    path: Path, options: FrameOptions, *, comment: str | None = None, upper: bool = False,
+    camera_axes: bool = False, names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
-) -> list[FrameRows]:
+) -> list[FrameRows]:  # fmt: skip
     """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
     names : the format's names, after the user's. status : a column of states, its good values.

@@ -208,11 +208,9 @@ def gsa(card: MaterialCard, options: SheetOptions) -> Export:
     linear = linear_card(card, options)
     c = linear.found.constants
     rows = [
-        ("Warp modulus", c.warp, "kN/m"),
-        ("Weft modulus", c.fill, "kN/m"),
-        ("Poisson's ratio (warp-weft)", c.nu_fill, "no unit"),
-        ("Shear modulus", c.shear, "kN/m"),
-    ]
+        ("Warp modulus", c.warp, "kN/m"), ("Weft modulus", c.fill, "kN/m"),
+        ("Poisson's ratio (warp-weft)", c.nu_fill, "no unit"), ("Shear modulus", c.shear, "kN/m"),
+    ]  # fmt: skip
     return _sheet(linear, "Fabric of Oasys GSA", rows, options)
 
 
@@ -222,13 +220,11 @@ def rfem(card: MaterialCard, options: SheetOptions) -> Export:
     c, t = linear.found.constants, card.thickness
     assert c.shear is not None
     rows = [
-        ("E_x (warp)", c.warp / t, "N/mm^2"),
-        ("E_y (fill)", c.fill / t, "N/mm^2"),
+        ("E_x (warp)", c.warp / t, "N/mm^2"), ("E_y (fill)", c.fill / t, "N/mm^2"),
         ("nu_xy (fill contracts)", c.nu_fill, "no unit"),
-        ("nu_yx (warp contracts)", c.nu_warp, "no unit"),
-        ("G_xy", c.shear / t, "N/mm^2"),
+        ("nu_yx (warp contracts)", c.nu_warp, "no unit"), ("G_xy", c.shear / t, "N/mm^2"),
         ("thickness d of the surface", t, "mm"),
-    ]
+    ]  # fmt: skip
     surface = "that the surface is a membrane, x along the warp"
     return _sheet(linear, "Orthotropic membrane of Dlubal RFEM", rows, options, surface)
 

@@ -300,13 +300,9 @@ def _plain(name: str) -> str:
 
 
 def _stacked(
-    path: Path,
-    block: Block,
-    names: list[str],
-    rows: Rows,
-    above: Sequence[str],
+    path: Path, block: Block, names: list[str], rows: Rows, above: Sequence[str],
     options: TableOptions,
-) -> tuple[list[str], Rows, tuple[str, ...]]:
+) -> tuple[list[str], Rows, tuple[str, ...]]:  # fmt: skip
     """Return names, rows, note of specimens side by side as if below each other; above : titles."""
     loads = columns_of(names, "load", options.columns)
     apart = {b - a for a, b in pairwise(loads)}
