@@ -118,12 +118,13 @@ def certainty(
     limit: Limit | None = None,
     second: Second | None = None,
     taken_out: bool = False,
+    noise: Noise | None = None,
 ) -> Certainty:
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
     (see `Noise.of`), else that of the best fit. second : terms of second order (see `Linear.of`).
     """
-    noise = Noise.of(problem, best.residual if limit is None else limit.residual)
+    noise = noise or Noise.of(problem, best.residual if limit is None else limit.residual)
     posterior, fine = posteriors_of(problem, best, noise, limit, second)
     strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
     first = problem.comparisons[0]

@@ -247,7 +247,8 @@ class Comparison:
     """A model that should show what was measured, by a solver of its own.
     name : of its test ("bubble 1", "strips 1: warp"). stage : those of lower stages lead into a fit
     of several (see `approach`). contracts : the sheet contracts freely under tension, so that the
-    law has to be positive definite. must_be_stable : an unstable equilibrium is refused."""
+    law has to be positive definite. must_be_stable : an unstable equilibrium is refused. prolong :
+    returns a start for this finer model from the path of a coarser one."""
 
     name: str
     model: Any
@@ -257,6 +258,7 @@ class Comparison:
     stage: int = 0
     contracts: bool = False
     must_be_stable: bool = True
+    prolong: Callable[[Array], Array] | None = None
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
 
     def by(self, solver: Solver) -> Comparison:
@@ -268,15 +270,18 @@ class Comparison:
         self._last = None
 
     def run(
-        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool
-    ) -> History:
+        self, law: HypoelasticLaw, free: Sequence[int], nuisance: Mapping[str, float], warm: bool,
+        beside: History | None = None,
+    ) -> History:  # fmt: skip
         """Run without derivatives.
         free : entries of the law's beta that vary between runs. nuisance : values by name, in their
         units. warm : start each increment from the last differentiated solution and its slope.
-        Raises SolverFailure."""
+        beside : of the comparison that this one refines, to start from. Raises SolverFailure."""
         values, model = self._model_values(nuisance), self.model_at(nuisance)
         if isinstance(self.solver, DifferentiatingSolver):
             guess = self._guess(self._point(law, free, values)) if warm else None
+            if beside is not None and beside.path is not None and self.prolong is not None:
+                guess = self.prolong(beside.path)
             return self.solver.run(model, law, guess=guess)
         return self.solver.run(model, law)
 

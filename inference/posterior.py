@@ -113,7 +113,7 @@ def _walked(
     return np.asarray(centre + away)
 
 
-@compiled(fastmath={"contract", "reassoc", "arcp", "nsz"})
+@compiled(fastmath=True)
 def _walk(away, begin, ways, slopes, share):  # type: ignore[no-untyped-def]
     """Walk from `away` (count, n), in place, along ways (steps, n) of unit length.
 
@@ -280,6 +280,11 @@ class Posterior:
             self.centre, self.covariance, self.unknowns.inequalities, self.best, count, random
         )
 
+    @cached_property
+    def drawn(self) -> Array:
+        """Return `DRAWS` draws of the law's unknowns, always the same ones."""
+        return self.sample(DRAWS, np.random.default_rng(0))[:, : self.unknowns.size]
+
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
@@ -298,8 +303,7 @@ def bands_of(
     The law's own modulus is always inside: where the mesh error is not taken out, the band reaches
     from there to the moduli of finer meshes."""
     unknowns = posterior.unknowns
-    drawn = posterior.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
-    coefficients = drawn @ unknowns.to_coefficients.T
+    coefficients = posterior.drawn @ unknowns.to_coefficients.T
     bands = {}
     for name, strain in strains.items():
         rows = modulus_rows(unknowns.form, name, strain, unknowns.strain_range)

@@ -21,9 +21,11 @@ from ..inference.linear import (
     Limit,
     Linear,
     Order,
+    along,
     definite,
     large,
     limit_of,
+    posteriors_of,
     residual_of,
     second_of,
 )
@@ -250,24 +252,29 @@ def _certainty(
     limit: Limit | None, out: bool = False,
 ) -> Certainty:  # fmt: skip
     """Return the certainty by first derivatives, by second if much is left and they differ."""
-    first = certainty(problem, best, law, reached, limit, taken_out=out)
     left = best.residual if limit is None else limit.residual
-    if not large(problem, left):
-        return first
     noise = Noise.of(problem, left)
-    found = second_of(problem, best, noise)
-    if not definite(Linear.of(problem, best, noise), found):
-        order = Order(False, NOT_DEFINITE, {}, found.directions, found.analyses)
-        return replace(first, order=order)
-    second = certainty(problem, best, law, reached, limit, found, out)
-    change = {}
-    for name, sigma in second.sigma.items():
-        by = sigma / first.sigma[name] - 1.0
-        change[name] = float(by[np.abs(by).argmax()])
-    used = max(map(abs, change.values())) > WORTH
-    why = "" if used else TOO_LITTLE
+    if not large(problem, left):
+        return certainty(problem, best, law, reached, limit, taken_out=out, noise=noise)
+    found, change = second_of(problem, best, noise), {}
+    used, why = False, NOT_DEFINITE
+    if definite(Linear.of(problem, best, noise), found):
+        first, second = (
+            along(
+                problem.unknowns, law, reached,
+                posteriors_of(problem, best, noise, limit, order)[0].covariance,
+            )[1]
+            for order in (None, found)
+        )  # fmt: skip
+        for name, sigma in second.items():
+            by = sigma / first[name] - 1.0
+            change[name] = float(by[np.abs(by).argmax()])
+        used = max(map(abs, change.values())) > WORTH
+        why = "" if used else TOO_LITTLE
     order = Order(used, why, change, found.directions, found.analyses)
-    return replace(second if used else first, order=order)
+    terms = found if used else None
+    sure = certainty(problem, best, law, reached, limit, terms, out, noise)
+    return replace(sure, order=order)
 
 
 def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit | None, list[Note]]:
@@ -276,10 +283,6 @@ def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit |
     except (InputError, SolverFailure) as error:
         words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
         return None, [Note(UNKNOWN, words)]
-
-
-#: Number of draws for the certainty of a card.
-DRAWS = 2000
 
 
 def card_certainty(
@@ -294,11 +297,10 @@ def card_certainty(
     if sure is None or known is None:
         return None
     unknowns = known.unknowns
-    drawn = known.sample(DRAWS, np.random.default_rng(0))[:, : unknowns.size]
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
     bands = {name: np.array([sure.strain[name], *ends]) for name, ends in sure.band.items()}
-    return certainty_of(law, drawn @ unknowns.to_coefficients.T, words, bands)
+    return certainty_of(law, known.drawn @ unknowns.to_coefficients.T, words, bands)
 
 
 #: A card, its file or its name; None for that of the project's fit.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -53,6 +53,8 @@ MOST_TURN = 30.0
 LEAST_QUADS = 48
 #: Quads on which a smoothed shape is balanced, at most: measured fields know no more.
 SHAPED = 150
+#: Number of the increment of a path from which a finer model begins: the sheet is taut there.
+LEAD = 1
 #: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
 INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 
@@ -140,7 +142,7 @@ class PreparedBubble:
             model = model.until(last)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
 
-    @property
+    @cached_property
     def targets(self) -> list[FieldTarget]:
         """Return the fields to match, frame by frame, on the model's mesh; raises InputError."""
         test, mesh, sheet = self.test, self.model.mesh, self.test.sheet
@@ -207,7 +209,8 @@ class PreparedBubble:
         moved = copy.copy(own.objective)
         reading = matching.reading_of(test, model.mesh)
         moved.targets = resampled(own.objective.targets, own.model.mesh, model.mesh, reading)
-        return replace(own, model=model, objective=moved)
+        prolong = partial(_prolonged, own.model, model) if factor > 1 else None
+        return replace(own, model=model, objective=moved, prolong=prolong)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files of the measured fields; none where they were computed."""
@@ -305,6 +308,20 @@ def resampled(
             found.append((places, sample))
         moved.append(replace(target, sample=sample))
     return tuple(moved)
+
+
+def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
+    """Return starts of a finer model from a path (steps, nodes, 3): one, NaN before it.
+
+    The sheet is taut there; with less pressure a slack one has folds that depend on the mesh.
+    """
+    sample = _sample(SmoothReading.of(own.mesh), finer.mesh.points[:, :2])
+    k = min(LEAD, len(path) - 1)
+    last = int(np.argmin(np.abs(np.array(finer.increments) - own.increments[k])))
+    starts = np.full((last + 1, *finer.mesh.points.shape), np.nan)
+    starts[last] = sample @ path[k]
+    starts.reshape(last + 1, -1)[last, finer.fixed] = 0.0
+    return starts
 
 
 def _sample(reading: SmoothReading | FacetReading, places: Array) -> sp.csr_matrix:

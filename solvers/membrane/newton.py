@@ -187,7 +187,7 @@ class NoEquilibrium(SolverFailure):
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Options of an analysis; guess : (increments, nodes, 3) to start each increment from."""
+    """Options of an analysis; guess : (increments or fewer, nodes, 3) to start each from."""
 
     parameters: Sequence[str] = ()
     guess: Array | None = None
@@ -246,8 +246,10 @@ def march(
     known, path = ([begun[0]], [begun[1]]) if begun is not None else ([], [])
     for i, level in enumerate(float(value) for value in levels):
         found = None
-        if asked.guess is not None:
+        if asked.guess is not None and i < len(asked.guess):
             found = loading.equilibrium(loading.guessed(asked.guess[i]), level)
+        if found is None and asked.guess is not None and not path:
+            found = _from_guess(loading, levels, asked.guess)
         if found is None and path:
             start = loading.ahead(known, path, level)
             found = loading.reached(known[-1], path[-1], level, start, loading.most_cuts)
@@ -261,6 +263,16 @@ def march(
         path.append(found)
         if asked.tell is not None:
             asked.tell(Done(done + i + 1))
+
+
+def _from_guess(loading: Loading, levels: Sequence[float] | Array, guess: Array) -> Array | None:
+    """Return the first equilibrium, back from the first level whose guess leads to one."""
+    for level, start in list(zip(levels, guess, strict=False))[1:]:
+        above = loading.equilibrium(loading.guessed(start), level)
+        if above is not None:
+            begin = loading.onward(above, level, levels[0], None)
+            return loading.reached(level, above, levels[0], begin, loading.most_cuts)
+    return None
 
 
 def reach(

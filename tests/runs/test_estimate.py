@@ -20,7 +20,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import in_process
 from ..places import EXAMPLES, KNOWN
-from ..projects import edited, project_file
+from ..projects import edited, project_file, small
 
 LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 PRESSURES = (0.05, 0.1)
@@ -185,3 +185,20 @@ def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
     (gap,) = found.gaps
     assert 10 < gap.chi < 500 and 0.3 < np.linalg.norm(gap.field, axis=1).max() < 10
     assert found.problem.analyses < 40 and GAP in [note.kind for note in found.notes]
+
+
+def test_a_finer_mesh_begins_at_the_equilibrium_of_the_coarse_one(tmp_path):
+    sheet = "[bubble.sheet]\nmodes = 1\n\n[bubble.nuisance]"
+    project = bf.read_project(small(tmp_path, ("[bubble.nuisance]", sheet)))
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    problem, (prepared,) = setup.problem(), setup.tests
+    (own,) = problem.comparisons
+    (finer,) = replace(prepared, by_this_model=False).finer(
+        setup.make_solver, setup.weightings[0], 2.0
+    )
+    nuisance = {n.name: 3.0 * (-1) ** k for k, n in enumerate(own.nuisance)}
+    law, free = prepared.known, problem.unknowns.free
+    beside = own.run(law, free, nuisance, False)
+    cold, led = (finer.run(law, free, nuisance, False, one) for one in (None, beside))
+    assert np.abs(cold.path - led.path).max() < 1e-6 * np.abs(cold.path).max()
+    assert led.iterations < cold.iterations
