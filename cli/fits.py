@@ -35,8 +35,8 @@ fit_options = given.with_checks(
     click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
     click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
     click.option(
-        "--starts-from", type=click.Choice(["random", "sobol", "proposed"]),
-        help="Where starts begin: drawn, spread evenly, or by an earlier fit.",
+        "--starts-from", type=click.Choice(["random", "sobol", "proposed", "estimate"]),
+        help="Where starts begin: drawn, spread evenly, by an earlier fit, or one at the estimate.",
     ),
     click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
     given.JOBS,
@@ -252,6 +252,8 @@ def start_lines(fit: Fit) -> list[str]:
         f"{result['objective_is']}: best {fit.objective:.3g}, median {middle:.3g}; "
         f"{result['analyses']} analyses{external}, {result['wall_s']:.0f} s"
     ]
+    if fit.project.fit.starts_from == "estimate":
+        lines.append(fit.agreement)
     return [*lines, f"coarse to fine: {fit.stages}"] if fit.stages else lines
 
 

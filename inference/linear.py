@@ -359,9 +359,9 @@ def residual_of(
 ) -> Array:
     """Return (m,) the residual of other models at the best unknowns; raises SolverFailure."""
     unknowns, parts = problem.unknowns, []
-    for comparison, own in zip(comparisons, best.histories, strict=True):
+    for comparison, beside in zip(comparisons, best.histories, strict=True):
         nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
-        history = comparison.run(law, unknowns.free, nuisance, False, own)
+        history = comparison.run(law, unknowns.free, nuisance, False, beside)
         parts.append(comparison.objective.residual(history, nuisance))
     rows = np.concatenate(parts)
     own = sum(sum(c.objective.sizes) for c in problem.comparisons)

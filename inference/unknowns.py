@@ -342,6 +342,18 @@ class RandomStarts:
             yield from draws[allowed(unknowns, draws)]
 
 
+@dataclass(frozen=True, eq=False)
+class EstimatedStarts:
+    """One start at estimated coefficients (size,) MPa, the others drawn at random."""
+
+    coefficients: Array
+
+    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
+        if number == 0:
+            yield self.coefficients
+        yield from RandomStarts().candidates(unknowns, seed, number)
+
+
 @dataclass(frozen=True)
 class SobolStarts:
     """Starts spread evenly: start k is allowed point k of the sequence that the seed scrambles.

@@ -108,7 +108,7 @@ class FitSection(Section):
 
     starts: Annotated[int, Field(ge=1)] = 50
     seed: Annotated[int, Field(ge=0)] = 1
-    starts_from: Literal["random", "sobol", "proposed"] = "random"
+    starts_from: Literal["random", "sobol", "proposed", "estimate"] = "random"
     earlier: Name | None = None
     method: Name = "lm"
     gradient: Literal["exact", "differences"] = "exact"

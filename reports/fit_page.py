@@ -195,6 +195,7 @@ def found_by(fit: Fit) -> list[tuple[str, object]]:
         (f"objective: {fit.setup.objective_is}", fit.objective),
         ("method", f"{project.fit.method} on {project.fit.solver}"),
         ("starts", f"{len(best.ranked)} feasible of {len(best.records)}"),
+        *([("agreement", fit.agreement)] if fit.agreement else []),
         *([("coarse to fine", fit.stages)] if fit.stages else []),
         ("analyses", result["analyses"]),
         *([(f"of them by {project.fit.solver}", runs)] if runs or cached else []),

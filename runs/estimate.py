@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,12 +19,15 @@ from ..inference.comparison import Comparison
 from ..inference.descent import bounded_step, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
+from ..inference.unknowns import EstimatedStarts
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
 from ..project.project import Project
 from .best import LEAST_STRAIN, BestFit
 from .result import answers
 from .setup import FitSetup, prepare_fit
+
+log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 METHOD = "virtual work"
@@ -152,6 +156,18 @@ def estimate_of(setup: FitSetup) -> Estimate:
             notes.append(Note(GAP, UNBALANCED.format(gap.chi), gap.name))
     seconds = time.process_time() - begun
     return Estimate(setup, problem, replace(best, certainty=sure), gaps, seconds, tuple(notes))
+
+
+def with_start(setup: FitSetup) -> FitSetup:
+    """Return a fit whose first start is the estimate, if that is asked for and there is one."""
+    if setup.project.fit.starts_from != "estimate":
+        return setup
+    try:
+        found = estimate_of(setup)
+    except (InputError, SolverFailure) as error:
+        log.warning("all starts are drawn at random: %s", str(error).splitlines()[0])
+        return setup
+    return replace(setup, starts=EstimatedStarts(found.best.point.coefficients))
 
 
 def _comparisons(setup: FitSetup, test: PreparedTest) -> Sequence[Comparison]:

@@ -32,8 +32,8 @@ from ..materials.forms.base import COMPONENTS
 from ..project.objects import Definition, Law, plain
 from ..project.project import Project, settings_of
 from ..solvers.base import Solver
-from .best import BestFit, best_fit, with_certainty
-from .estimate import Estimate, estimate_of
+from .best import BestFit, best_fit, ranking, with_certainty
+from .estimate import Estimate, estimate_of, with_start
 from .executor import Task, executor_of
 from .folder import (
     NAMES,
@@ -109,6 +109,36 @@ def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
         strain = np.linspace(0.0, ends[component], POINTS)
         apart.append(np.abs(one.modulus(name, strain) / other.modulus(name, strain) - 1.0).max())
     return float(max(apart))
+
+
+#: Times as many starts are wanted where the best optimum was found once.
+MORE = 5
+#: Relative difference of objectives that are as good as each other.
+AS_GOOD = 1e-4
+
+
+def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> str:
+    """Describe whether starts end in one optimum, or that more are wanted; "" for one start."""
+    ended = [record for record in ranking(records) if record.objective is not None]
+    if len(ended) < 2:
+        return ""
+    room = project.fit.tolerance
+    groups = distinct(problem, ended, room)
+    alike = next(group for group in groups if ended[0] in group)
+    # Moduli that no test determines may differ where nothing else does.
+    least = (ended[0].objective or 0.0) * (1 + AS_GOOD) + room
+    best = sum(one in alike or (one.objective or 0.0) <= least for one in ended)
+    first = " (the first begins at the estimate)"
+    said = f"starts{first if project.fit.starts_from == 'estimate' else ''} end in"
+    if best == len(ended):
+        return f"all {best} {said} the same optimum"
+    if best > 1:
+        return f"{best} of {len(ended)} {said} the best optimum, the others in worse ones"
+    return (
+        f"only one of {len(ended)} {said} the best optimum (objective {ended[0].objective:.4g}, "
+        f"the next {ended[1].objective:.4g}): there may be a better one, and more starts are "
+        f"wanted (--starts {MORE * len(ended)} --starts-from random)"
+    )
 
 
 Event = EvaluationRecord | StartRecord
@@ -256,7 +286,8 @@ def fit(
         of their own.
     starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
     scheduler : address of a Dask scheduler, whose workers run the starts.
-    starts_from, earlier : "random", "sobol" (spread evenly) or "proposed", from the evaluations in
+    starts_from, earlier : "random", "sobol" (spread evenly), "estimate" (the first at the moduli by
+        virtual work, the others drawn) or "proposed", from the evaluations in
         the folder `earlier`.
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
@@ -289,7 +320,7 @@ def fit(
     tell = listener(progress)
     tell(Stage("tests to read", len(chosen)))
     with timed("tests and their data made ready"):
-        setup = prepare_fit(project, chosen)
+        setup = with_start(prepare_fit(project, chosen))
     problem = setup.problem()
     judgements = judge(setup)
     for judgement in judgements:
@@ -318,7 +349,8 @@ def fit(
             records = _records(setup, files, done, tell)
         with one_blas_thread(), timed("the best fit once more, and how sure it is"):
             best = with_certainty(setup, problem, _best(problem, records, project))
-    return Fit(setup, problem, best, time.perf_counter() - begun, record, judgements)
+    seconds, agreed = time.perf_counter() - begun, agreement(problem, best.records, project)
+    return Fit(setup, problem, best, seconds, record, judgements, agreed)
 
 
 def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> BestFit:

@@ -63,7 +63,10 @@ PLACES = 61
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
-    """The result of a fit; best : of the starts, run once more from the unloaded state."""
+    """The result of a fit; best : of the starts, run once more from the unloaded state.
+
+    agreement : words on whether starts ended in one optimum.
+    """
 
     setup: FitSetup
     problem: FitProblem
@@ -71,6 +74,7 @@ class Fit:
     wall_s: float
     record: Record | None = None
     judgements: tuple[Judgement, ...] = ()
+    agreement: str = ""
 
     @property
     def project(self) -> Project:

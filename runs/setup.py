@@ -28,6 +28,7 @@ from ..inference.comparison import Comparison, Nuisance, OwnObjective
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
 from ..inference.unknowns import (
+    EstimatedStarts,
     LawBounds,
     ProposedStarts,
     RandomStarts,
@@ -357,7 +358,7 @@ class FitSetup:
             )
         ]
         problem = self.problem_of(comparisons)
-        if masks is not None and isinstance(self.starts, ProposedStarts):
+        if masks is not None and isinstance(self.starts, (ProposedStarts, EstimatedStarts)):
             problem.starts = RandomStarts()  # nothing of the points left out may be in them
         return problem
 

@@ -12,9 +12,10 @@ from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, MeasuredShape
 from bubblefit.meshes.disk import disk_mesh, disk_modes
-from bubblefit.runs.estimate import GAP, estimate_of
-from bubblefit.runs.fit import check
+from bubblefit.runs.estimate import GAP, estimate_of, with_start
+from bubblefit.runs.fit import agreement, check
 from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.starts import StartRecord
 from bubblefit.solvers.membrane import factorisation
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
@@ -202,3 +203,36 @@ def test_a_finer_mesh_begins_at_the_equilibrium_of_the_coarse_one(tmp_path):
     cold, led = (finer.run(law, free, nuisance, False, one) for one in (None, beside))
     assert np.abs(cold.path - led.path).max() < 1e-6 * np.abs(cold.path).max()
     assert led.iterations < cold.iterations
+
+
+def test_one_start_begins_at_the_estimate_and_all_agree(tmp_path):
+    path = project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 240"))
+    found = bf.fit(bf.read_project(path), starts=3, starts_from="estimate", jobs=1)
+    first, *others = found.best.records
+    assert first.analyses < min(one.analyses for one in others)
+    assert "all 3" in found.agreement and "estimate" in found.agreement
+    assert found.objective < 1e-6
+
+
+def record(number, objective, beta):
+    return StartRecord(
+        number, (1, number), objective, "converged", 9, beta, beta, 1.0, reached=(0.1, 0.1, 0.1)
+    )
+
+
+def test_starts_that_differ_are_said_to_want_more(known):
+    problem, project = known.problem(), known.project
+    one, other = (tuple(size * np.ones(problem.unknowns.count)) for size in (1.0, 1.2))
+    records = [record(0, 0.1, one), record(1, 0.2, other), record(2, 0.2, other)]
+    assert "only one of 3" in agreement(problem, records, project)
+    assert "2 of 3" in agreement(problem, [*records[1:], record(0, 0.3, one)], project)
+    # Moduli that nothing determines may differ.
+    assert "all 2" in agreement(problem, [record(0, 0.1, one), record(1, 0.1, other)], project)
+    assert agreement(problem, records[:1], project) == ""
+
+
+def test_without_an_estimate_all_starts_are_random(tmp_path):
+    sheet = "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
+    project = edited(tmp_path, "[bubble.nuisance]", sheet).with_fit(starts_from="estimate")
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    assert with_start(setup) is setup
