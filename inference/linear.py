@@ -359,9 +359,11 @@ def residual_of(
 ) -> Array:
     """Return (m,) the residual of other models at the best unknowns; raises SolverFailure."""
     unknowns, parts = problem.unknowns, []
-    for comparison, beside in zip(comparisons, best.histories, strict=True):
+    names = [comparison.name for comparison in problem.comparisons]
+    ran = dict(zip(names, best.histories, strict=False))  # of known derivatives alone there is none
+    for comparison in comparisons:
         nuisance = unknowns.nuisance_values(comparison.name, best.unknowns)
-        history = comparison.run(law, unknowns.free, nuisance, False, beside)
+        history = comparison.run(law, unknowns.free, nuisance, False, ran.get(comparison.name))
         parts.append(comparison.objective.residual(history, nuisance))
     rows = np.concatenate(parts)
     own = sum(sum(c.objective.sizes) for c in problem.comparisons)
