@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
-from ..materials.card import MaterialCard, positive, thickness_difference
+from ..materials.card import MaterialCard, State, positive, thickness_difference
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
@@ -43,6 +43,7 @@ BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
 UNMATCHED = NoteKind("unmatched direction", weight=9)
 DOUBTFUL = NoteKind("doubtful data", weight=12)
 READING = NoteKind("how a file was read")
+STATES = NoteKind("tests in different states", weight=9)
 
 #: A file below the output folder, and its caption or what it is.
 Shown = tuple[str, str]
@@ -515,6 +516,39 @@ def beyond_range(reached: Array, ends: Array) -> list[Note]:
     )
     found = beyond(reached, ends)
     return [Note(BEYOND_LAW, words.format(name, *in_percent(*two))) for name, *two in found]
+
+
+#: How strips say that they were not conditioned; and rates that differ by more are no longer one.
+NONE, RATES = frozenset(("none", "no", "0", "without", "keine", "ohne")), 2.0
+
+
+def state_said(conditioning: str | None) -> State:
+    """Return the state of a fabric by the words for its conditioning; "" where nothing is said."""
+    if conditioning is None:
+        return ""
+    return "first loading" if conditioning.strip().casefold() in NONE else "conditioned"
+
+
+def state_of(tests: Sequence[Test]) -> State:
+    """Return the state of all tests where strips say one and no other test is in another."""
+    states: set[Any] = {s for t in tests if (s := getattr(t, "state", ""))}
+    said = any(getattr(t, "conditioning", None) for t in tests)
+    return states.pop() if said and len(states) == 1 else ""
+
+
+def notes_of_states(tests: Iterable[Test]) -> list[Note]:
+    """Note tests that are fitted together in different states of the fabric or at other rates."""
+    every = list(tests)
+    states = {t.name: said for t in every if (said := getattr(t, "state", ""))}
+    rates = {t.name: rate for t in every if (rate := getattr(t, "rate", None))}
+    found = []
+    if len({*states.values()}) > 1:
+        words = ", ".join(f"{name}: {said}" for name, said in states.items())
+        found.append(Note(STATES, f"joined tests differ in state ({words}): one law is not both"))
+    if rates and max(rates.values()) > RATES * min(rates.values()):
+        words = ", ".join(f"{name}: {rate:g} mm/min" for name, rate in rates.items())
+        found.append(Note(STATES, f"joined tests differ in rate ({words})"))
+    return found
 
 
 def notes_of(history: History, card: MaterialCard) -> list[Note]:

@@ -20,6 +20,8 @@ from ..experiments.kinds import (
     PreparedTest,
     beyond_range,
     by_strain,
+    notes_of_states,
+    state_of,
     strains_of,
     unstable_words,
 )
@@ -108,7 +110,8 @@ class Fit:
             source += ", error of the mesh taken out"
         law = replace(self.law, strain_range=self.best.valid)
         sure = card_certainty(self.problem, self.best, law, list(self.tests))
-        return MaterialCard(law, self.thickness, self.project.title, source, sure)
+        state = state_of([prepared.test for prepared in self.setup.tests])
+        return MaterialCard(law, self.thickness, self.project.title, source, sure, state)
 
     @property
     def thickness(self) -> float:
@@ -617,6 +620,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     """Return the notes for page, terminal and json; pins : of `pinned_numbers`."""
     best, several = fit.best, len(fit.problem.comparisons) > 1
     notes = list(best.certainty.undetermined) if best.certainty is not None else []
+    notes += notes_of_states(prepared.test for prepared in fit.setup.tests)
     notes += notes_of_verdicts(fit.verdicts)
     if cut := [record for record in best.records if record.failure]:
         said = f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "

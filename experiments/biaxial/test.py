@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
 from ...files import is_file
+from ...materials.card import State
 from ...meshes.strip_models import PatchModel
 from ...readers.sections import Length, Name, Number, Positive, Section, beside
 from ..kinds import Place, Reach, Refined, named_format
@@ -164,6 +165,12 @@ class BiaxialTest:
     section: BiaxialSection
     noise: float | None = None
     kind: str = "biaxial"
+
+    @property
+    def state(self) -> State:
+        """Return "conditioned" where a cycle before those that are evaluated was not the first."""
+        later = any(path.cycle.count > 1 for path in self.data.paths)
+        return "conditioned" if later else "first loading"
 
     @property
     def reads_files(self) -> bool:

@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import pairwise
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
@@ -129,6 +130,7 @@ class BubbleTest:
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
     registration: Mapping[str, float] = field(default_factory=dict)
     kind: str = "bubble"
+    state: ClassVar[State] = "first loading"
 
     @property
     def radius(self) -> float:

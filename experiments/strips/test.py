@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
 from ...files import is_file
+from ...materials.card import State
 from ...meshes.strip_models import (
     GRIP_DISTANCE,
     WIDTH,
@@ -36,7 +37,7 @@ from ...readers.curves import (
     split_at_restarts,
 )
 from ...readers.sections import Length, Name, Positive, Section, beside
-from ..kinds import Place, Reach, Refined, named_format
+from ..kinds import Place, Reach, Refined, named_format, state_said
 from .data import Strip
 
 Mask = NDArray[np.bool_]
@@ -150,6 +151,11 @@ class StripsTest:
     conditioning: str | None = None
     kind: str = "strips"
     reads_files = True
+
+    @property
+    def state(self) -> State:
+        """Return "first loading" or "conditioned", as the key `conditioning` says; else ""."""
+        return state_said(self.conditioning)
 
     @property
     def thickness(self) -> float:

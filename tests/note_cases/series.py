@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import Note, NoteKind
+from bubblefit.experiments import kinds
 from bubblefit.experiments import registry as experiments
+from bubblefit.experiments.kinds import state_said
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports import subroutines
@@ -101,6 +104,14 @@ def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
     load_cycles.write(travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain))
     faulty = list(load_cycles.faulty(folder).values())
     return [*bf.cycles(faulty).notes, *bf.cycles(travel, length=200.0).notes]
+
+
+def notes_of_states(*_: Any) -> list[Note]:
+    said = {"bubble": "first loading", "one": state_said("3 cycles to 5 kN/m"), "two": "",
+            "three": state_said("None")}  # fmt: skip
+    rates = {"one": 100.0, "two": 10.0, "three": None}
+    tests: Any = [SimpleNamespace(name=n, state=s, rate=rates.get(n)) for n, s in said.items()]
+    return kinds.notes_of_states(tests)
 
 
 def notes_of_exports(*_: Any) -> list[Note]:

@@ -5,11 +5,13 @@ import json
 import math
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bubblefit import cycles
 from bubblefit.errors import InputError
+from bubblefit.experiments import kinds
 from bubblefit.experiments.strips.cycles import (
     DRIFT,
     SLIP,
@@ -267,3 +269,16 @@ def test_left_out_cycles_of_cords_are_predicted(shared_data):
         assert table["permanent_strain_off"].abs().max() < 0.001
         count += 1
     assert count >= 2
+
+
+def test_a_card_says_the_state_that_its_strips_say():
+    def state(*tests):
+        return kinds.state_of([SimpleNamespace(**test) for test in tests])
+
+    bubble, silent = {"state": "first loading"}, {"state": "", "conditioning": None}
+    first, third = (
+        {"state": kinds.state_said(words), "conditioning": words} for words in ("none", "3 cycles")
+    )
+    assert [state(bubble), state(silent), state(bubble, silent)] == ["", "", ""]
+    assert state(bubble, first) == state(first, silent) == "first loading"
+    assert (state(third), state(bubble, third)) == ("conditioned", "")
