@@ -84,6 +84,11 @@ class BeamBodies:
     collar_length: float
     collars: tuple[float, ...] = (0.0,)
 
+    @property
+    def name(self) -> str:
+        """Return the name of what loads the beam."""
+        return "collar" if self.collars == (0.0,) else "strap"
+
 
 def bending_charts(
     panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
@@ -211,7 +216,7 @@ def beam_charts(
     whole = Chart(title, *axes, side, f"{title}: the bent beam from the side",
                   x_range=(-1.03 * ends, 1.03 * ends), y_range=(low - 20, high + 20),
                   **scale)  # fmt: skip
-    close = Chart("at the collar", *axes, side, "the bent beam at the collar",
+    close = Chart(f"at the {bodies.name}", *axes, side, f"the bent beam at the {bodies.name}",
                   x_range=(at - reach, at + reach), y_range=(middle - tall, middle + tall),
                   **scale)  # fmt: skip
     return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=1)
@@ -231,7 +236,7 @@ def _supports(bodies: BeamBodies) -> list[Series]:
     for z in bodies.collars:
         for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
             x = [z - half, z + half, z + half, z - half, z - half]
-            series.append(line("collar", x, [y, y, y + WALL, y + WALL, y], colour=0))
+            series.append(line(bodies.name, x, [y, y, y + WALL, y + WALL, y], colour=0))
     return series
 
 

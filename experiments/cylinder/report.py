@@ -81,17 +81,18 @@ def whole_beam(model: CylinderModel | BeamModel, run: BendingRun) -> Beam:
     return Beam(Mesh(points, quads, sets, {}, warp), moves[0], moves[1])
 
 
-def _axis(position: Array) -> tuple[Array, Array]:
-    """Return z and y (mm) of the axis of a beam's surface, row by row."""
-    rows, row = np.unique(np.round(position[:, 2], 3), return_inverse=True)
-    return rows, np.bincount(row, position[:, 1]) / np.bincount(row)
+def _axis(beam: Beam) -> tuple[Array, Array]:
+    """Return z (mm, before bending) and y of the axis of the bent beam, row by row."""
+    rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
+    height = (beam.mesh.points + beam.bent)[:, 1]
+    return rows, np.bincount(row, height) / np.bincount(row)
 
 
 def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -> BeamBodies:
     """Return supports and collar, placed to touch the inflated beam."""
     if isinstance(model, BeamModel):
         z, size = model.supports.span, model.supports.diameter
-        strap = np.interp(0.5 * model.load_spacing, *_axis(beam.mesh.points + beam.bent))
+        strap = np.interp(0.5 * model.load_spacing, *_axis(beam))
         spots = sorted({-0.5 * model.load_spacing, 0.5 * model.load_spacing})
         low = -max(model.roller_below, model.section.radius + 0.5 * size)
         return BeamBodies(

@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.experiments.cylinder import report
-from bubblefit.experiments.cylinder.predicted import run_of
+from bubblefit.experiments.cylinder.predicted import BendingRun, run_of
 from bubblefit.experiments.cylinder.report import bodies_of, whole_beam
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeSection
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.mesh import enclosed_volume, surface_strain
+from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
 from ...cylinder_cases import ran
@@ -131,3 +133,13 @@ def test_the_colours_are_strains_along_the_axis_at_the_end(quarter, picture):
         assert same(corners, np.concatenate([at, at * [-1.0, 1.0]]))
     assert picture.charts[0].scale == "log strain along the axis"
     assert picture.charts[0].title == "150 mm, 140 kPa"
+
+
+def test_straps_of_a_beam_hang_on_its_bent_axis():
+    wall = PlainWall(400.0, 300.0, 60.0, wrinkles=False)
+    model = BeamModel(TubeSection(170.0, 0.1, wall), 3000.0, [100.0], 1000.0, roller_below=300.0)
+    history = MembraneSolver().run(model, HypoelasticLaw.linear(1.0, 1.0, 1.0))
+    run = BendingRun(*([0.0, 100.0],) * 4, history.displacement[0], history.displacement[-1], [])
+    bodies = bodies_of(model, whole_beam(model, run), 100.0)
+    assert bodies.collars == (-500.0, 500.0) and -100.0 < bodies.collar_height < -75.0
+    assert bodies.supports == ((-1500.0, -300.0), (1500.0, -300.0))
