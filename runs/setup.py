@@ -371,6 +371,11 @@ class FitSetup:
             return tuple(comparisons)
         weight = weighting.weight / len(comparisons) if weighting.relative else 1.0
         for one in comparisons:
+            if not hasattr(one.objective, "columns"):
+                problem = (
+                    f"expected no function: {test.test.kind} tests have an objective of their own"
+                )
+                raise InputError(test.test.name, "objective", problem)
             own = OwnObjective(one.objective, function, weighting.relative, weight)
             more = float(np.median(one.objective.scale) / np.median(own.scale))
             priors = tuple(replace(n, weight=more * n.weight) for n in one.nuisance)

@@ -23,7 +23,7 @@ from bubblefit.runs.setup import fingerprints, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 from bubblefit.solvers.base import WrappedSolver
 
-from ..places import ROOT
+from ..places import EXAMPLES, ROOT
 from ..projects import constant_strips, small, with_form
 
 RANGE = (0.13, 0.12, 0.1)
@@ -320,6 +320,9 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
     with pytest.raises(InputError) as error:
         prepared(changing).problem()
     assert error.value.field == "objective"
+    cruciform = read_project(EXAMPLES / "biaxial-computed" / "project.toml")
+    with pytest.raises(InputError, match="biaxial tests have an objective of their own"):
+        prepared(cruciform.with_objective("biaxial", np.subtract)).problem()
 
 
 def test_the_script_of_the_documents(tmp_path):
