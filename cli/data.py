@@ -22,13 +22,8 @@ from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest
+from ..experiments.strips import gauge
 from ..experiments.strips.cycles import cycles
-from ..experiments.strips.gauge import (
-    GaugeTable,
-    PairedLoads,
-    loads_at_frames,
-    virtual_strain_gauge,
-)
 from ..files import __version__, replacing
 from ..materials.designers import Options
 from ..project.project import read_project
@@ -90,18 +85,10 @@ AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print the outcom
 #: Arguments that are options of the same name.
 ARGUMENTS = "|".join(
     [
-        *OF_LOADS,
-        "columns",
-        "max_gap",
-        "flag_column",
-        "format",
-        "length_unit",
-        "reference_load",
-        "length",
-        "width",
-        "strain_unit",
+        *OF_LOADS, "columns", "max_gap", "flag_column", "format", "length_unit", "reference_load",
+        "length", "width", "strain_unit",
     ]
-)
+)  # fmt: skip
 
 
 @command(
@@ -154,9 +141,9 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         check_out(out, [*files, options["loads"], options["frame_times"]], options["overwrite"])
         read = _frames(files, options, QUANTITIES, planar=True)
         lower, upper = options["lower"], options["upper"]
-        record = virtual_strain_gauge(read, lower, upper, options["max_gap"])
+        record = gauge.virtual_strain_gauge(read, lower, upper, options["max_gap"])
         names = [frame.path.name if frame.path else "" for frame in read]
-        table = GaugeTable(names, lower, upper, record, note=note)
+        table = gauge.GaugeTable(names, lower, upper, record, note=note)
         # Before the loads, whose error may have this cause.
         for words in dict.fromkeys(note for frame in read for note in frame.source.notes):
             click.echo(f"note: {words}", err=True)
@@ -164,7 +151,7 @@ def gauge_command(frames: tuple[str, ...], out: Path, **options: Any) -> None:
         for one in said:
             click.echo(f"warning: {one.line}", err=True)
         if loads is not None:
-            table = replace(table, curve=loads_at_frames(record, loads))
+            table = replace(table, curve=gauge.loads_at_frames(record, loads))
     table.write(out)
     result = {"command": "gauge", "out": str(out), **table.numbers()}
     more = note_lines([note for note in table.notes if note not in said])
@@ -181,7 +168,7 @@ def _frames(
     return read_frames(files, asked, options["format"])
 
 
-def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
+def _loads(options: Mapping[str, Any], name: str) -> gauge.PairedLoads | None:
     """Return the loads of the options, None without --loads. `name` : of the specimen."""
     given = {key: options[key] for key in OF_LOADS if options[key] is not None}
     if options["loads"] is None:
@@ -192,7 +179,7 @@ def _loads(options: Mapping[str, Any], name: str) -> PairedLoads | None:
         problem = "this option is missing; a load curve needs it: warp, fill or bias"
         raise InputError(None, "direction", problem)
     given["format"] = given.pop("load_format", None)
-    return PairedLoads(options["loads"], **{"specimen": name, **given})
+    return gauge.PairedLoads(options["loads"], **{"specimen": name, **given})
 
 
 @contextmanager
@@ -287,23 +274,6 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         ]
         save(out.with_suffix(".png"), sphere_charts(drawn))
         result["out"] = [str(out), str(out.with_suffix(".png"))]
-    show(result, _sphere_lines(result), as_json)
-
-
-def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
-    pairs = list(zip("xyz", one.centre.tolist(), one.centre_error.tolist(), strict=True))
-    row: dict[str, Any] = {"frame": name, "points": int(one.kept.sum()), "left_out": one.left_out}
-    row |= {"radius_mm": one.radius, "radius_error_mm": one.radius_error}
-    row |= {f"{axis}_mm": value for axis, value, _ in pairs}
-    row |= {f"{axis}_error_mm": error for axis, _, error in pairs}
-    row["rms_mm"] = one.rms
-    if radius is not None:
-        row["deviation_percent"] = 100 * (one.radius / radius - 1)
-    return row
-
-
-def _sphere_lines(result: dict[str, Any]) -> list[str]:
-    """Return a table for the terminal."""
     known = "radius_mm" in result
     head = ["frame", "points", "left out", "radius, mm", "+-", "centre, mm", "RMS, mm"]
     cells = [[*head, *(["off, %"] if known else [])]]
@@ -321,18 +291,28 @@ def _sphere_lines(result: dict[str, Any]) -> list[str]:
         )
     if "out" in result:
         lines.append(f"written to {' and '.join(result['out'])}")
-    return lines
+    show(result, lines, as_json)
+
+
+def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
+    pairs = list(zip("xyz", one.centre.tolist(), one.centre_error.tolist(), strict=True))
+    row: dict[str, Any] = {"frame": name, "points": int(one.kept.sum()), "left_out": one.left_out}
+    row |= {"radius_mm": one.radius, "radius_error_mm": one.radius_error}
+    row |= {f"{axis}_mm": value for axis, value, _ in pairs}
+    row |= {f"{axis}_error_mm": error for axis, _, error in pairs}
+    row["rms_mm"] = one.rms
+    if radius is not None:
+        row["deviation_percent"] = 100 * (one.radius / radius - 1)
+    return row
 
 
 dic_command.add_command(dic_sphere)
 
 
 @command(
-    "biaxial",
-    "bubblefit biaxial project.toml",
-    "bubblefit biaxial project.toml --paths 10 --free",
+    "biaxial", "bubblefit biaxial project.toml", "bubblefit biaxial project.toml --paths 10 --free",
     "bubblefit biaxial project.toml --ratio 1:1 --ratio 2:1 --out out/two-ratios",
-)
+)  # fmt: skip
 @given.PROJECT
 @given.TESTS
 @click.option("--paths", type=click.Choice(["8", "10"]), default="8", show_default=True,
@@ -409,10 +389,8 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     with _naming_options():
         found = cycles(files, **options)
     tables = {
-        "cycles": found.table,
-        "holds": found.holds,
-        "notes": pd.DataFrame(note_rows(found.notes)),
-    }
+        "cycles": found.table, "holds": found.holds, "notes": pd.DataFrame(note_rows(found.notes)),
+    }  # fmt: skip
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}
     for name, table in tables.items():

@@ -69,11 +69,9 @@ def fit_command(**options: Any) -> None:
 
 
 @command(
-    "bubble",
-    "bubblefit bubble project.toml",
-    "bubblefit bubble project.toml --starts 4 --jobs 2",
+    "bubble", "bubblefit bubble project.toml", "bubblefit bubble project.toml --starts 4 --jobs 2",
     "bubblefit bubble project.toml --data measured --resume",
-)
+)  # fmt: skip
 @fit_options
 def bubble_command(**options: Any) -> None:
     """Fit the moduli of PROJECT.toml to its bubble inflation tests only.
@@ -151,31 +149,43 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
         )  # fmt: skip
     with timed(f"card, tables and figures in {folder}"):
         result.report(folder)
-    _end(result, folder, options["fail_above"], options["as_json"])
-
-
-def _end(fit: Fit, folder: Path, fail_above: float | None, as_json: bool) -> None:
-    """Print the outcome; exit 1 when the best fit is worse than asked for."""
-    show(fit.result, lines_of(fit, folder, every=verbose()), as_json)
-    if fail_above is not None and fit.objective > fail_above:
-        said = f"{fit.objective:.4g} is left of the objective, above {fail_above:g}"
+    fail_above = options["fail_above"]
+    show(result.result, lines_of(result, folder, every=verbose()), options["as_json"])
+    if fail_above is not None and result.objective > fail_above:
+        said = f"{result.objective:.4g} is left of the objective, above {fail_above:g}"
         click.echo(f"bubblefit: --fail-above: {said}", err=True)
         sys.exit(WORSE)
 
 
 def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
-    from ..reports.fit_page import verdict_words
+    from ..reports.fit_page import sigma_words, verdict_words
 
+    lines = [
+        f"{verdict.name}: {verdict.words}"
+        for verdict in fit.verdicts
+        if verdict.shared or verdict.prior is None
+    ]
+    for source, sigmas in fit.result.get("pinned", {}).items():
+        parts = ", ".join(
+            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
+            for name, s in sigmas.items()
+        )
+        lines.append(f"1 sigma by the noise, from {source}: {parts}")
+    misfits = []
+    for comparison, m in fit.misfits.items():
+        times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
+        beside = times if m.noise > 0 else "no noise to compare with"
+        misfits.append(f"misfit of {comparison}: {m.rms:.3g} {m.unit} RMS, {beside}")
     return [
         *modulus_lines(fit),
-        *misfit_lines(fit),
+        *misfits,
         *(
             f"{name}: {line}" if len(fit.findings) > 1 else line
             for name, findings in fit.findings.items()
             for line in findings.lines
         ),
-        *sure_lines(fit),
+        *lines,
         *start_lines(fit),
         *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
         verdict_words(fit),
@@ -209,34 +219,6 @@ def modulus_lines(fit: Answered) -> list[str]:
             f"{name:15}{100 * one.strain:>6.3g} %{one.value:>10.4g}{sigma:>10}{band:>20}"
             f"{one.per_width:>10.4g}{'  (end)' if one.end else ''}"
         )
-    return lines
-
-
-def misfit_lines(fit: Fit) -> list[str]:
-    """Return the RMS misfit of every comparison beside the noise of its data."""
-    lines = []
-    for name, m in fit.misfits.items():
-        times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
-        beside = times if m.noise > 0 else "no noise to compare with"
-        lines.append(f"misfit of {name}: {m.rms:.3g} {m.unit} RMS, {beside}")
-    return lines
-
-
-def sure_lines(fit: Fit) -> list[str]:
-    """Return the unknowns beside the moduli, and one sigma of the moduli from each test."""
-    from ..reports.fit_page import sigma_words
-
-    lines = [
-        f"{verdict.name}: {verdict.words}"
-        for verdict in fit.verdicts
-        if verdict.shared or verdict.prior is None
-    ]
-    for source, sigmas in fit.result.get("pinned", {}).items():
-        parts = ", ".join(
-            f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"
-            for name, s in sigmas.items()
-        )
-        lines.append(f"1 sigma by the noise, from {source}: {parts}")
     return lines
 
 

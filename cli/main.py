@@ -10,15 +10,7 @@ from typing import Any
 import click
 
 from ..files import __version__
-from .terminal import (
-    COMMAND_LINE,
-    VERBOSE,
-    Suggesting,
-    examples,
-    in_one_line,
-    listen,
-    with_common_options,
-)
+from . import terminal
 
 #: Module of each command, which defines NAME_command, and its line in the help.
 COMMANDS = {
@@ -53,7 +45,7 @@ COMMANDS = {
 }
 
 
-class LazyGroup(Suggesting):
+class LazyGroup(terminal.Suggesting):
     """Import a command only when it is called, and print usage errors in one line."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
@@ -67,13 +59,13 @@ class LazyGroup(Suggesting):
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
         given = ["bubblefit", *args]  # parsing eats them
-        with in_one_line():
+        with terminal.in_one_line():
             context = super().make_context(info_name, args, parent, **extra)
-        context.meta[COMMAND_LINE] = given
+        context.meta[terminal.COMMAND_LINE] = given
         return context
 
     def invoke(self, ctx: click.Context) -> Any:
-        with in_one_line():
+        with terminal.in_one_line():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -83,7 +75,7 @@ class LazyGroup(Suggesting):
         if name not in COMMANDS:
             return None
         module = importlib.import_module(f".{COMMANDS[name][0]}", __package__)
-        return with_common_options(getattr(module, f"{name}_command"))
+        return terminal.with_common_options(getattr(module, f"{name}_command"))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -94,16 +86,16 @@ class LazyGroup(Suggesting):
     "bubblefit",
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=examples(
+    epilog=terminal.examples(
         "bubblefit init mine", "bubblefit fit mine/project.toml", "bubblefit fit --help"
     ),
 )
 @click.version_option(__version__, prog_name="bubblefit")
-@click.option("--verbose", is_flag=True, help=VERBOSE)
+@click.option("--verbose", is_flag=True, help=terminal.VERBOSE)
 def main(verbose: bool) -> None:
     """Identify the material law of a coated fabric from tests.
 
     Exit codes: 0 success, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
     4 the solver failed, 130 interrupted.
     """
-    listen(verbose)
+    terminal.listen(verbose)

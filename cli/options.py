@@ -128,9 +128,7 @@ def command_line() -> list[str]:
 
 def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
     """Return the folder of measured data for all tests, or a folder by test ("NAME=DIR").
-
-    Raises InputError for some of both, or a test named twice.
-    """
+    Raises InputError for some of both, or a test named twice."""
     named = [name.partition("=") for name in given if "=" in name and not os.path.exists(name)]
     if named and len(named) < len(given):
         raise InputError(None, "--data", "give one DIR for all tests, or TEST=DIR for each")
@@ -161,9 +159,7 @@ def result_folder(options: Mapping[str, Any], suffix: str) -> Path:
 
 def read_with_solver(options: Mapping[str, Any], need_data: bool = True) -> Project:
     """Read the project of a command; its solver options replace those of the file.
-
-    options : of the command, by name.
-    """
+    options : of the command, by name."""
     from ..project.project import read_project
 
     project = read_project(options["project"], data_folders(options["data"]), need_data)
@@ -234,9 +230,7 @@ def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None
 
 def columns_named(given: str | None) -> dict[str, str] | None:
     """Return the columns of some of x, y, z, dx, dy, dz, given as in "x=X,dz=W".
-
-    Raises InputError for another form, an unknown quantity, one column for two quantities.
-    """
+    Raises InputError for another form, an unknown quantity, one column for two quantities."""
     names: dict[str, str] = {}
     for part in [] if given is None else given.split(","):
         quantity, equals, name = (piece.strip() for piece in part.partition("="))

@@ -18,7 +18,7 @@ from ..project.project import Project, chosen_cards, read_project
 from ..project.schema import FitSection, LawSection, usual_folder
 from ..readers.sections import first_error
 from ..runs.folder import KeptAnalyses
-from ..runs.predictions import Predictions, measured_tests, predict
+from ..runs.predictions import measured_tests, predict
 from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from . import options as given
@@ -54,12 +54,9 @@ prediction_options = given.with_checks(
 
 
 def run_predictions(
-    project: Project,
-    folder: Path,
-    options: Mapping[str, Any],
-    tests: Sequence[str] | None = None,
+    project: Project, folder: Path, options: Mapping[str, Any], tests: Sequence[str] | None = None,
     cards: Sequence[str] | Mapping[str, MaterialCard] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Predict, write the folder and print the outcome."""
     project = with_solver(project, options["solver_given"])
     if options["fail_above"] is not None and not measured_tests(project, tests):
@@ -72,12 +69,8 @@ def run_predictions(
             overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
         )  # fmt: skip
     predictions.report(folder)
-    _end(predictions, folder, options["fail_above"], options["as_json"])
-
-
-def _end(predictions: Predictions, folder: Path, fail_above: float | None, as_json: bool) -> None:
-    """Print the outcome; exit 4 when a run failed, 1 when one is further from its measurement."""
-    show(predictions.result, [*predictions.lines(), written_to(folder)], as_json)
+    fail_above = options["fail_above"]
+    show(predictions.result, [*predictions.lines(), written_to(folder)], options["as_json"])
     each, failed = predictions.each, predictions.failed()
     if failed:
         run = each[failed[0]]

@@ -34,10 +34,8 @@ COMPILING = (
 
 class LiveLine:
     """Show a bar on a terminal, on stderr, so that stdout stays for results; elsewhere none.
-
     Announcements meanwhile get a line of their own; a state (a process that waits for a licence)
-    is shown on the bar, and without a bar on a line, a minute apart.
-    """
+    is shown on the bar, and without a bar on a line, a minute apart."""
 
     def __init__(self, quiet: bool, *more: ProgressColumn) -> None:
         self.bar: Progress | None = None
@@ -47,14 +45,9 @@ class LiveLine:
         self._stated: dict[str, float] = {}
         if not quiet and sys.stderr.isatty():
             self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                *more,
-                TimeElapsedColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
+                TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), *more,
+                TimeElapsedColumn(), console=Console(stderr=True), transient=True,
+            )  # fmt: skip
 
     def __enter__(self) -> Self:
         from ..files import kernels_are_compiled
@@ -172,9 +165,7 @@ class NamedProgress(CountProgress):
 
 class StudyProgress(CountProgress):
     """Show starts done, best objective, and the time left.
-
-    said : the line that begins each of several fits in turn, with {} for its name.
-    """
+    said : the line that begins each of several fits in turn, with {} for its name."""
 
     def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
         super().__init__("starts", total, 0, quiet)
@@ -186,9 +177,7 @@ class StudyProgress(CountProgress):
 
     def saw(self, record: object) -> None:
         """Record the name of a fit that begins, a stage, an analysis or the end of a start.
-
-        None: time passes.
-        """
+        None: time passes."""
         from ..runs.starts import EvaluationRecord, Stage, StartRecord
 
         if isinstance(record, str):

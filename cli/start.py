@@ -42,11 +42,9 @@ COUNT = click.IntRange(0, 99)
 
 
 @command(
-    "init",
-    "bubblefit init mine",
-    "bubblefit init mine --example uniaxial",
+    "init", "bubblefit init mine", "bubblefit init mine --example uniaxial",
     "bubblefit init mine --own --bubble 1 --strips 1 --thickness 0.8",
-)
+)  # fmt: skip
 @click.argument("folder", type=FILE)
 @click.option("--example", type=click.Choice(list(KINDS)),
               help="A bubble from a known solution; from measured DIC files; strip tests; a biaxial"
@@ -78,7 +76,27 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
     if own:
         _write_own(folder, said)
     else:
-        _copy(folder, example or "known")
+        name, advice, project = KINDS[example or "known"]
+        files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
+        for file in (*files, SCHEMA):
+            _free(folder / file.name)
+        written = []
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for file in files:
+                written.append(folder / file.name)
+                written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
+            written.append(folder / SCHEMA.name)
+            written[-1].write_bytes(SCHEMA.read_bytes())
+        except OSError as error:
+            for path in written:  # half an example would be in the way of the next attempt
+                with suppress(OSError):
+                    path.unlink(missing_ok=True)
+            raise OutputError(
+                f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
+            ) from None
+        click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
+        click.echo(f"next: {advice.format(folder / project)}")
 
 
 def _write_own(folder: Path, said: dict[str, Any]) -> None:
@@ -86,7 +104,24 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     _free(path)
     kinds = writable_kinds()
     if not said and on_a_terminal():
-        said = _asked()
+        said = {
+            "name": click.prompt("Name of the fabric", default="My fabric"),
+            "thickness": click.prompt("Thickness before the test, mm", type=float),
+            "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
+        }
+        if said["bubble"]:
+            said["radius"] = click.prompt(
+                "Radius of the clamped disk, mm", type=float, default=100.0
+            )
+            said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
+        said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
+        said["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
+        said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
+        if said["cylinder"]:
+            said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
+            said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
+        if said["bubble"] or said["strips"] or said["biaxial"]:
+            said["form"] = click.prompt("Form of the moduli", default="cubic")
     tests = {kind: said.pop(kind, 0) for kind in kinds}
     if "pressures" in said:
         said["pressures"] = numbers(said["pressures"], "--pressures")
@@ -107,54 +142,9 @@ def on_a_terminal() -> bool:
     return sys.stdin.isatty()
 
 
-def _asked() -> dict[str, Any]:
-    """Return the options of --own from questions on the terminal."""
-    said: dict[str, Any] = {
-        "name": click.prompt("Name of the fabric", default="My fabric"),
-        "thickness": click.prompt("Thickness before the test, mm", type=float),
-        "bubble": click.prompt("How many bubble inflation tests", type=COUNT, default=1),
-    }
-    if said["bubble"]:
-        said["radius"] = click.prompt("Radius of the clamped disk, mm", type=float, default=100.0)
-        said["pressures"] = click.prompt("Pressures of the pictures, kPa, with commas between")
-    said["strips"] = click.prompt("How many sets of strips", type=COUNT, default=0)
-    said["biaxial"] = click.prompt("How many biaxial tests", type=COUNT, default=0)
-    said["cylinder"] = click.prompt("How many cylinders to predict", type=COUNT, default=0)
-    if said["cylinder"]:
-        said["diameter"] = click.prompt("Diameter of the cylinders, mm", type=float)
-        said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
-    if said["bubble"] or said["strips"] or said["biaxial"]:
-        said["form"] = click.prompt("Form of the moduli", default="cubic")
-    return said
-
-
 def _free(path: Path) -> None:
     if path.exists():
         raise InputError(path, "", "is already there; name another folder")
-
-
-def _copy(folder: Path, example: str) -> None:
-    name, advice, project = KINDS[example]
-    files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
-    for file in (*files, SCHEMA):
-        _free(folder / file.name)
-    written = []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for file in files:
-            written.append(folder / file.name)
-            written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
-        written.append(folder / SCHEMA.name)
-        written[-1].write_bytes(SCHEMA.read_bytes())
-    except OSError as error:
-        for path in written:  # half an example would be in the way of the next attempt
-            with suppress(OSError):
-                path.unlink(missing_ok=True)
-        raise OutputError(
-            f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
-        ) from None
-    click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
-    click.echo(f"next: {advice.format(folder / project)}")
 
 
 @command("schema", "bubblefit schema", "bubblefit schema --out project.schema.json")
@@ -184,10 +174,8 @@ def pages() -> dict[str, Path]:
 
 def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]]:
     """Return the name of the page that is meant, and others of the same name.
-
     topic : "marc", "how-to/marc" or "docs/how-to/marc.md". known : as `pages` gives them. Raises
-    InputError where there is none.
-    """
+    InputError where there is none."""
     wanted = topic.removeprefix("docs/").removesuffix(".md")
     if wanted in known:
         return wanted, []
@@ -205,21 +193,10 @@ def title_of(page: Path) -> str:
     return next((line[2:] for line in lines if line.startswith("# ")), page.stem)
 
 
-def laid_out(page: str, width: int) -> str:
-    """Return a page as text without colours, which many pagers would show as codes."""
-    console = Console(file=StringIO(), width=width)
-    with console.capture() as captured:
-        console.print(Markdown(page, hyperlinks=False))
-    return captured.get()
-
-
 @command(
-    "docs",
-    "bubblefit docs",
-    "bubblefit docs own-bubble-test",
-    "bubblefit docs how-to/marc",
+    "docs", "bubblefit docs", "bubblefit docs own-bubble-test", "bubblefit docs how-to/marc",
     "bubblefit docs project-file --path",
-)
+)  # fmt: skip
 @click.argument("topic", required=False)
 @click.option("--path", is_flag=True, help="Print where the page is, instead of the page.")
 def docs_command(topic: str | None, path: bool) -> None:
@@ -240,6 +217,9 @@ def docs_command(topic: str | None, path: bool) -> None:
     if path:
         click.echo(str(known[name]))
     elif sys.stdout.isatty():
-        click.echo_via_pager(laid_out(known[name].read_text(encoding="utf-8"), Console().width))
+        console = Console(file=StringIO(), width=Console().width)
+        with console.capture() as captured:
+            console.print(Markdown(known[name].read_text(encoding="utf-8"), hyperlinks=False))
+        click.echo_via_pager(captured.get())
     else:
         click.echo(known[name].read_text(encoding="utf-8"), nl=False)

@@ -1,7 +1,6 @@
 """Study commands: profile, bootstrap, plan, compare, validate, and `study mesh`, `study nu12`.
 
-Each reads the project, calls one function of `runs` and ends with `_finish`.
-"""
+Each reads the project, calls one function of `runs` and ends with `_finish`."""
 
 from __future__ import annotations
 
@@ -42,9 +41,7 @@ def study_options(
     name: str, *own: Decorator, refits: bool = True, resumes: bool = False
 ) -> Decorator:
     """Add PROJECT, a study's own options and those of every study, output in out/NAME-`name`.
-
-    refits : the study fits again, by --jobs and --scheduler. resumes : it has --resume.
-    """
+    refits : the study fits again, by --jobs and --scheduler. resumes : it has --resume."""
     usual = given.TESTS, given.out_option(f"out/NAME-{name}"), given.DATA, given.solver_choice
     again = (given.JOBS, given.SCHEDULER) if refits else ()
     resume = (given.resume_option("Continue the study in the output folder."),) if resumes else ()
@@ -77,18 +74,6 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
     report.html and result.json.
     """
     project = given.read_to_refit(options)
-    asked = _strains_by_modulus(moduli, strain)
-    folder = given.folder_of(options, "profile")
-    with NamedProgress("sides", given.quiet(options)) as progress:
-        found = profile(
-            project, asked, options["card"], options["tests"] or None, out=folder,
-            overwrite=options["overwrite"], progress=progress.saw,
-        )  # fmt: skip
-    _finish(found, folder, options)
-
-
-def _strains_by_modulus(moduli: Sequence[str], strain: str | None) -> dict[str, list[float]] | None:
-    """Return strains by modulus; a modulus that is named twice has those of both."""
     common = [] if strain is None else given.numbers(strain, "--strain")
     if common and not moduli:
         raise InputError(None, "--strain", "goes with --modulus NAME")
@@ -97,7 +82,13 @@ def _strains_by_modulus(moduli: Sequence[str], strain: str | None) -> dict[str, 
         name, equals, strains = text.partition("=")
         own = given.numbers(strains, "--modulus") if equals else common
         asked.setdefault(name, []).extend(own)
-    return asked or None
+    folder = given.folder_of(options, "profile")
+    with NamedProgress("sides", given.quiet(options)) as progress:
+        found = profile(
+            project, asked or None, options["card"], options["tests"] or None, out=folder,
+            overwrite=options["overwrite"], progress=progress.saw,
+        )  # fmt: skip
+    _finish(found, folder, options)
 
 
 @command(
@@ -158,8 +149,7 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
         help="By E1, E2, G12, or the least certain of them.",
     ),
     click.option(
-        "--specimens", type=click.IntRange(min=1),
-        help="Of every candidate [1 bubble, 3 strips].",
+        "--specimens", type=click.IntRange(min=1), help="Of every candidate [1 bubble, 3 strips].",
     ),
     click.option(
         "--noise", "noises", multiple=True, metavar="KIND=VALUE",
@@ -224,8 +214,7 @@ def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **opti
         comparison = laws.compare(
             settings_given(project, options), options["tests"] or None, forms, folds=folds,
             starts=starts, fold_starts=fold_starts, trust=options["trust"], out=folder,
-            resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw,
+            resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
             command_line=given.command_line(),
         )  # fmt: skip
     _finish(comparison, folder, options, comparison.notes)

@@ -1,8 +1,7 @@
 """The terminal's side of every command: usage errors, exit codes, events, logs and the outcome.
 
 A command is declared with `command` (or `group`) and its body is called within `exits`; it ends
-with `show`. `--events` and `--verbose` belong to every command and are added by `main`.
-"""
+with `show`. `--events` and `--verbose` belong to every command and are added by `main`."""
 
 from __future__ import annotations
 
@@ -329,9 +328,7 @@ def _louder(ctx: click.Context, _: click.Parameter, verbose: bool) -> None:
 
 def with_common_options(command: click.Command) -> click.Command:
     """Add --verbose and --events to a command, or to each command of a group.
-
-    Both are eager callbacks; the command's function does not receive them.
-    """
+    Both are eager callbacks; the command's function does not receive them."""
     if isinstance(command, click.Group):
         for below in command.commands.values():
             with_common_options(below)

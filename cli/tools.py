@@ -17,7 +17,7 @@ import click
 
 from ..errors import InputError, SolverFailure, rows
 from ..materials.card import read_card
-from ..materials.exports.base import Export, Option, options_of, write_export
+from ..materials.exports.base import Option, options_of, write_export
 from ..reports.content import beside
 from ..reports.html import PAGE, print_page, write_page
 from ..reports.run_pages import page_of_folder
@@ -65,15 +65,12 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
         gone += cache.prune(least, None if older is None else _seconds(older))
     entries = cache.entries()
     state: dict[str, Any] = {
-        "folder": str(cache.folder),
-        "runs": len(entries),
-        "bytes": sum(entry.size for entry in entries),
-        "limit": cache.limit,
-        "dropped": len(gone),
+        "folder": str(cache.folder), "runs": len(entries),
+        "bytes": sum(entry.size for entry in entries), "limit": cache.limit, "dropped": len(gone),
         "dropped_bytes": sum(entry.size for entry in gone),
         "used_first": entries[0].used if entries else None,
         "used_last": entries[-1].used if entries else None,
-    }
+    }  # fmt: skip
     used, most = _words(state["bytes"]), _words(cache.limit)
     lines = [f"{cache.folder}: {len(entries)} runs, {used} of at most {most}"]
     if entries:
@@ -161,11 +158,9 @@ def _solver_line(one: Diagnosis) -> str:
 
 
 @command(
-    "report",
-    "bubblefit report out/fabric",
-    "bubblefit report out/fabric --format pdf",
+    "report", "bubblefit report out/fabric", "bubblefit report out/fabric --format pdf",
     "bubblefit report out/cubic out/spline --out both.html",
-)
+)  # fmt: skip
 @click.argument("folders", type=FILE, nargs=-1, required=True, metavar="FOLDER [OTHER]")
 @click.option(
     "--format", "kind", type=click.Choice(["html", "pdf"]), default="html", show_default=True,
@@ -229,7 +224,12 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
         if not some:
             click.echo(f"{subject}: not here (bubblefit doctor says why), nothing compared")
         for one in some:
-            click.echo(_number_line(one))
+            factor, unit = (1.0, one.unit) if one.absolute else (100.0, "%")
+            click.echo(
+                f"{one.what:58}{one.ours:12.6g}  {one.theirs:12.6g} {one.unit:5}"
+                f"{factor * one.deviation:+10.4f} {unit:2}{factor * one.allowed:8.4g}  {one.source}"
+                f"{'' if one.met else '   MISSED'}"
+            )
 
     if as_json:
         found = verify(subjects or None, data=data)
@@ -242,15 +242,6 @@ def verify_command(subjects: Sequence[str], data: Path | None, as_json: bool) ->
         click.echo(said if missed else f"all {count} numbers are met")
     if found.missed:
         sys.exit(WORSE)
-
-
-def _number_line(one: Number) -> str:
-    factor, unit = (1.0, one.unit) if one.absolute else (100.0, "%")
-    return (
-        f"{one.what:58}{one.ours:12.6g}  {one.theirs:12.6g} {one.unit:5}"
-        f"{factor * one.deviation:+10.4f} {unit:2}{factor * one.allowed:8.4g}  {one.source}"
-        f"{'' if one.met else '   MISSED'}"
-    )
 
 
 def _values(known: Option) -> click.ParamType:
@@ -299,7 +290,15 @@ def export_command(
         export = FORMATS[name].export(material, **given)
     except InputError as error:
         raise InputError(card, error.field, error.problem) from None
-    paths = _targets(export, out, f"{card.stem}-{name}")
+    default = f"{card.stem}-{name}"
+    first, *others = export.files
+    target = Path(default + first) if out is None else out
+    if target.is_dir():
+        target = target / (default + first)
+    paths = [target, *(target.with_suffix(suffix) for suffix in others)]
+    if len(set(paths)) < len(paths):
+        problem = f"{', '.join(others)} is what another file ends in; use {first}"
+        raise InputError(None, "--out", f"{target}: {problem}")
     for path in paths:
         if path.exists() and path.samefile(card):
             raise InputError(None, "--out", f"{path} is the card itself; name another file")
@@ -309,16 +308,3 @@ def export_command(
     said |= {"confirm": export.says.confirm, "notes": rows(export.says.notes)}
     lines = [*export.says.lines(), f"written to {', '.join(files)}"]
     show({"files": files, "format": name, **said}, lines, as_json)
-
-
-def _targets(export: Export, out: Path | None, default: str) -> list[Path]:
-    """Return a path for each file; the first has the name that was given."""
-    first, *others = export.files
-    target = Path(default + first) if out is None else out
-    if target.is_dir():
-        target = target / (default + first)
-    paths = [target, *(target.with_suffix(suffix) for suffix in others)]
-    if len(set(paths)) < len(paths):
-        problem = f"{', '.join(others)} is what another file ends in; use {first}"
-        raise InputError(None, "--out", f"{target}: {problem}")
-    return paths

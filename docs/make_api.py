@@ -141,7 +141,8 @@ def _annotation(annotation: Any) -> str:
 
 def text_of(thing: Any) -> str:
     """Return the docstring with sections in bold and entries as lists."""
-    text = inspect.getdoc(thing) or ""
+    head, _, rest = (inspect.getdoc(thing) or "").partition("\n")
+    text = f"{head}\n\n{rest.strip()}".strip()
     if inspect.isclass(thing) and (thing.__doc__ or "").startswith(f"{thing.__name__}("):
         return ""  # the default docstring of a dataclass
     parts = SECTION.split(text)

@@ -3,8 +3,7 @@
 A project names tests; each is of a kind. A kind reads its section of the project into a `Test`,
 which makes models. Tests of a kind that can be fitted are prepared once (data read, or computed)
 and then give comparisons to a fit, in every process that runs starts; the kind's presenter says
-what a fit means for a test. Nothing outside a folder of this package asks which kind a test is.
-"""
+what a fit means for a test. Nothing outside a folder of this package asks which kind a test is."""
 
 from __future__ import annotations
 
@@ -61,9 +60,7 @@ class Output:
     @classmethod
     def of(cls, folder: Path, test: str, several: bool) -> Output:
         """Return the output of a test; its name stands before every file's if there are several.
-
-        What does not belong in the name of a file becomes a dash; digits tell such names apart.
-        """
+        What does not belong in the name of a file becomes a dash; digits tell such names apart."""
         plain = "".join(c if c.isalnum() or c in "._" else "-" for c in test)
         plain = plain.encode()[:LONGEST].decode(errors="ignore").strip("-.")
         if plain != test.replace(" ", "-"):
@@ -89,9 +86,7 @@ Refined = Literal["elements", "increments"]
 @dataclass(frozen=True)
 class Fabric:
     """The one fabric of all tests of a project; thickness in mm before the test.
-
-    lab : who tested it, for the page.
-    """
+    lab : who tested it, for the page."""
 
     name: str
     thickness: float
@@ -114,11 +109,9 @@ class Scales:
 @dataclass(frozen=True)
 class Place:
     """The place of a test: its file and key, its units, the folder of its data.
-
     at : dotted key of its section, "bubble[0]". data_folder : instead of the folder that the
     section names. need_data : whether measured files must be there (a forward analysis does
-    without).
-    """
+    without)."""
 
     path: Path
     at: str
@@ -135,11 +128,9 @@ class Place:
 @dataclass(frozen=True)
 class Reach:
     """The strains that the data of a test reach, before any fit.
-
     strain : ends (eps1, eps2, gamma12) of the logarithmic strain, None where unknown. break_shares
     : for each of them two shares of its end where the measured stiffness changes most, for laws
-    with regions; None where unknown.
-    """
+    with regions; None where unknown."""
 
     strain: tuple[float | None, float | None, float | None] = (None, None, None)
     break_shares: tuple[tuple[float, float] | None, ...] = (None, None, None)
@@ -147,10 +138,8 @@ class Reach:
 
 class Test(Protocol):
     """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa.
-
     weight : among several tests in one fit. reach : of its data. reads_files : whether its data are
-    measured files, which a folder can be named for.
-    """
+    measured files, which a folder can be named for."""
 
     @property
     def kind(self) -> str: ...
@@ -171,10 +160,8 @@ class Test(Protocol):
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, Any]:
         """Return models by the name of their part; raises InputError for an impossible mesh.
-
         thickness : mm, the fabric's unless given. what, factor : edges of elements, or increments,
-        divided by a factor.
-        """
+        divided by a factor."""
 
     def settings(self) -> Mapping[str, object]:
         """Return settings, without paths, on which a result depends beside data, law, solver."""
@@ -183,7 +170,6 @@ class Test(Protocol):
 @dataclass(frozen=True, eq=False)
 class Studied:
     """The quantities of a study with a card: under refinement, or with another nu12.
-
     steps : load levels of a model. quantities : of interest in a study of the mesh; responses : of
     a study of nu12, in words `response`. curve : (x, y) along which levels are compared, or None.
     """
@@ -214,14 +200,12 @@ class Simulation:
 
 class Kind(Protocol):
     """A kind of test, as the registry holds it.
-
     name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
     section : of such a table; `name` is among its keys, and `weight` where it is fitted. fitted :
     whether its tests are `FittableTest`s. predicted : of tests that cards predict, None for others.
     studied : None where no study runs it. A kind that knows tests worth making next is `Plannable`.
     A kind with measured files in a folder has `folder_key`, the dotted key of it, by which a
-    project can be written down with the folder that it was run with.
-    """
+    project can be written down with the folder that it was run with."""
 
     name: str
     title: str
@@ -235,10 +219,8 @@ class Kind(Protocol):
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Read the data of a test that is fitted, or compute them from its known solution.
-
         law : all but the coefficients. Kinds that are only predicted do not have it. Raises
-        InputError in the data, SolverFailure where the known solution cannot be run.
-        """
+        InputError in the data, SolverFailure where the known solution cannot be run."""
 
 
 #: Which of the measured points a fit matches, by name of the comparison.
@@ -248,10 +230,8 @@ Masks = Mapping[str, NDArray[np.bool_]]
 @dataclass(frozen=True)
 class Weighting:
     """The weight of a test.
-
     relative : the blocks of a test add up to `weight` times its mean relative RMS error, so that a
-    test of many blocks does not outvote one of few; otherwise its own objective weighs them.
-    """
+    test of many blocks does not outvote one of few; otherwise its own objective weighs them."""
 
     relative: bool = False
     weight: float = 1.0
@@ -263,13 +243,11 @@ FittableTest = Test
 
 class PreparedTest(Protocol):
     """A test with its data, in memory, as worker processes get it.
-
     objective_is : its own objective, in words. known : the law behind computed data. specimens : by
     comparison, of each point that can be left out of a fit. One with measured files also has
     `data_files()`, for the record of a run (`OfFiles`), as a test that is predicted does. A kind
     that looks at its data before a fit has `doubts(expected)`, and then lists the names of its
-    doubts, `Kind.doubts`.
-    """
+    doubts, `Kind.doubts`."""
 
     @property
     def test(self) -> FittableTest: ...
@@ -290,20 +268,16 @@ class PreparedTest(Protocol):
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return the comparisons of a fit: models, solvers, objectives, nuisance unknowns.
-
-        Each is named as the test, followed by its part where there are several: "strips: warp".
-        """
+        Each is named as the test, followed by its part where there are several: "strips: warp"."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedTest:
     """One test with the results of a finished fit.
-
     comparisons, histories : its own, in its own order, as `Weighting()` gives them. nuisance : by
     plain name, in the unit of each. law : the best; laws : of the best starts, best first.
     reached : (3,) largest strain (eps1, eps2, gamma12) in all tests. valid : (3,) the ends up to
-    which the moduli are fitted.
-    """
+    which the moduli are fitted."""
 
     comparisons: tuple[Comparison, ...]
     histories: tuple[History, ...]
@@ -318,10 +292,8 @@ class FittedTest:
 @dataclass(frozen=True, eq=False)
 class Findings:
     """The meaning of a fit for one test.
-
     numbers : for result.json. lines : for the terminal. quality : in a few words, for the card.
-    summary : a clause for the head of the page.
-    """
+    summary : a clause for the head of the page."""
 
     numbers: dict[str, Any]
     warnings: tuple[Note, ...] = ()
@@ -333,13 +305,11 @@ class Findings:
 @dataclass(frozen=True, eq=False)
 class RunRecord:
     """The end of a run of one test with one card, as it is stored.
-
     seconds : wall clock, when it was made. failure : why there is no result, "" where there is one;
     early : the solver's reason for an end before the last frame, "" otherwise. strain : (3,)
     largest (eps1, eps2, gamma12). arrays : that the kind of test keeps of the history. iterations,
     unstable, remarks : as the solver has them. from_cache : it was made earlier and is a cached
-    run.
-    """
+    run."""
 
     seconds: float
     failure: str = ""
@@ -355,10 +325,8 @@ class RunRecord:
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
     """One test with one card: the model, how its run ended, and notes on it.
-
     end : of the band that the solver gives for the model, None where it has one answer. around :
-    runs with laws around the card's, None where there are none.
-    """
+    runs with laws around the card's, None where there are none."""
 
     test: Any
     card: str
@@ -446,12 +414,10 @@ def record_of(
                 seconds if outcome.seconds is None else outcome.seconds,
                 early=kind.early(model, outcome),
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
-                arrays=kind.arrays(model, outcome),
-                iterations=outcome.iterations,
-                unstable=outcome.unstable,
-                remarks=tuple(map(as_note, outcome.remarks)),
+                arrays=kind.arrays(model, outcome), iterations=outcome.iterations,
+                unstable=outcome.unstable, remarks=tuple(map(as_note, outcome.remarks)),
                 from_cache=outcome.from_cache,
-            )
+            )  # fmt: skip
         except SolverFailure as failure:
             outcome = failure
     return RunRecord(seconds, outcome.line)
@@ -570,10 +536,8 @@ MOST_STRAIN = 0.3
 @dataclass(frozen=True)
 class Precision:
     """The precision of the values of one comparison of the project.
-
     noise : in the unit of its data, as its fit reckons with. alike : number of neighbours with one
-    error. values : of one block (a direction of displacement in one frame, a load curve).
-    """
+    error. values : of one block (a direction of displacement in one frame, a load curve)."""
 
     noise: float
     alike: float
@@ -587,11 +551,9 @@ class Precision:
 @dataclass(frozen=True, eq=False)
 class Planning:
     """The project as it is known when a test is planned.
-
     present : the project's own tests of the kind, with their data. precision : by name of a
     comparison. law : at the present optimum; candidates get their data from it. noise : of the
-    kind's measured values (mm, N), where a user gives it.
-    """
+    kind's measured values (mm, N), where a user gives it."""
 
     place: Place
     present: Sequence[PreparedTest]
@@ -609,12 +571,10 @@ class Planning:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A test that could be made.
-
     name : in a few words, one of its own. make : return the test with data of the law, its
     objective's least noise that of independent values; raises SolverFailure where the law cannot be
     run, InputError where there is no such model. noise_is : the source of that noise, in words.
-    specimens : number that is usually tested, each as good as the other.
-    """
+    specimens : number that is usually tested, each as good as the other."""
 
     name: str
     make: Callable[[], PreparedTest]
@@ -633,19 +593,15 @@ class Plannable(Protocol):
 @runtime_checkable
 class Divisible(Protocol):
     """A prepared test that can leave single parts out of a fit.
-
     Its `comparisons` take the masks of `parts`, and none is among them that leaves nothing. Their
     objectives have `of_points(values)`, (m,) for each residual, of values for the points of a mask;
-    a bootstrap lets parts count several times, or not at all.
-    """
+    a bootstrap lets parts count several times, or not at all."""
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return by sort ("frames", "specimens") and name ("97 kPa") the points kept without it.
-
         Only sorts of which the test has two or more. Masks are of every comparison of the test,
-        over its points in the order of its data.
-        """
+        over its points in the order of its data."""
 
 
 @runtime_checkable
@@ -656,11 +612,9 @@ class Refinable(Protocol):
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """Return its comparisons with edges of elements and increments divided by a factor.
-
         Every residual is of the same measured value as that of `comparisons`; data computed with
         the fit's own model have the same comparisons. A factor below one leaves the increments as
-        they are. Raises InputError without such a mesh.
-        """
+        they are. Raises InputError without such a mesh."""
 
 
 #: A modulus that the data themselves tell may be off its bounds by this factor: it is a rough one.
@@ -670,7 +624,6 @@ ROUGH = 4.0
 @dataclass(frozen=True)
 class Doubt:
     """One trap that the data of a test seem to have fallen into.
-
     name : one or two words joined by a hyphen, by which it is trusted. sure : whether a fit of such
     data would be worthless; a warning otherwise. text : numbers, the probable cause, and a remedy.
     """
@@ -741,10 +694,8 @@ def judged(test: str, doubts: Sequence[Doubt], trust: Collection[str]) -> Judgem
 @dataclass(frozen=True, eq=False)
 class DataFile:
     """A measured file and the number of its rows that are used.
-
     source : its format, columns and units, and choices where it leaves any. used : number of rows,
-    None where that means nothing. dropped : number of other rows, by why.
-    """
+    None where that means nothing. dropped : number of other rows, by why."""
 
     path: Path
     source: FrameSource
@@ -788,10 +739,8 @@ SEED = 0
 @dataclass(frozen=True, eq=False)
 class Around:
     """Runs with laws around that of a card.
-
     by : "directions": steps along independent directions, `steps` standard deviations each, from
-    which the spread follows to first order; "samples": laws drawn from the card's certainty.
-    """
+    which the spread follows to first order; "samples": laws drawn from the card's certainty."""
 
     by: Literal["directions", "samples"]
     steps: Sequence[float]
@@ -811,10 +760,8 @@ class Around:
 
     def sigma(self, own: Array, others: Sequence[Array | None]) -> Array:
         """Return (frames,) one standard deviation of a curve; NaN where it is not known.
-
         own : (frames,) of the card itself. others : the same of the runs, None of one that failed,
-        shorter of one that ended early.
-        """
+        shorter of one that ended early."""
         reached = [curve for curve in others if curve is not None]
         whole = np.full(len(own), np.nan)
         least = max(1, len(others)) if self.by == "directions" else 2
@@ -834,10 +781,8 @@ def laws_around(
     card: MaterialCard, samples: int | None
 ) -> tuple[Around | None, Sequence[HypoelasticLaw]]:
     """Return the laws to be run around a card's, and how; nothing where the card has no certainty.
-
     samples : number of laws to draw; None for the least certain directions, 0 for nothing. Raises
-    ValueError where hardly any law that could be drawn has positive moduli.
-    """
+    ValueError where hardly any law that could be drawn has positive moduli."""
     sure = card.certainty
     if sure is None or samples == 0:
         return None, ()
@@ -875,11 +820,9 @@ def channel_of(section: ChannelSection) -> Channel:
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:
     """Return the name after a check that there is such a format; None where none is given.
-
     field : dotted key of the name below the section.
     Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
-    work.
-    """
+    work."""
     if name is not None:
         try:
             format_named(content, name)

@@ -25,12 +25,10 @@ USUAL = HypoelasticLaw.linear(300.0, 200.0, 10.0)
 
 class OwnTest:
     """Base class of a test of one's own (`bf.OwnTest`); a subclass has `measured` and `modelled`.
-
     measured : (n,) values. unit, noise : of one of them; 1 % of the largest unless given. strain :
     largest logarithmic (eps1, eps2, gamma12) that they depend on, None for none. places : columns
     (n,) of the table of residuals, the first is the x axis of the chart. weight : among other
-    tests. thickness : mm, of the fabric that the test is fitted with.
-    """
+    tests. thickness : mm, of the fabric that the test is fitted with."""
 
     name: str = "own"
     measured: ArrayLike = ()

@@ -24,9 +24,7 @@ log = logging.getLogger(__name__)
 
 def kinds() -> Mapping[str, Kind]:
     """Return every kind by name: ours, those that are fitted first, then those of plug-ins.
-
-    Plug-ins that do not work are logged and left out.
-    """
+    Plug-ins that do not work are logged and left out."""
     ours = sorted((kind_named(name) for name in _folders()), key=lambda k: (not k.fitted, k.name))
     known = {kind.name: kind for kind in ours}
     for plug_in in plug_ins(GROUP):
@@ -58,15 +56,13 @@ def kind_named(name: str) -> Kind:
 
 def report_of(name: str) -> Any:
     """Return the presenter of a kind of test: the module `report` of its folder, or `Kind.report`.
-
     It has `simulate(test, cards, runs, out, within_range)`, which writes the results of forward
     analyses, runs by (card, part), and returns a `Simulation`. Of tests that are fitted it also has
     `findings(prepared, fitted)`, which returns `Findings`; `show(prepared, fitted, findings, out)`,
     which writes the files of a fit and returns an `Exhibit`; `residuals(prepared, fitted)`, a table
     of every matched value (part, where, quantity, measured, modelled, difference, unit); and, where
     the data are looked at before a fit, `examine(prepared, out)`. Of tests that are predicted it
-    has `show_outcome(outcome, out)`.
-    """
+    has `show_outcome(outcome, out)`."""
     if name in _folders():
         return import_module(f".{name}.report", __package__)
     kind: Any = kind_named(name)

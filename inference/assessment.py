@@ -111,15 +111,10 @@ class Certainty:
 
 
 def certainty(
-    problem: FitProblem,
-    best: Evaluation,
-    law: HypoelasticLaw,
-    reached: Array,
-    limit: Limit | None = None,
-    second: Second | None = None,
-    taken_out: bool = False,
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
+    limit: Limit | None = None, second: Second | None = None, taken_out: bool = False,
     noise: Noise | None = None,
-) -> Certainty:
+) -> Certainty:  # fmt: skip
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
     (see `Noise.of`), else that of the best fit. second : terms of second order (see `Linear.of`).
@@ -169,13 +164,9 @@ def certainty(
 
 
 def uncertainty_from(
-    problem: FitProblem,
-    best: Evaluation,
-    law: HypoelasticLaw,
-    reached: Array,
-    numbers: Sequence[int],
-    noise: Array,
-) -> dict[str, Array]:
+    problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,
+    numbers: Sequence[int], noise: Array,
+) -> dict[str, Array]:  # fmt: skip
     """Return the 1-sigma relative uncertainty of each modulus from some comparisons, by number.
     It is the best estimate that those allow (weights do not count), with each modulus known before
     to 1000 % of itself, each nuisance to its prior or ten times the width of its bounds. noise :
@@ -272,16 +263,10 @@ class Verdict:
     def numbers(self) -> dict[str, Any]:
         """Return the entry of result.json."""
         return {
-            "value": self.value,
-            "unit": self.unit,
-            "sigma": self.sigma,
-            "bounds": [self.lower, self.upper],
-            "prior": self.prior,
-            "on_bound": self.on or None,
-            "determined": self.determined,
-            "correlation": self.correlation,
-            "verdict": self.words,
-        }
+            "value": self.value, "unit": self.unit, "sigma": self.sigma,
+            "bounds": [self.lower, self.upper], "prior": self.prior, "on_bound": self.on or None,
+            "determined": self.determined, "correlation": self.correlation, "verdict": self.words,
+        }  # fmt: skip
 
 
 def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:

@@ -163,12 +163,10 @@ STEP, PROBES = 1e-5, 4
 
 class OwnObjective:
     """Residuals that a function of one's own makes of what an objective with `columns` compares.
-
     function : of modelled and measured values, a list of frames (m, 3) or (frames, m, 3) of a
     field, (m,) loads; returns a vector, or several in a list: e adds up their RMS. derivative : of
     both and of a change of what is modelled, the change of the same; None: differences. relative :
-    a vector counts by its largest value for a model that does not move, and as one of so many.
-    """
+    a vector counts by its largest value for a model that does not move, and as one of so many."""
 
     def __init__(
         self, inner: Any, function: Callable[..., Any], relative: bool = False, weight: float = 1.0
@@ -294,11 +292,9 @@ class Comparison:
         values = self._model_values(nuisance)
         point = self._point(law, free, values)
         history, slope = self.solver.run_with_sensitivity(
-            self.model_at(nuisance),
-            law,
-            [*(f"beta_{i}" for i in free), *values, *self._of_law],
+            self.model_at(nuisance), law, [*(f"beta_{i}" for i in free), *values, *self._of_law],
             guess=self._guess(point) if warm else None,
-        )
+        )  # fmt: skip
         if history.path is not None and history.path_slope is not None:
             self._last = (point, history.path, history.path_slope)
         by_solver = self.objective.jacobian(history, slope)

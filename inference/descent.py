@@ -20,15 +20,10 @@ SMALLEST_DROP = 1e-3  # of the shear modulus, relative, that can explain a loss 
 
 
 def descend(
-    problem: FitProblem,
-    point: Evaluation,
-    tolerance: float,
-    max_analyses: int,
-    norms: bool = False,
-    only: NDArray[np.bool_] | None = None,
-    damping: float = FIRST_DAMPING,
+    problem: FitProblem, point: Evaluation, tolerance: float, max_analyses: int,
+    norms: bool = False, only: NDArray[np.bool_] | None = None, damping: float = FIRST_DAMPING,
     negligible: float = NEGLIGIBLE,
-) -> tuple[Evaluation, str]:
+) -> tuple[Evaluation, str]:  # fmt: skip
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
     norms : minimise e itself, the sum of the blocks' norms, instead of their squares. only :
     (unknowns,) which may change. negligible : predicted relative decrease of the sum of squares
@@ -111,13 +106,9 @@ def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array
 
 
 def bounded_step(
-    hessian: Array,
-    gradient: Array,
-    a: Array,
-    c: Array,
-    y: Array,
+    hessian: Array, gradient: Array, a: Array, c: Array, y: Array,
     plane: tuple[Array, float] | None = None,
-) -> Array | None:
+) -> Array | None:  # fmt: skip
     """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer.
     plane : (row, value), to which the step leads: row (y + s) = value."""
     unit = 1.0 / np.sqrt(np.diag(hessian))

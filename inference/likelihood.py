@@ -69,13 +69,9 @@ def extreme(unknowns: Unknowns, row: Array, sign: float) -> float:
 
 
 def profile_side(
-    problem: FitProblem,
-    best: Evaluation,
-    row: Array,
-    sign: float,
-    sigma: float,
+    problem: FitProblem, best: Evaluation, row: Array, sign: float, sigma: float,
     tell: Callable[[], None] = lambda: None,
-) -> Side:
+) -> Side:  # fmt: skip
     """Hold row @ unknowns ever farther from the best until -2 log L passes the threshold.
     problem : weighted so that its sum of squares is -2 log L. best : its optimum, with Jacobian.
     sign : 1 upwards, -1 downwards. sigma : one standard deviation. tell : called after each place.
@@ -111,16 +107,11 @@ def profile_side(
         if ratios[-1] >= THRESHOLD:
             why = ""
             break
-        step = _next(values, ratios)
+        last = abs(values[-1] - values[-2])
+        roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
+        grown = float(roots[1] - roots[0])
+        step = last * min(STEP / grown if grown > 0 else np.inf, MOST_GROWTH)
     return Side(tuple(values), tuple(ratios), why, problem.analyses - before)
-
-
-def _next(values: list[float], ratios: list[float]) -> float:
-    """Return the step in which the root of -2 log L should grow by `STEP`."""
-    last = abs(values[-1] - values[-2])
-    roots = np.sqrt(np.maximum(ratios[-2:], 0.0))
-    grown = float(roots[1] - roots[0])
-    return last * min(STEP / grown if grown > 0 else np.inf, MOST_GROWTH)
 
 
 def fitted_at(

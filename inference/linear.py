@@ -1,8 +1,7 @@
 """Linearise a fit at its optimum: posteriors, mesh error, second order, information.
 
 Near its optimum a fit of the sum of the norms of its blocks is a least squares fit in which every
-block weighs the inverse of its norm, and it is that estimate which the noise moves.
-"""
+block weighs the inverse of its norm, and it is that estimate which the noise moves."""
 
 from __future__ import annotations
 
@@ -123,12 +122,9 @@ LEFT = 0.1
 
 
 def posteriors_of(
-    problem: FitProblem,
-    best: Evaluation,
-    noise: Noise,
-    limit: Limit | None = None,
+    problem: FitProblem, best: Evaluation, noise: Noise, limit: Limit | None = None,
     second: Second | None = None,
-) -> tuple[Posterior, Posterior | None]:
+) -> tuple[Posterior, Posterior | None]:  # fmt: skip
     """Return the posterior from the noise, and that of ever finer models (None without `limit`).
     The latter's covariance includes the model error that may be left. A block that is fitted better
     than its noise allows has the norm of the noise; a direction without data is as uncertain as
@@ -204,12 +200,9 @@ class Order:
     def numbers(self) -> dict[str, Any]:
         """Return the entry of result.json."""
         return {
-            "order": 2 if self.used else 1,
-            "why": self.why,
-            "change_of_sigma": dict(self.change),
-            "directions": self.directions,
-            "analyses": self.analyses,
-        }
+            "order": 2 if self.used else 1, "why": self.why, "change_of_sigma": dict(self.change),
+            "directions": self.directions, "analyses": self.analyses,
+        }  # fmt: skip
 
     @property
     def words(self) -> str:

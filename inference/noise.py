@@ -244,12 +244,9 @@ class Discrepancy:
 
 
 def discrepancies(
-    problem: FitProblem,
-    residual: Array,
-    doubt: Array | None = None,
-    best: Evaluation | None = None,
-    effect: Effect | None = None,
-) -> dict[str, Discrepancy]:
+    problem: FitProblem, residual: Array, doubt: Array | None = None,
+    best: Evaluation | None = None, effect: Effect | None = None,
+) -> dict[str, Discrepancy]:  # fmt: skip
     """Return the discrepancy of every comparison with places on a sheet, from the residual (m,).
     doubt : (m,) part of the residual that the mesh may cause. best : where causes are looked for.
     """
@@ -321,12 +318,9 @@ def _by_thickness(problem: FitProblem, best: Evaluation, k: int) -> dict[str, Ar
 
 
 def discrepancy(
-    blocks: Sequence[Array],
-    doubts: Sequence[Array],
-    places: Sequence[Array],
-    unknowns: int,
+    blocks: Sequence[Array], doubts: Sequence[Array], places: Sequence[Array], unknowns: int,
     unit: str,
-) -> Discrepancy | None:
+) -> Discrepancy | None:  # fmt: skip
     """Return the discrepancy of blocks (n,) at places (n, 2) mm; None where values are too few.
     Doubt is taken off the smooth shapes; `unknowns` have taken as many out of the residual."""
     usable = [
@@ -451,13 +445,9 @@ def differences_of_all(
 
 
 def alike_in_all(
-    residuals: Sequence[Array],
-    places: Sequence[Array],
-    slopes: Sequence[Array],
-    unit: str,
-    causes: Mapping[str, Array] | None = None,
-    effect: Effect | None = None,
-) -> Discrepancy | None:
+    residuals: Sequence[Array], places: Sequence[Array], slopes: Sequence[Array], unit: str,
+    causes: Mapping[str, Array] | None = None, effect: Effect | None = None,
+) -> Discrepancy | None:  # fmt: skip
     """Return what specimens have in common beside the model and what no unknown can follow.
     residuals : (n,) of each specimen, model less measured, in `unit`s. places : (n,) along its
     curve. slopes : (n, unknowns). causes : of all, see `ranked_causes`. None with fewer than
@@ -575,13 +565,10 @@ class NoiseTest:
     def numbers(self) -> dict[str, Any]:
         """Return the entry of result.json."""
         return {
-            "values": self.values,
-            "independent": self.independent,
-            "chi_square": self.square,
-            "degrees_of_freedom": self.free,
-            "probability_of_more": self.above,
+            "values": self.values, "independent": self.independent, "chi_square": self.square,
+            "degrees_of_freedom": self.free, "probability_of_more": self.above,
             "probability_of_less": self.below,
-        }
+        }  # fmt: skip
 
 
 def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:

@@ -149,7 +149,11 @@ class FitProblem:
             try:
                 if with_jacobian:
                     history, slope = comparison.differentiate(law, free, nuisance, warm)
-                    jacobians.append(self._by_unknowns(comparison, slope))
+                    p = self.unknowns
+                    rows = np.zeros((len(slope), p.count))
+                    rows[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
+                    rows[:, p.nuisance_places(comparison.name)] = slope[:, p.size :]
+                    jacobians.append(rows)
                 else:
                     history = comparison.run(law, free, nuisance, warm)
                 residual = comparison.objective.residual(history, nuisance)
@@ -179,14 +183,6 @@ class FitProblem:
         self.cached += point.from_cache
         self._report(y, value, point.status)
         return point
-
-    def _by_unknowns(self, comparison: Comparison, slope: Array) -> Array:
-        """Return (m, unknowns) from the slope by free entries of beta and own nuisance."""
-        p = self.unknowns
-        jacobian = np.zeros((len(slope), p.count))
-        jacobian[:, : p.size] = slope[:, : p.size] @ p.to_coefficients
-        jacobian[:, p.nuisance_places(comparison.name)] = slope[:, p.size :]
-        return jacobian
 
     def _report(self, y: Array, value: float | None, status: str) -> None:
         if self.watch is not None:
@@ -219,11 +215,9 @@ class WeightedProblem(FitProblem):
         """Return an analysis of the problem without factors as this one sees it: nothing is run."""
         residual, slope = self.factors * point.residual, point.jacobian
         return replace(
-            point,
-            residual=residual,
-            value=self.blocks.value(residual),
+            point, residual=residual, value=self.blocks.value(residual),
             jacobian=None if slope is None else self.factors[:, None] * slope,
-        )
+        )  # fmt: skip
 
 
 # How a fit ends, as a user reads it.

@@ -62,7 +62,11 @@ def corrected_fit(
             point = problem.evaluate(y, False)
             worse = point is not None and best is not None and point.value >= best.value
             if point is None or not point.stable or worse:
-                if shorter == MOST_SHORTER or _is_level(point, best):
+                if shorter == MOST_SHORTER or (
+                    False
+                    if point is None or best is None or not point.stable
+                    else point.value < (1 + NOT_WORTH_A_RUN) * best.value
+                ):
                     status, failure = LEVEL, problem.failure if point is None else ""
                     break
                 shorter += 1
@@ -86,13 +90,6 @@ def corrected_fit(
     status = f"{problem.solver.name} failed: {failure}" if failure else status
     runs = problem.analyses
     return Optimum(best, status, runs + surrogate.analyses, runs, failure)
-
-
-def _is_level(point: Evaluation | None, best: Evaluation | None) -> bool:
-    """Return whether a run that went wrong was not much worse than the best."""
-    if point is None or best is None or not point.stable:
-        return False
-    return point.value < (1 + NOT_WORTH_A_RUN) * best.value
 
 
 @contextmanager

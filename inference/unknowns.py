@@ -100,13 +100,9 @@ class Unknowns:
 
     @classmethod
     def of(
-        cls,
-        form: Form,
-        nu12: float,
-        strain_range: ArrayLike,
-        bounds: LawBounds,
+        cls, form: Form, nu12: float, strain_range: ArrayLike, bounds: LawBounds,
         comparisons: Iterable[Comparison] = (),
-    ) -> Unknowns:
+    ) -> Unknowns:  # fmt: skip
         """Return the unknowns of a law and its comparisons; raises as `LawBounds.check`."""
         bounds.check(form)
         several = tuple(comparisons)
@@ -114,12 +110,9 @@ class Unknowns:
         # Where it is unknown, whatever it may be: the largest is the strictest.
         most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
         return cls(
-            form,
-            tuple(np.asarray(strain_range, dtype=float).tolist()),
-            bounds,
-            nuisance,
+            form, tuple(np.asarray(strain_range, dtype=float).tolist()), bounds, nuisance,
             most if any(c.contracts for c in several) else None,
-        )
+        )  # fmt: skip
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -400,16 +393,13 @@ class ProposedStarts:
 
     def predicted(self, unknowns: Unknowns, coefficients: Array) -> Array:
         """Return (n,) the decadic logarithm of the objective predicted at (n, size)."""
-        return np.asarray(self._regression(unknowns).predict(_places(unknowns, coefficients)))
-
-    def _regression(self, unknowns: Unknowns) -> Any:
         from sklearn.neighbors import KNeighborsRegressor
 
         if "regression" not in self._made:
             near = KNeighborsRegressor(min(NEIGHBOURS, len(self.objectives)), weights="distance")
             values = np.log10(np.maximum(self.objectives, np.finfo(float).tiny))
             self._made["regression"] = near.fit(_places(unknowns, self.coefficients), values)
-        return self._made["regression"]
+        return np.asarray(self._made["regression"].predict(_places(unknowns, coefficients)))
 
 
 def _places(unknowns: Unknowns, coefficients: Array) -> Array:

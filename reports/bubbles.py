@@ -35,10 +35,8 @@ class Cut:
 
 def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     """Return the profile of a mesh along x (axis 0) or y (axis 1).
-
     points (n, 2 or 3), displacement (n, 3), mm. Nodes on the axis where there are some, else
-    (free meshes) linear interpolation between the nodes beside it.
-    """
+    (free meshes) linear interpolation between the nodes beside it."""
     xy, u = np.asarray(points, dtype=float)[:, :2], np.asarray(displacement, dtype=float)
     on = _on_axis(xy, axis)
     if on.sum() >= ENOUGH:
@@ -96,11 +94,9 @@ def cut_charts(
     measured: Sequence[tuple[ArrayLike, ArrayLike]] = (), caption: str = "",
 ) -> Charts:  # fmt: skip
     """Return the bubble's profile along both axes (Figs 4.10 and 4.11).
-
     pressures : (frames,) MPa. points : (n, 2 or 3) mm, nodes of a full or a quarter mesh.
     displacement : (frames, n, 3) mm. measured : for each frame, points (k, 2) and displacements (k,
-    3) mm, drawn as dots.
-    """
+    3) mm, drawn as dots."""
     frames, shown = np.asarray(pressures, dtype=float), np.asarray(displacement, dtype=float)
     numbers, charts = chosen(len(frames)), []
     for axis, (title, label) in enumerate(AXES):
@@ -118,11 +114,9 @@ def cut_charts(
 
 
 def height_charts(
-    pressures: ArrayLike,
-    measured: Sequence[ArrayLike],
-    modelled: Sequence[ArrayLike],
+    pressures: ArrayLike, measured: Sequence[ArrayLike], modelled: Sequence[ArrayLike],
     measured_label: str = "measured",
-) -> Charts:
+) -> Charts:  # fmt: skip
     """Return modelled against measured z (k,) mm of each frame, and their difference."""
     frames = np.asarray(pressures, dtype=float)
     pairs = [

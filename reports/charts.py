@@ -33,7 +33,6 @@ TITLES = {"bias": "45° bias", "bias45": "45° bias"}
 @dataclass(frozen=True)
 class Series:
     """One curve, band, cloud of points or set of coloured faces of a chart.
-
     name : in the legend, "" for none. x, y : (n,) in the units of the axes; None where there is no
     value. Faces have their corners one after the other. lower, upper : (n,) ends of a band about a
     curve, or of error bars through dots. look : line, dots, only the band, or faces. colour : index
@@ -41,8 +40,7 @@ class Series:
     dash pattern, 0 for solid. ends : draw a dot at the end of the curve. faint : thin, pale and
     behind the others. marks : draw a dot at every value of a line. values : colours on the chart's
     scale, one for every dot or face. shape : Vega's name of the symbol. wide : a thick pale line
-    behind the others. hollow : dots are rings.
-    """
+    behind the others. hollow : dots are rings."""
 
     name: str
     x: Numbers
@@ -65,15 +63,13 @@ class Series:
 @dataclass(frozen=True)
 class Chart:
     """One pair of axes; the labels name the units.
-
     alt : description in words for those who cannot see the chart. from_zero : the y axis begins at
     zero. top : end of the y axis, where a band may be wider than is worth showing; None for that of
     all that is drawn. level : y of a horizontal line. x_names : names at x = 1, 2, ... in place of
     numbers. equal : both axes have the same scale, as a drawing true to scale needs. scale : label
     of the colours of `Series.values`. shades : their kind; ends : values of the first and last
     colour, those of the data by default. x_range, y_range : part that is shown; everything by
-    default.
-    """
+    default."""
 
     title: str
     x_label: str

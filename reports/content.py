@@ -1,8 +1,7 @@
 """Hold the content of a page as plain data: words, tables, charts, maps and pictures.
 
 It is written as page.json (`write_page_data`), from which report.html is made, now or later; two
-pages can be laid beside each other (`beside`).
-"""
+pages can be laid beside each other (`beside`)."""
 
 from __future__ import annotations
 
@@ -27,10 +26,8 @@ from .maps import Maps, Solid
 @dataclass(frozen=True)
 class Table:
     """A table; numbers get four significant digits; text : columns of words, beside the first.
-
     side : stands beside its neighbours where there is room. closed : opened by a click, and when
-    printed.
-    """
+    printed."""
 
     title: str
     header: Sequence[str]
@@ -105,11 +102,9 @@ class Section:
 @dataclass(frozen=True)
 class Report:
     """The content of a page, in its order; empty parts are left out.
-
     title : of the project. about : date, fabric and laboratory. summary : a sentence or two on the
     result. facts : for the head of the page. warnings : what a reader must know before using the
-    numbers. files : name and content of the files of the output folder. versions : by program.
-    """
+    numbers. files : name and content of the files of the output folder. versions : by program."""
 
     title: str
     summary: str = ""
@@ -139,13 +134,11 @@ class Report:
 @dataclass(frozen=True, eq=False)
 class Exhibit:
     """The contribution of one test to a page.
-
     figures, files : a file below the output folder, and its caption or content.
     parts : charts, maps and solids of its own, which stand before the pictures in `figures`.
     record : tables of how it was measured, for the record at the end of the page. standards :
     tables as a standard's report has them.
-    summary : the result in a sentence.
-    """
+    summary : the result in a sentence."""
 
     facts: Sequence[tuple[str, object]] = ()
     figures: Sequence[tuple[str, str]] = ()
@@ -275,9 +268,21 @@ def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]
             continue
         left.remove(twin)
         if isinstance(part, Table) and isinstance(twin, Table):
-            yield _tables(names, part, twin)
+            pairs = zip_longest(part.rows, twin.rows)
+            rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
+            note = (
+                part.note
+                if part.note == twin.note
+                else f"{names[0]}: {part.note} {names[1]}: {twin.note}"
+            )
+            text = (1, *(k + 1 for k in part.text))
+            yield Table(part.title, ["of", *part.header], rows, note, text)
         elif isinstance(part, Charts) and isinstance(twin, Charts):
-            yield _charts(names, part, twin)
+            charts = [_chart(names, a, b) for a, b in zip(part.charts, twin.charts, strict=True)]
+            caption = part.caption
+            if twin.caption != caption:
+                caption = f"{names[0]}: {part.caption} {names[1]}: {twin.caption}"
+            yield Charts(part.name, charts, caption)
         elif part == twin:
             yield part
         else:
@@ -302,38 +307,16 @@ def _named(name: str, part: Part) -> list[Part]:
     return [Facts((), name), part]
 
 
-def _tables(names: tuple[str, str], one: Table, other: Table) -> Table:
-    """Merge tables row by row."""
-    pairs = zip_longest(one.rows, other.rows)
-    rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
-    note = (
-        one.note if one.note == other.note else f"{names[0]}: {one.note} {names[1]}: {other.note}"
-    )
-    text = (1, *(k + 1 for k in one.text))
-    return Table(one.title, ["of", *one.header], rows, note, text)
-
-
-def _charts(names: tuple[str, str], one: Charts, other: Charts) -> Charts:
-    charts = [_chart(names, a, b) for a, b in zip(one.charts, other.charts, strict=True)]
-    caption = one.caption
-    if other.caption != caption:
-        caption = f"{names[0]}: {one.caption} {names[1]}: {other.caption}"
-    return Charts(one.name, charts, caption)
-
-
 def _chart(names: tuple[str, str], one: Chart, other: Chart) -> Chart:
     def own(name: str, chart: Chart, second: bool) -> list[Series]:
         return [
             replace(
-                s,
-                name=f"{s.name}, {name}" if s.name else name,
-                colour=s.colour + second,
-                rank=None,
-                dashes=s.dashes + second,
+                s, name=f"{s.name}, {name}" if s.name else name, colour=s.colour + second,
+                rank=None, dashes=s.dashes + second,
             )
             for s in chart.series
             if not s.faint
-        ]
+        ]  # fmt: skip
 
     tops = [top for top in (one.top, other.top) if top is not None]
     series = [*own(names[0], one, False), *own(names[1], other, True)]

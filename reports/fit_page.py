@@ -158,23 +158,6 @@ def misfit_table(fit: Fit) -> Table:
     return Table("Residual beside the noise", header, rows, note, text=(3, 4))
 
 
-def known_solution_table(
-    errors: dict[str, float], ranges: dict[str, tuple[float, float]]
-) -> list[Table]:
-    """Return the largest errors of the moduli, where the solution is known."""
-    rows: list[list[object]] = [
-        [name, percent(error), *(100 * end for end in ranges.get(name, (nan, nan)))]
-        for name, error in errors.items()
-    ]
-    note = (
-        "Against the known solution, over the range of logarithmic strain in the table, which is "
-        "what the tests reached. Single coefficients are not compared: the highest powers hardly "
-        "act at these strains, so quite different coefficients give the same moduli."
-    )
-    header = ["modulus", "largest error", "from strain, %", "to strain, %"]
-    return [Table("Errors of the moduli", header, rows, note)] if rows else []
-
-
 def assumed(fit: Fit) -> list[tuple[str, object]]:
     """Return the quantities that were taken as known."""
     unknowns, project = fit.project.fit.unknowns, fit.project
@@ -399,6 +382,18 @@ def _page(fit: Fit, folder: Path) -> Report:
         *(f for exhibit in exhibits.values() for f in exhibit.files),
     ]
     card = (folder / CARD).read_text(encoding="utf-8")
+    known = all(prepared.known is not None for prepared in fit.setup.tests)
+    ranges = result.get("moduli_error_range", {})
+    rows: list[list[object]] = [
+        [name, percent(error), *(100 * end for end in ranges.get(name, (nan, nan)))]
+        for name, error in result.get("moduli_error", {}).items()
+    ]
+    note = (
+        "Against the known solution, over the range of logarithmic strain in the table, which is "
+        "what the tests reached. Single coefficients are not compared: the highest powers hardly "
+        "act at these strains, so quite different coefficients give the same moduli."
+    )
+    header = ["modulus", "largest error", "from strain, %", "to strain, %"]
     return Report(
         title=fit.project.title,
         summary=verdict_words(fit),
@@ -407,13 +402,11 @@ def _page(fit: Fit, folder: Path) -> Report:
             Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
             Section("Can it be trusted?", [
                 warnings_of(fit), Words([_said_by_tests(fit), *_checked(fit)]), misfit_table(fit),
-                *known_solution_table(
-                    result.get("moduli_error", {}), result.get("moduli_error_range", {})
-                ),
+                *([Table("Errors of the moduli", header, rows, note)] if rows else []),
                 Facts(assumed(fit)), reached_table(fit),
             ]),
             Section("The moduli over strain", [_saved(moduli(fit), folder / MODULI_PICTURE)]),
-            Section(_beside_model(fit), [
+            Section(f"{'Known' if known else 'Measured'} beside modelled", [
                 part for name, exhibit in exhibits.items()
                 for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
             ]),
@@ -446,12 +439,6 @@ def _plain(prepared: Any, fitted: FittedTest, found: Findings, out: Output) -> E
     return Exhibit(facts=[("misfit", found.summary)], parts=[charts])
 
 
-def _beside_model(fit: Fit) -> str:
-    """Return the title above data and model: what was computed is not measured."""
-    known = all(prepared.known is not None for prepared in fit.setup.tests)
-    return f"{'Known' if known else 'Measured'} beside modelled"
-
-
 def optima(fit: Fit) -> Charts:
     """Return the chart of the optima of all starts."""
     words = f"Optimum of every start: {fit.setup.objective_is}, from worst to best"
@@ -468,12 +455,9 @@ def moduli(fit: Fit) -> Charts:
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
     band, sure = None, fit.best.certainty
     if sure is not None and sure.band:
-        band = np.array(
-            [
-                sure.ends(name, x, fit.law.modulus(name, x)) or ()
-                for name, x in zip(COMPONENTS, strains, strict=True)
-            ]
-        ).transpose(1, 0, 2)
+        along = zip(COMPONENTS, strains, strict=True)
+        ends = [sure.ends(name, x, fit.law.modulus(name, x)) or () for name, x in along]
+        band = np.array(ends).transpose(1, 0, 2)
     truth = None if known is None else modulus_curves(known, strains)
     words = ", where a dot ends them" if known is None and band is not None else ""
     if band is not None:
@@ -628,23 +612,16 @@ def _data_table(data: Sequence[Mapping[str, Any]]) -> Table:
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
     rows: list[list[object]] = [
         [
-            row["test"],
-            row["name"],
-            row["sha256"][:DIGITS],
-            row["format"],
-            _columns(row["columns"], row["units"]),
-            row["rows_used"],
+            row["test"], row["name"], row["sha256"][:DIGITS], row["format"],
+            _columns(row["columns"], row["units"]), row["rows_used"],
             ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
         ]
         for row in data
-    ]
+    ]  # fmt: skip
     note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
     return Table(f"{RECORD_TITLE}: data files", header, rows, note, text=(1, 2, 3, 4, 6))
 
 
 def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
-    said = []
-    for quantity, name in columns.items():
-        unit = f" in {units[quantity]}" if quantity in units else ""
-        said.append(f"{quantity}: {name}{unit}")
-    return ", ".join(said)
+    of = {quantity: f" in {unit}" for quantity, unit in units.items()}
+    return ", ".join(f"{key}: {name}{of.get(key, '')}" for key, name in columns.items())

@@ -49,12 +49,6 @@ def write_report(folder: Path | str, report: Report) -> Path:
 def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     """Write only the page: report.html of the folder, or another file; raises OutputError."""
     path = folder / PAGE if path is None else path
-    write_text(path, page_text(folder, report))
-    return path
-
-
-def page_text(folder: Path, report: Report, today: date | None = None) -> str:
-    """Return the page as text. folder : of its pictures; today : the day that it names."""
     html = environment(FileSystemLoader(TEMPLATES / "report"), html=True)
     html.filters |= {
         "number": number, "percent": percent, "chart_views": chart_views, "drawn": vega.figure,
@@ -74,9 +68,10 @@ def page_text(folder: Path, report: Report, today: date | None = None) -> str:
     context: dict[str, Any] = {f.name: getattr(report, f.name) for f in fields(report)}
     context |= {
         "style": _own(style), "script": _own(script), "library": _own(library),
-        "today": today or date.today(), "policy": policy(style, script, library),
+        "today": date.today(), "policy": policy(style, script, library),
     }  # fmt: skip
-    return html.get_template("report.html.j2").render(context)
+    write_text(path, html.get_template("report.html.j2").render(context))
+    return path
 
 
 def chart_views(part: Charts) -> list[dict[str, Any]]:
@@ -155,9 +150,7 @@ def long(value: object) -> bool:
 
 def folds(table: Table) -> list[list[int]]:
     """Return the columns of a table in rows that are narrow enough, each with those that name it.
-
-    Columns that name a row are the first and those of words right after it.
-    """
+    Columns that name a row are the first and those of words right after it."""
 
     def letters(column: int) -> int:
         words = [*str(table.header[column]).split(), *(

@@ -1,8 +1,7 @@
 """Draw values at places and surfaces over several loads: maps, a body to turn, ParaView's files.
 
 Arrays are kept packed (`Packed`); maps are charts of coloured dots that Vega draws; the surface is
-drawn here for paper, and moved by a script of the page.
-"""
+drawn here for paper, and moved by a script of the page."""
 
 from __future__ import annotations
 
@@ -34,10 +33,8 @@ MISSING = 65535
 @dataclass(frozen=True)
 class Packed:
     """Numbers of any shape: value = least + step * (0 to `STEPS`), `MISSING` for NaN.
-
     shape : of the array, in C order. least, step : in the numbers' unit. data : little endian
-    unsigned 16 bit, zlib, base 64.
-    """
+    unsigned 16 bit, zlib, base 64."""
 
     shape: tuple[int, ...]
     least: float
@@ -86,9 +83,7 @@ MOST_PLACES = 700
 @dataclass(frozen=True)
 class Panel:
     """One map: values (places of all loads one after the other,) in a unit.
-
-    row : in which it stands; maps of a row with the same shades have the same ends of colours.
-    """
+    row : in which it stands; maps of a row with the same shades have the same ends of colours."""
 
     name: str
     unit: str
@@ -127,9 +122,7 @@ class Shade:
 @dataclass(frozen=True)
 class Solid:
     """A surface of quads to turn: points (loads, nodes, 3) mm, faces (m, 4) of node numbers.
-
-    warp : (k, 3) mm, an arrow along the warp, as one line.
-    """
+    warp : (k, 3) mm, an arrow along the warp, as one line."""
 
     name: str
     loads: Sequence[str]
@@ -157,9 +150,7 @@ def maps_of(
     labels: tuple[str, str], caption: str, alt: str, source: str = "measured",
 ) -> Maps:  # fmt: skip
     """Return maps of data, model and difference (n,), a row with a unit a quantity.
-
-    source : the name of the data.
-    """
+    source : the name of the data."""
     names = source, "modelled", f"modelled − {source}"
     every = [max(1, -(-len(own) // MOST_PLACES)) for own in places]
 
@@ -371,18 +362,14 @@ def classes(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.
 
 
 def write_vtu(
-    mesh: Mesh,
-    displacement: ArrayLike,
-    path: Path | str,
+    mesh: Mesh, displacement: ArrayLike, path: Path | str,
     point_data: Mapping[str, ArrayLike] | None = None,
     cell_data: Mapping[str, ArrayLike] | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write the deformed mesh as a VTK unstructured grid.
-
     displacement : (n, 3) mm; also written as point data, so the mesh at rest is `displacement`
     subtracted (ParaView: Warp By Vector, scale -1). point_data, cell_data : (n, ...), (m, ...).
-    Raises OutputError, and ValueError for a field that does not have one row a node.
-    """
+    Raises OutputError, and ValueError for a field that does not have one row a node."""
     grid = meshio_of(mesh, displacement, point_data or {}, cell_data or {})
     with replacing(path) as temporary:
         grid.write(temporary, file_format="vtu")

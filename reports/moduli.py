@@ -35,15 +35,13 @@ def moduli_charts(
     band: ArrayLike | None = None, caption: str = "", names: Sequence[str] | None = None,
 ) -> Charts:  # fmt: skip
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
-
     strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached;
     (fits, 3, k) where every law has a range of its own. moduli : (fits, 3, k) MPa, best fit first,
     in the same order. known : (3, k) MPa; a second row of charts then shows the deviation from it
     in percent. band : (2, 3, k) MPa, ends of the band of the first fit; not drawn where it is not
     finite. names : of the fits where they are different laws, and not one's best and the next.
     Raises ValueError: not one name a fit, or strains of each law's own together with a known
-    solution.
-    """
+    solution."""
     fits, given = np.asarray(moduli, dtype=float), np.asarray(strains, dtype=float)
     if names is not None and len(names) != len(fits):
         raise ValueError(f"moduli_charts: {len(names)} names for {len(fits)} fits")
@@ -112,11 +110,9 @@ def moduli_together(
     strains: ArrayLike, moduli: ArrayLike, sigma: ArrayLike | None = None, title: str = ""
 ) -> Charts:
     """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
-
     strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. sigma :
     (3, k) MPa, one standard deviation, as bands; left out where it is not finite. The axis is
-    logarithmic where the moduli are positive and span more than a decade.
-    """
+    logarithmic where the moduli are positive and span more than a decade."""
     x, curves = PERCENT * np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
     series = []
     for m, name in enumerate(("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")):

@@ -80,34 +80,27 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         summary=summary,
         about=about_of(predictions.project, predictions.record),
         facts=[
-            ("tests", len(result["tests"])),
-            ("cards", len(result["cards"])),
-            ("solver", result["solver"]),
-            ("wall time, s", float(result["wall_s"])),
+            ("tests", len(result["tests"])), ("cards", len(result["cards"])),
+            ("solver", result["solver"]), ("wall time, s", float(result["wall_s"])),
             *([("runs from the cache", predictions.cached)] if predictions.cached else []),
             ("seconds of all runs", float(sum(run.record.seconds for run in each))),
             *(fact for exhibit in exhibits.values() for fact in exhibit.facts),
         ],
         warnings=[
-            f"{run.title}: {how}"
-            for run, how in zip(each, ended, strict=True)
+            f"{run.title}: {how}" for run, how in zip(each, ended, strict=True)
             if run.record.failure or run.record.early
         ],
         sections=[
             Section("What was predicted", [
-                part
-                for exhibit in exhibits.values()
+                part for exhibit in exhibits.values()
                 for part in replace(exhibit, facts=()).all_parts()
             ]),
             Section("What to know of the runs", _notes(predictions)),
-            Section(
-                "The record", record
-            ),
+            Section("The record", record),
             Section("How to cite", citation()),
         ],
         files=[
-            (RUNS_TABLE, "the table of runs with all its columns"),
-            (NOTES, NOTES_ARE),
+            (RUNS_TABLE, "the table of runs with all its columns"), (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
             *(file for exhibit in exhibits.values() for file in exhibit.files),
             *([] if predictions.record is None else predictions.record.files),
@@ -152,24 +145,18 @@ def write_check(check: Check, folder: Path) -> Path:
         about=about_of(check.setup.project, None),
         facts=facts,
         warnings=[
-            words
-            for j in check.judgements
-            for words in (
-                *(f"{j.test}: {d.text}" for d in j.errors),
-                *(n.line for n in j.notes),
-            )
+            words for j in check.judgements
+            for words in (*(f"{j.test}: {d.text}" for d in j.errors), *(n.line for n in j.notes))
         ],
         sections=[
             Section("Doubts", [doubts]),
-            Section(
-                "What was seen",
-                [p for _, e in exhibits for p in replace(e, facts=()).all_parts()],
-            ),
+            Section("What was seen", [
+                p for _, e in exhibits for p in replace(e, facts=()).all_parts()
+            ]),
             Section("An estimate by virtual work", shown),
         ],
-        files=[
-            ("check.json", "the doubts in plain values"), *(f for _, e in exhibits for f in e.files)
-        ],
+        files=[("check.json", "the doubts in plain values"),
+               *(f for _, e in exhibits for f in e.files)],
         versions={"bubblefit": __version__},
     )  # fmt: skip
     return write_report(folder, report)
@@ -204,10 +191,8 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
         edge = gap.places[np.append(edge, edge[0])]
         fields = zip(("dx, mm", "dy, mm", "dz, mm"), gap.field.T, strict=True)
         out = Output.of(folder, gap.name, several)
-        save(
-            out.path("equilibrium.png"),
-            disk_charts([(t, gap.places, v) for t, v in fields], edge),
-        )
+        charts = disk_charts([(t, gap.places, v) for t, v in fields], edge)
+        save(out.path("equilibrium.png"), charts)
         figures.append((out.name("equilibrium.png"), OFF.format(gap.name)))
     tables = [
         Table("Estimated moduli", header, rows, ESTIMATED),
@@ -219,8 +204,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
 def _check_summary(check: Check) -> str:
     if not check.sound:
         return "A fit would not begin."
-    doubts = sum(len(judgement.doubts) for judgement in check.judgements)
-    if doubts:
+    if doubts := sum(len(judgement.doubts) for judgement in check.judgements):
         return f"A fit would begin, and carry {doubts} of the doubts below with it."
     return "The data are fit to be fitted."
 
@@ -282,23 +266,25 @@ def page_of_folder(folder: Path) -> Report:
     if (folder / RESULT).exists():
         problem = f"has a result but no {PAGE_DATA}: an older version wrote it; run it again"
         raise InputError(folder, "", problem)
-    within = _folders_within(folder)
+    rows: list[list[object]] = []
+    for path in sorted(folder.glob("*/")):
+        if (path / RESULT).exists():
+            rows.append([path.name, "finished"])
+        elif (path / RUN).exists():
+            rows.append([path.name, "unfinished"])
+    within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
     if not (folder / RUN).exists() and not within:
         raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
+    project = _provenance(folder).get("project", {})
+    named = project.get("file") if isinstance(project, dict) else None
     return Report(
-        title=_title(folder),
+        title=f"{Path(str(named)).name if named else folder.resolve().name}: unfinished",
         summary=UNFINISHED,
         sections=[
             Section("So far", [*_starts(folder), *_runs(folder), *within]),
             Section("The record", _record(folder)),
         ],
     )
-
-
-def _title(folder: Path) -> str:
-    project = _provenance(folder).get("project", {})
-    named = project.get("file") if isinstance(project, dict) else None
-    return f"{Path(str(named)).name if named else folder.resolve().name}: unfinished"
 
 
 def _starts(folder: Path) -> list[Part]:
@@ -323,17 +309,6 @@ def _runs(folder: Path) -> list[Part]:
     """Return the number of predictions that are kept."""
     kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
     return [Facts([("runs that ended", len(kept))])] if kept else []
-
-
-def _folders_within(folder: Path) -> list[Part]:
-    """Return a table of the fits of a study, a folder each, and how far they are."""
-    rows: list[list[object]] = []
-    for path in sorted(folder.glob("*/")):
-        if (path / RESULT).exists():
-            rows.append([path.name, "finished"])
-        elif (path / RUN).exists():
-            rows.append([path.name, "unfinished"])
-    return [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
 
 
 def _provenance(folder: Path) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .charts import (
     TITLES,
@@ -35,13 +35,11 @@ GRIP = 0.06
 @dataclass(frozen=True, eq=False)
 class StripCurves:
     """Loads of one direction; a curve is a pair of elongation (mm) and load (N).
-
     direction : "warp", "fill", "bias" (or "bias45"). models : (name, elongation, load), best first;
     each may end where it likes. Where it starts above zero it is taken to have started unloaded at
     zero elongation. points : measured, of any number of specimens, in any order. polynomial : the
     load curve fitted to them, on increasing elongations. scatter : N, of the specimens about their
-    curve. rms : N, of each model in turn (Eqs 3.4-3.6), as far as known.
-    """
+    curve. rms : N, of each model in turn (Eqs 3.4-3.6), as far as known."""
 
     direction: str
     models: Sequence[tuple[str, ArrayLike, ArrayLike]] = ()
@@ -186,18 +184,18 @@ def strip_charts(
     gauge: ArrayLike, title: str = "", grips: bool = True,
 ) -> Charts:  # fmt: skip
     """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
-
     points : (n, 3) or (n, 2) mm, at rest. quads : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
     shear : (m,) gamma12 of each quad, signed or its magnitude. gauge : (2,) nodes of the virtual
     strain gauge. grips : whether the ends are held in grips, to be drawn. Raises ValueError: not
-    one shear strain a quad.
-    """
+    one shear strain a quad."""
     rest = np.asarray(points, dtype=float)[:, :2]
     now = rest + np.asarray(displacement, dtype=float)[:, :2]
     cells, gamma = np.asarray(quads, dtype=int), np.asarray(shear, dtype=float)
     if gamma.shape != (len(cells),):
         raise ValueError(f"strip_charts: {gamma.size} shear strains for {len(cells)} quads")
-    outline, ends = _outline(cells), np.asarray(gauge, dtype=int)
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    outline, ends = unique[count == 1], np.asarray(gauge, dtype=int)
     series = [
         faces("", now[cells], gamma),
         line("at rest", *_segments(rest[outline]), colour=7, dashes=1),
@@ -213,13 +211,6 @@ def strip_charts(
         shades=shades_of(gamma),
     )  # fmt: skip
     return Charts("strip", [chart], "")
-
-
-def _outline(quads: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the edges (k, 2) that belong to one quad only."""
-    edges = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return unique[count == 1]
 
 
 def _segments(edges: Array) -> tuple[Array, Array]:
@@ -243,10 +234,8 @@ def cycle_charts(
     histories: Sequence[tuple[str, Array, Array, Sequence[tuple[int, int, int]], Curve | None]],
 ) -> Charts:
     """Return load over strain of histories: name, load (n,) N, strain (n,), rows of each cycle.
-
     Rows are where a cycle begins, is highest and ends; unloading is dashed. Last : strains and
-    loads of a model, or None.
-    """
+    loads of a model, or None."""
     charts = []
     for name, load, strain, rows, model in histories:
         series = []

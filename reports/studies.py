@@ -33,10 +33,8 @@ ROOM, POINTS = 1.6, 81
 @dataclass(frozen=True, eq=False)
 class ConvergencePanel:
     """One model of a study of refinement; sizes, work and seconds are (levels,), coarse to fine.
-
     changes : by quantity, (levels - 1,) percent, from each level to the next finer one. work :
-    element-increments. seconds : wall clock.
-    """
+    element-increments. seconds : wall clock."""
 
     name: str
     sizes: Sequence[float]
@@ -59,9 +57,7 @@ class LawRow:
 @dataclass(frozen=True, eq=False)
 class ProfilePanel:
     """One modulus at one strain: MPa, -2 log L; ends None where the curve does not pass the line.
-
-    sigma : MPa, one standard deviation; band : MPa, within the bounds.
-    """
+    sigma : MPa, one standard deviation; band : MPa, within the bounds."""
 
     title: str
     values: Sequence[float]
@@ -73,11 +69,9 @@ class ProfilePanel:
 
 
 def optima_chart(
-    objectives: ArrayLike,
-    caption: str,
-    label: str = "objective",
+    objectives: ArrayLike, caption: str, label: str = "objective",
     references: Mapping[str, float] | None = None,
-) -> Charts:
+) -> Charts:  # fmt: skip
     """Return the optima (starts,), worst to best, NaN counted, and published ones as lines."""
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     ended = np.maximum(np.sort(values[np.isfinite(values)])[::-1], PERFECT)
@@ -116,10 +110,8 @@ def _changes(model: ConvergencePanel, size: str) -> Chart:
     sizes = np.asarray(model.sizes[:-1], dtype=float)
     loads = [name for name in model.changes if re.match(SERIES, name)]
     rising = dict(zip(loads, np.linspace(0.0, 1.0, max(2, len(loads))).tolist(), strict=False))
-    drawn: dict[str, np.ndarray] = {}
-    for name, values in model.changes.items():
-        change = np.asarray(values, dtype=float)
-        drawn[name] = np.where(change > SMALLEST, change, np.nan)
+    changes = {name: np.asarray(own, dtype=float) for name, own in model.changes.items()}
+    drawn = {name: np.where(own > SMALLEST, own, np.nan) for name, own in changes.items()}
     series: list[Series] = [
         line(name, sizes, change, colour=rank, rank=rising.get(name), marks=True)
         for rank, (name, change) in enumerate(drawn.items())
@@ -138,11 +130,9 @@ def _changes(model: ConvergencePanel, size: str) -> Chart:
 
 
 def nu12_charts(
-    models: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]],
-    base: float,
-    response: str,
+    models: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]], base: float, response: str,
     caption: str,
-) -> Charts:
+) -> Charts:  # fmt: skip
     """Return responses over that at the base nu12, a chart a model: nu12 and ratio (n,)."""
     if not models:
         raise ValueError("nu12_charts: no models to draw")
@@ -178,11 +168,8 @@ def _profile(panel: ProfilePanel, threshold: float) -> Chart:
         line("profile", panel.values, panel.ratios, marks=True),
         line("by the 1 sigma of the fit", x, inside, colour=1, dashes=1),
     ]
-    series += [
-        line("ends", [end, end], [0.0, threshold], dashes=2)
-        for end in panel.ends
-        if end is not None
-    ]
+    known = [end for end in panel.ends if end is not None]
+    series += [line("ends", [end, end], [0.0, threshold], dashes=2) for end in known]
     low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in panel.ends)
     alt = f"{panel.title}: best {panel.best:.4g} MPa, lower end {low}, upper end {high}"
     return Chart(
@@ -192,12 +179,10 @@ def _profile(panel: ProfilePanel, threshold: float) -> Chart:
 
 
 def weights_charts(
-    counted: str,
-    counts: Sequence[float],
-    errors: Mapping[str, Sequence[float]],
+    counted: str, counts: Sequence[float], errors: Mapping[str, Sequence[float]],
     moduli: Mapping[str, Mapping[float, Sequence[float]]],
     sigma: Mapping[str, Sequence[float] | None],
-) -> list[Charts]:
+) -> list[Charts]:  # fmt: skip
     """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
     across = f"weight of {counted}, times that of the project"
     drawn = [
@@ -226,11 +211,9 @@ def weights_charts(
 
 
 def held_out_charts(
-    tests: Sequence[str],
-    predicted: Mapping[str, Sequence[float]],
-    fitted: Mapping[str, Sequence[float]],
-    caption: str,
-) -> Charts:
+    tests: Sequence[str], predicted: Mapping[str, Sequence[float]],
+    fitted: Mapping[str, Sequence[float]], caption: str,
+) -> Charts:  # fmt: skip
     """Return relative errors by law at each test: predicted, and by the fit to all of them."""
     errors = {f"{law}, predicted": 100 * np.asarray(own) for law, own in predicted.items()}
     errors |= {f"{law}, fitted": 100 * np.asarray(own) for law, own in fitted.items()}
@@ -259,9 +242,8 @@ def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption:
         for at, values in zip(place, folds, strict=True)
         if np.isfinite(values).any()
     ]
-    chart = _named(
-        "form of the moduli (number of coefficients)", label, names, errors, alt, noise, own
-    )
+    across = "form of the moduli (number of coefficients)"
+    chart = _named(across, label, names, errors, alt, noise, own)
     return Charts("laws", [chart], caption)
 
 
@@ -301,12 +283,8 @@ def _named(
 ) -> Chart:  # fmt: skip
     """Return a chart over names instead of numbers."""
     place = np.arange(len(names)) + 1.0
-    series = [
-        dots(name, place + by, own, colour=rank)
-        for rank, ((name, own), by) in enumerate(
-            zip(values.items(), _aside(len(values)), strict=True)
-        )
-    ]
+    pairs = zip(values.items(), _aside(len(values)), strict=True)
+    series = [dots(k, place + by, own, colour=c) for c, ((k, own), by) in enumerate(pairs)]
     drawn = [np.array(s.y, dtype=float) for s in (*series, *more)]
     log = spans_a_decade(np.concatenate([*drawn, [np.nan if level is None else level]]))
     return Chart(

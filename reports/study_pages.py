@@ -1,7 +1,6 @@
 """Write the folder of a study: tables, figures, notes.csv, report.html and, last, result.json.
 
-A function a study returns its content, by the type of its result; `write_folder` writes it.
-"""
+A function a study returns its content, by the type of its result; `write_folder` writes it."""
 
 from __future__ import annotations
 
@@ -28,23 +27,12 @@ from ..runs.poisson import Nu12Study
 from ..runs.refinement import Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
 from ..solvers.base import History
+from . import studies
 from .charts import Charts
 from .content import Listing, Picture, Report, Section, Table
 from .fit_page import about_of, citation, correlation_table
 from .html import write_report
 from .moduli import bootstrap_charts
-from .studies import (
-    ConvergencePanel,
-    LawRow,
-    ProfilePanel,
-    convergence_charts,
-    held_out_charts,
-    law_charts,
-    nu12_charts,
-    plan_charts,
-    profile_charts,
-    weights_charts,
-)
 from .vega import Drawing, save
 
 #: Files of every study, after its own.
@@ -123,13 +111,12 @@ def plain(
 
 
 def _refinement(study: Refinement) -> Content:
-    """Return the content of a study of meshes or increments."""
     title = f"{study.project.name}: finer and finer {study.what}"
-    charts = convergence_charts(panels(study), study.what, title)
+    charts = studies.convergence_charts(panels(study), study.what, title)
     return plain(study, title, "convergence", [charts], charts)
 
 
-def panels(study: Refinement) -> list[ConvergencePanel]:
+def panels(study: Refinement) -> list[studies.ConvergencePanel]:
     """Return relative changes from each level to the next finer one, by model."""
     drawn = []
     for name, runs in study.runs.items():
@@ -144,32 +131,31 @@ def panels(study: Refinement) -> list[ConvergencePanel]:
             changes["RMS along the load curve"] = [100 * r / largest for r in rms]
         sizes = [run.level.size for run in good]
         work = [run.level.elements * run.level.part.increments for run in good]
-        drawn.append(ConvergencePanel(name, sizes, changes, work, [run.seconds for run in good]))
+        drawn.append(
+            studies.ConvergencePanel(name, sizes, changes, work, [run.seconds for run in good])
+        )
     return drawn
 
 
 def _nu12(study: Nu12Study) -> Content:
-    """Return the content of a study of nu12."""
     shown = {
         name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
         for name, part in study.parts.items()
     }
     title = f"{study.project.name}: what nu12 changes"
-    charts = nu12_charts(shown, study.base, study.response, title)
+    charts = studies.nu12_charts(shown, study.base, study.response, title)
     return plain(study, title, "nu12", [charts], charts)
 
 
 def _validation(study: Validation) -> Content:
-    """Return the content of a validation."""
     title = f"{study.title}: errors at data left out of the fit"
-    charts = held_out_charts(
+    charts = studies.held_out_charts(
         *study.errors(), "Errors at data left out of the fit (predicted), and given to it (fitted)"
     )
     return plain(study, title, "validation", [charts], digits=9)
 
 
 def _weights(study: weights.WeightStudy) -> Content:
-    """Return the content of a study of weights."""
     ended = study.ended
     moduli = {
         name: {
@@ -178,7 +164,7 @@ def _weights(study: weights.WeightStudy) -> Content:
         }
         for name in COMPONENTS
     }
-    parts = weights_charts(
+    parts = studies.weights_charts(
         study.counted, [run.count for run in ended],
         {name: [run.relative[name] for run in ended] for name in ended[0].relative}, moduli,
         {name: study.sigma(name) for name in COMPONENTS},
@@ -189,7 +175,6 @@ def _weights(study: weights.WeightStudy) -> Content:
 
 
 def _bootstrap(study: bootstrap.Bootstrap) -> Content:
-    """Return the content of a bootstrap."""
     found, law = study.found, study.found.best.law
     best = {name: law.modulus(name, strain) for name, strain in study.strains.items()}
     charts = bootstrap_charts(study.strains, best, study.bands, study.of_fit, BANDS)
@@ -226,12 +211,11 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 
 
 def _profiles(study: profile.Profiles) -> Content:
-    """Return the content of profile likelihoods."""
     shown = [
-        ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
+        studies.ProfilePanel(one.name, *one.curve, one.best, one.sigma, one.ends, one.band)
         for one in study.each
     ]
-    charts = profile_charts(shown, THRESHOLD, LIKELIHOODS)
+    charts = studies.profile_charts(shown, THRESHOLD, LIKELIHOODS)
     header = [
         "modulus", "MPa", f"{100 * LEVEL:.0f} % from, MPa", "to, MPa", "band of the fit from, MPa",
         "to, MPa", "upper over lower distance", "analyses",
@@ -241,18 +225,15 @@ def _profiles(study: profile.Profiles) -> Content:
         title=f"{study.title}: profile likelihood",
         summary=f"{study.each[0].name}: {study.each[0].words}.",
         facts=[
-            ("card", study.card),
-            ("tests", ", ".join(study.tests)),
-            ("analyses", study.analyses),
+            ("card", study.card), ("tests", ", ".join(study.tests)), ("analyses", study.analyses),
         ],
         sections=[
-            Section(
-                "The profiles",
-                [charts, Table("Between what each modulus lies", header, rows, profile.METHOD)],
-            )
+            Section("The profiles", [
+                charts, Table("Between what each modulus lies", header, rows, profile.METHOD)
+            ])
         ],
         files=[("profile.csv", "the curves"), ("profile.png", "picture of the profiles")],
-    )
+    )  # fmt: skip
     return page, {"profile.csv": study.table()}, {"profile.png": charts}, 9
 
 
@@ -266,12 +247,11 @@ def _interval(one: profile.Profile) -> list[object]:
 
 
 def _plan(study: plan.Plan) -> Content:
-    """Return the content of a plan."""
     words, now, first = plan.words, study.now, study.candidates[0]
     every = [("the present tests alone", now)]
     every += [(f"{k}. {p.title}", p) for k, p in enumerate(study.candidates, start=1)]
     sigma = {name: [100 * one.summary[name] for _, one in every] for name in COMPONENTS}
-    charts = plan_charts([title for title, _ in every], sigma, UNCERTAINTIES)
+    charts = studies.plan_charts([title for title, _ in every], sigma, UNCERTAINTIES)
     rows: list[list[object]] = [
         [title, *(words(p.summary[name]) for name in COMPONENTS), p.noise] for title, p in every
     ]
@@ -284,11 +264,8 @@ def _plan(study: plan.Plan) -> Content:
         )
         for name in COMPONENTS
     ]
-    facts = [
-        ("card", study.card),
-        ("present tests", ", ".join(study.tests)),
-        ("ranked by", study.criterion),
-    ]
+    facts = [("card", study.card), ("present tests", ", ".join(study.tests))]
+    facts.append(("ranked by", study.criterion))
     if study.following is not None:
         after = ", ".join(f"{name} {words(s)}" for name, s in study.following.summary.items())
         facts.append(("best after the first", f"{study.following.title}: {after}"))
@@ -312,9 +289,10 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     """Return the content of a comparison of forms; with a folder also what each test draws."""
     error, total = study.result["objective_is"], sum(noise(study.forms[0]).values())
     rows = [
-        LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out()) for f in study.forms
+        studies.LawRow(f.name, f.coefficients, f.fitted, f.validated, f.left_out())
+        for f in study.forms
     ]
-    charts, table = law_charts(rows, total, error, ERRORS), study.table()
+    charts, table = studies.law_charts(rows, total, error, ERRORS), study.table()
     note = "fitted: to all points; left out: at what the fits of the folds were not given"
     cells = table.to_numpy(dtype=object).tolist()
     tests = study.forms[0].fit.setup.tests

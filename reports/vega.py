@@ -2,8 +2,7 @@
 
 `panel` turns one `Chart` into the data, scales, axes, legends and marks of a Vega group. A file is
 a grid of such groups; on the page each is a view of its own. vl-convert runs Vega without a
-browser, and carries the scripts that the page holds.
-"""
+browser, and carries the scripts that the page holds."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from ..inference.noise import Noise
 from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law
-from ..materials.card import CardCertainty, MaterialCard, certainty_of, words_of
+from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
@@ -59,11 +59,9 @@ LEAST_STRAIN = 1e-6
 @dataclass(frozen=True, eq=False)
 class BestFit:
     """The best fit, run again.
-
     point : by the project's solver. differentiated : the same by the solver that differentiates, if
     it could. ranked : starts with a fit, best first. records : all, by number. reached : (3,)
-    largest (eps1, eps2, gamma12) in all tests. certainty : None without derivatives.
-    """
+    largest (eps1, eps2, gamma12) in all tests. certainty : None without derivatives."""
 
     point: Evaluation
     differentiated: Evaluation | None
@@ -86,10 +84,8 @@ class BestFit:
 
 def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: float) -> BestFit:
     """Run the best of the starts again; another program gets a second try.
-
     tolerance : objectives below it are the same. SolverFailure : it does not run again, or gives
-    another objective.
-    """
+    another objective."""
     ranked = ranking(records)
     problem.reset()
     unknowns = np.array(ranked[0].unknowns)
@@ -101,7 +97,18 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     if point is None:
         said = f"the best fit does not run again: {problem.failure}"
         raise SolverFailure(f"{said}; its starts are kept, --resume goes on", problem.solver.name)
-    first = _repeated(problem, ranked[0], point, tolerance)
+    record = ranked[0]
+    assert record.objective is not None
+    before, now = record.objective, point.value
+    untold = tolerance + UNTOLD * sum(noise_of(problem).values())
+    if abs(now - before) > ROUNDING * max(now, before) + untold:
+        raise SolverFailure(
+            f"start {record.number} ended with an objective of {before:.6g}, and the same moduli "
+            f"give {now:.6g} from the unloaded state: the fit hangs on the way it was reached; "
+            "more increments usually help",
+            problem.solver.name,
+        )
+    first = replace(record, objective=now)
     ranked = [_like(r, first) for r in ranked]
     again = [_like(r, first) for r in records]
     strains = [strains_of(h) for h in point.histories]
@@ -132,23 +139,6 @@ def noise_of(problem: FitProblem) -> dict[str, float]:
     }
 
 
-def _repeated(
-    problem: FitProblem, record: StartRecord, point: Evaluation, tolerance: float
-) -> StartRecord:
-    """Return the best record with the objective of the run from the unloaded state."""
-    assert record.objective is not None
-    before, now = record.objective, point.value
-    untold = tolerance + UNTOLD * sum(noise_of(problem).values())
-    if abs(now - before) > ROUNDING * max(now, before) + untold:
-        raise SolverFailure(
-            f"start {record.number} ended with an objective of {before:.6g}, and the same moduli "
-            f"give {now:.6g} from the unloaded state: the fit hangs on the way it was reached; "
-            "more increments usually help",
-            problem.solver.name,
-        )
-    return replace(record, objective=now)
-
-
 #: Factor of the finer mesh.
 FINER = 2.0
 #: Values of `fit.mesh_error`.
@@ -159,9 +149,7 @@ LEAST, NOTHING = 0.01, 1e-4
 
 def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limit | None:
     """Return the limit of the best fit on ever finer meshes; InputError, SolverFailure.
-
-    None without derivatives, for another program (not run unasked), or without a finer model.
-    """
+    None without derivatives, for another program (not run unasked), or without a finer model."""
     if best.differentiated is None or problem.solver.external:
         return None
     if not all(isinstance(test, Refinable) for test in setup.tests):
@@ -218,10 +206,8 @@ NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """Return the best fit with its certainty, if its derivatives are known.
-
     Noise is the residual of finer models. With `mesh_error` taken out, and where the mesh moves
-    anything, the law is that of ever finer meshes; the analysis stays that of the fit.
-    """
+    anything, the law is that of ever finer meshes; the analysis stays that of the fit."""
     slopes = best.differentiated
     if slopes is None:
         return best
@@ -289,9 +275,7 @@ def card_certainty(
     problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
 ) -> CardCertainty | None:
     """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
-
-    With an error of the mesh not taken out, draws lie about the law of ever finer meshes.
-    """
+    With an error of the mesh not taken out, draws lie about the law of ever finer meshes."""
     sure = best.certainty
     known = None if sure is None else sure.fine or sure.posterior
     if sure is None or known is None:
@@ -314,9 +298,7 @@ MOVED = 0.02
 @dataclass(frozen=True, eq=False)
 class Optimum:
     """A fit's optimum, found again from its card, with derivatives and certainty.
-
-    moved : largest relative change of each modulus from the card.
-    """
+    moved : largest relative change of each modulus from the card."""
 
     setup: FitSetup
     problem: FitProblem
@@ -353,10 +335,8 @@ class Optimum:
 
 def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> Optimum:
     """Find the optimum of the project's fit from a card, by a solver that differentiates.
-
     card : by default that of the project's fit. InputError : in the project or its data; no card,
-    or one of another form. SolverFailure : the tests cannot be run with it.
-    """
+    or one of another form. SolverFailure : the tests cannot be run with it."""
     notes = []
     named = project.fit.solver
     if make_solver(project).external:
@@ -366,7 +346,17 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
     material = card_of(project, card)
     setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
     problem = setup.problem()
-    point = evaluate_law(problem, _unknowns(setup, problem, material), with_jacobian=True)
+    own, unknowns = material.law.form, problem.unknowns
+    if own != setup.law.form:
+        expected = "expected a card of this project's fit: its moduli are "
+        expected += f"{setup.law.form.describe()}, those of the card {own.describe()}"
+        raise InputError(setup.project.path, "--card", expected)
+    start = unknowns.at(material.law.beta[list(unknowns.free)])
+    known = {"nu12": material.law.nu12, "thickness": material.thickness}
+    for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
+        if shared.name in known:
+            start[place] = min(max(known[shared.name], shared.lower), shared.upper)
+    point = evaluate_law(problem, start, with_jacobian=True)
     if point is None:
         said = f"the tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(said, problem.solver.name)
@@ -378,35 +368,15 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         0, (project.fit.seed, 0), found.value, status, analyses, y, coefficients, 0.0
     )
     best = with_certainty(setup, problem, best_fit(problem, [record], tolerance))
-    moved = _moved(material, best)
+    moved = {}
+    for name, component in COMPONENTS.items():
+        end = min(float(best.valid[component]), float(material.law.strain_range[component]))
+        strain = np.linspace(0.0, end, 21)
+        change = best.law.modulus(name, strain) / material.law.modulus(name, strain) - 1.0
+        moved[name] = float(change[np.abs(change).argmax()])
     far = [f"{name} by {100 * by:+.2g} %" for name, by in moved.items() if abs(by) > MOVED]
     if far:
         words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
         notes.append(Note(NOT_THE_CARD, words))
     words = card_words(card)
     return Optimum(setup, problem, best, words, analyses + 1, moved, tuple(notes))
-
-
-def _unknowns(setup: FitSetup, problem: FitProblem, card: MaterialCard) -> Array:
-    """Return the unknowns (count,) of a card; raises InputError for another form."""
-    own, unknowns = card.law.form, problem.unknowns
-    if own != setup.law.form:
-        expected = "expected a card of this project's fit: its moduli are "
-        expected += f"{setup.law.form.describe()}, those of the card {own.describe()}"
-        raise InputError(setup.project.path, "--card", expected)
-    y = unknowns.at(card.law.beta[list(unknowns.free)])
-    known = {"nu12": card.law.nu12, "thickness": card.thickness}
-    for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
-        if shared.name in known:
-            y[place] = min(max(known[shared.name], shared.lower), shared.upper)
-    return y
-
-
-def _moved(card: MaterialCard, best: BestFit) -> dict[str, float]:
-    moved = {}
-    for name, component in COMPONENTS.items():
-        end = min(float(best.valid[component]), float(card.law.strain_range[component]))
-        strain = np.linspace(0.0, end, 21)
-        change = best.law.modulus(name, strain) / card.law.modulus(name, strain) - 1.0
-        moved[name] = float(change[np.abs(change).argmax()])
-    return moved

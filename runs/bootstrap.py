@@ -156,14 +156,10 @@ class Bootstrap(Presented):
         away = (each - each.mean(axis=0)) / moved
         correlation = away.T @ away / (len(each) - 1)
         names = list(known.labels)
-        table = pd.DataFrame(
-            {
-                "unknown": names,
-                "value": turn @ self.found.point.unknowns,
-                "sigma": sigma,
-                "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
-            }
-        )
+        table = pd.DataFrame({
+            "unknown": names, "value": turn @ self.found.point.unknowns, "sigma": sigma,
+            "sigma_of_fit": np.sqrt(np.diag(known.coefficients)),
+        })  # fmt: skip
         return pd.concat([table, pd.DataFrame(correlation, columns=names)], axis=1)
 
     def table(self) -> pd.DataFrame:
@@ -219,13 +215,10 @@ class Bootstrap(Presented):
     def lines(self) -> list[str]:
         """Return the result in words, for the terminal."""
         drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
+        each = [f"{n} {percent(own)} (fit {percent(of)})" for n, (own, of) in self.sigma.items()]
         lines = [
             f"{len(self.samples)} samples of {self.over}: {drawn}; {self.analyses} analyses",
-            "1 sigma, root mean square along the strain: "
-            + ", ".join(
-                f"{name} {percent(own)} (fit {percent(of)})"
-                for name, (own, of) in self.sigma.items()
-            ),
+            f"1 sigma, root mean square along the strain: {', '.join(each)}",
         ]
         if self.unfinished:
             lines.append(f"{self.unfinished} samples used up their analyses before they settled")
@@ -240,17 +233,14 @@ def bootstrap(
     progress: Progress | bool | None = None,
 ) -> Bootstrap:  # fmt: skip
     """Draw parts of the data with replacement and fit every draw.
-
     Every refit begins at the optimum of the fit that wrote the card and takes a few analyses. What
     is drawn twice counts twice. over : "tests" (among those of their kind), or a sort of parts of
     the tests: "frames", "specimens", "directions", "ratios". samples : number of draws. card : the
     one that the project's fit left in its usual folder unless given. tests : as for `fit`. seed :
     of the draws, the project's unless given. out : folder of the study, in which every sample is
-    kept as it ends;
-    resume : read what it holds. Raises InputError: in the project or its data; fewer than two
-    units; OutputError: the folder is used or cannot be written; SolverFailure: the tests cannot be
-    run with the card.
-    """
+    kept as it ends; resume : read what it holds. Raises InputError: in the project or its data;
+    fewer than two units; OutputError: the folder is used or cannot be written; SolverFailure: the
+    tests cannot be run with the card."""
     check_asked(out, resume, overwrite)
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")
@@ -295,8 +285,8 @@ def _tests(found: Optimum) -> list[Group]:
         kinds.setdefault(test.test.kind, []).append(Unit(test.test.name, rows))
     several = [Group(kind, units) for kind, units in kinds.items() if len(units) > 1]
     if not several:
-        problem_said = "no kind of which the project has two tests or more"
-        raise InputError(setup.project.path, "--over", problem_said)
+        said = "no kind of which the project has two tests or more"
+        raise InputError(setup.project.path, "--over", said)
     return several
 
 

@@ -48,10 +48,8 @@ LOST = "no fit without its points ended well, or no analysis at them: the form i
 
 def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project]:
     """Return the project with each of the forms, by name; all that its solver carries unless given.
-
     names : of forms; "spline:8" is a spline of eight knots for each modulus. Raises InputError: no
-    such form, or bounds that do not go with every form.
-    """
+    such form, or bounds that do not go with every form."""
     bounds = project.law.bounds
     if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
         problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
@@ -88,10 +86,8 @@ def plain(name: str) -> str:
 @dataclass(frozen=True)
 class FoldError:
     """Errors at the points that a fold leaves out.
-
     value : their part of the objective; rms : root mean square by comparison, in its unit. None and
-    empty where no fit without them, or no analysis, ended well.
-    """
+    empty where no fit without them, or no analysis, ended well."""
 
     fold: int
     value: float | None
@@ -118,12 +114,10 @@ def validate(
     setup: FitSetup, count: int, starts: int, done: Collection[int] = ()
 ) -> Iterator[FoldError | None]:
     """Fit without the points of each fold and judge at these points; None now and then.
-
     Strain range and breaks of the law, and scales of relative errors, follow from the points
     matched, and the fits begin at random starts of their own: the points left out enter only by how
     far the models are strained. count : of folds, at most. starts : random starts a fold, the best
-    of which counts.
-    """
+    of which counts."""
     parts = folds(setup, count)
     missing = [fold for fold in range(len(parts)) if fold not in done]
     prepare = functools.partial(_task, setup, parts, starts)
@@ -351,15 +345,13 @@ def compare(
     command_line: Sequence[str] | None = None,
 ) -> LawComparison:  # fmt: skip
     """Fit every form to the tests, then without some specimens, and judge it at those.
-
     Tests without known specimens stay whole in every fold. tests : by name or kind; every test that
     can be fitted unless given. forms : as for `candidates`. folds : at most; fold_starts : random
     starts of the fit of each. starts : random starts of the fit of each form. out : folder of the
     study, with a folder for each form, written as the fits end. trust, progress, command_line : as
     for `fit`. Raises InputError:
     in the project or its data, no test with specimens, nothing to resume; OutputError,
-    NoFeasibleStart, SolverFailure: as `fit`.
-    """
+    NoFeasibleStart, SolverFailure: as `fit`."""
     check_asked(out, resume, overwrite)
     tell = listener(progress)
     project = project.with_fit(trust=[*project.fit.trust, *trust])

@@ -6,8 +6,7 @@ Every process has a pipe of its own and nothing is shared (tests/runs/test_proce
 
 `ClusterTasks`: each worker thread has one task at a time, so the task of a dead worker is
 known and done again, nothing waits behind a long task, and later workers are used. Reports of a
-task come with its result, once.
-"""
+task come with its result, once."""
 
 from __future__ import annotations
 
@@ -73,10 +72,8 @@ def cores() -> int:
 @dataclass(frozen=True)
 class Executor:
     """Do tasks here or on a cluster, with the same results.
-
     jobs : at once; by default all cores of machine or cluster. scheduler : address of a Dask
-    scheduler; by default processes of this machine.
-    """
+    scheduler; by default processes of this machine."""
 
     jobs: int | None = None
     scheduler: str | None = None
@@ -87,18 +84,13 @@ class Executor:
             check_scheduler(self.scheduler)
 
     def run_tasks(
-        self,
-        prepare: Callable[[], Task],
-        numbers: Sequence[int],
-        what: str = "starts",
+        self, prepare: Callable[[], Task], numbers: Sequence[int], what: str = "starts",
         lost: Lost | None = None,
-    ) -> Iterator[Any]:
+    ) -> Iterator[Any]:  # fmt: skip
         """Do the task of every number; yield records as they come, None now and then.
-
         prepare : makes the task, once a process. what : name of the tasks. lost : for a task at
         which worker after worker died; by default an error. BubblefitError : of a task; of
-        processes that died (exit code 4: only current tasks are lost).
-        """
+        processes that died (exit code 4: only current tasks are lost)."""
         if self.scheduler is None:
             yield from run_tasks(prepare, numbers, self.jobs or cores(), what)
             return
@@ -110,13 +102,9 @@ class Executor:
                 series.cancel()
 
     def run_starts(
-        self,
-        build: Callable[[], FitProblem],
-        options: FitOptions,
-        seed: int,
-        numbers: Sequence[int],
-        mesh: MeshName = "full",
-    ) -> Iterator[Record | None]:
+        self, build: Callable[[], FitProblem], options: FitOptions, seed: int,
+        numbers: Sequence[int], mesh: MeshName = "full",
+    ) -> Iterator[Record | None]:  # fmt: skip
         """Fit every start, as `run_tasks`; build : the problem, once a process. mesh : of it."""
 
         def lost(number: int, why: str) -> StartRecord:
@@ -143,10 +131,8 @@ def run_tasks(
     prepare: Callable[[], Task], numbers: Sequence[int], jobs: int, what: str = "starts"
 ) -> Iterator[Any]:
     """Do tasks as `Executor.run_tasks` in `jobs` processes beside this one, which only listens.
-
     A task whose process dies is done again, once: its earlier reports come twice. A second death,
-    or an error of a task, ends all.
-    """
+    or an error of a task, ends all."""
     context = process_context()
     waiting, left, died = deque(numbers), len(numbers), Counter[int]()
     workers: list[_Worker] = []
@@ -265,7 +251,12 @@ def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
         except (EOFError, ConnectionError):  # nobody listens any more
             raise SystemExit(1) from None
         except Exception as error:
-            _send_error(listener, error)
+            try:
+                listener.send(error)
+            except ConnectionError:
+                raise SystemExit(1) from None
+            except Exception:  # it cannot cross: its words can
+                listener.send(BubblefitError(f"{type(error).__name__}: {error}"))
     except SystemExit:
         # Nothing else of a copy of the parent is run: the end is an end at once.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -276,20 +267,9 @@ def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
-def _send_error(listener: connection.Connection, error: Exception) -> None:
-    try:
-        listener.send(error)
-    except ConnectionError:
-        raise SystemExit(1) from None
-    except Exception:  # it cannot cross: its words can
-        listener.send(BubblefitError(f"{type(error).__name__}: {error}"))
-
-
 def _end_with_parent(number: int) -> None:
     """Interrupt this process when its parent is gone, and kill it GRACE_S later.
-
-    The kernel's signal is of Linux only, and comes when the starting thread ends.
-    """
+    The kernel's signal is of Linux only, and comes when the starting thread ends."""
     me = psutil.Process()
     with suppress(psutil.NoSuchProcess):
         parent = psutil.Process(number)
@@ -304,14 +284,9 @@ class ClusterTasks:
     """Tasks of one kind on the workers that a scheduler has."""
 
     def __init__(
-        self,
-        client: Any,
-        prepare: Callable[[], Task],
-        numbers: Sequence[int],
-        jobs: int | None,
-        what: str,
-        lost: Callable[[int, str], Any] | None,
-    ) -> None:
+        self, client: Any, prepare: Callable[[], Task], numbers: Sequence[int], jobs: int | None,
+        what: str, lost: Callable[[int, str], Any] | None,
+    ) -> None:  # fmt: skip
         self.client, self.jobs, self.what, self.lost = client, jobs, what, lost
         self.name = f"bubblefit-{uuid.uuid4().hex}"
         self.prepare: bytes = cloudpickle.dumps(prepare)
@@ -403,7 +378,13 @@ class ClusterTasks:
         except Exception as caught:
             error = caught
         if number is None:
-            self._joined(worker, result if error is None else error)
+            said = result if error is None else error
+            wanted = version()
+            if said == wanted:
+                self.threads[worker], self._used = self.there.get(worker, 1), True
+            elif worker in self.there:
+                self.refused[worker] = f"worker {worker} is not used: it has {_other(said, wanted)}"
+                announce(self.refused[worker])
         elif error is None:
             yield from result
         elif isinstance(error, NotJoined):
@@ -416,15 +397,6 @@ class ClusterTasks:
             yield from self._again(worker, [number])
         else:
             raise error
-
-    def _joined(self, worker: str, said: Any) -> None:
-        """Use a worker if its bubblefit is ours."""
-        wanted = version()
-        if said == wanted:
-            self.threads[worker], self._used = self.there.get(worker, 1), True
-        elif worker in self.there:
-            self.refused[worker] = f"worker {worker} is not used: it has {_other(said, wanted)}"
-            announce(self.refused[worker])
 
     def _died(self, worker: str) -> Iterator[Any]:
         """Give the tasks of a worker that is gone to others."""
@@ -477,11 +449,6 @@ def _error(words: str) -> BubblefitError:
 @functools.cache
 def version() -> tuple[str, str, str]:
     """Return the versions of Python, of bubblefit, and of its code by content."""
-    return platform.python_version(), __version__, _code()
-
-
-def _code() -> str:
-    """Return the SHA-256 of all modules and templates of the package."""
     files = [*ROOT.glob("*.py")]
     for folder in ROOT.iterdir():
         if folder.name == "templates" or (folder / "__init__.py").exists():
@@ -489,7 +456,7 @@ def _code() -> str:
     named = {path.relative_to(ROOT).as_posix(): path for path in files}
     marks = [(name, file_mark(named[name])) for name in sorted(named)
              if name.split("/")[0] not in ("tests", "setup.py")]  # fmt: skip
-    return hashlib.sha256(repr(marks).encode()).hexdigest()
+    return platform.python_version(), __version__, hashlib.sha256(repr(marks).encode()).hexdigest()
 
 
 def join(series: str, prepare: bytes, wanted: tuple[str, str, str]) -> tuple[str, str, str]:
@@ -527,16 +494,11 @@ def work_of(series: str, number: int, topic: str) -> list[Any]:
         told.append(record)
 
     with hearing(said), unless(unwanted):
-        told.append(_task(series)(number, tell))
+        ready: dict[str, Any] | None = getattr(_ready, "tasks", None)
+        if ready is None or series not in ready:
+            if series not in _prepared:
+                raise NotJoined(series)
+            _ready.limits = threadpool_limits(1)  # the worker's threads are what runs side by side
+            _ready.tasks = ready = {series: cloudpickle.loads(_prepared[series])()}
+        told.append(ready[series](number, tell))
     return told
-
-
-def _task(series: str) -> Any:
-    """Return the task of a series, made once a thread, as solvers keep things."""
-    ready: dict[str, Any] | None = getattr(_ready, "tasks", None)
-    if ready is None or series not in ready:
-        if series not in _prepared:
-            raise NotJoined(series)
-        _ready.limits = threadpool_limits(1)  # the worker's threads are what runs side by side
-        _ready.tasks = ready = {series: cloudpickle.loads(_prepared[series])()}
-    return ready[series]

@@ -1,7 +1,6 @@
 """The output folder of a run: its store, kept runs and analyses, resuming, the record, presenters.
 
-The record, provenance.json: project, data files, command, date, machine, versions.
-"""
+The record, provenance.json: project, data files, command, date, machine, versions."""
 
 from __future__ import annotations
 
@@ -155,20 +154,14 @@ class Store:
         return (self.path / RUN).exists() or (self.path / RESULT).exists()
 
     def begin(
-        self,
-        parts: Mapping[str, str],
-        resume: bool,
-        overwrite: bool,
-        records: Sequence[str] = (),
+        self, parts: Mapping[str, str], resume: bool, overwrite: bool, records: Sequence[str] = (),
         facts: Facts | None = None,
-    ) -> bool:
+    ) -> bool:  # fmt: skip
         """Make the folder ready; return whether it holds anything to go on with.
-
         parts : digests of what must be the same to resume, by name; empty if every record carries
         one. records : files below the folder to remove unless resumed. facts : behind the digests,
         to describe a difference. OutputError : the folder cannot be written, or is used without
-        `resume` or `overwrite`. InputError : something else to resume, or not readable.
-        """
+        `resume` or `overwrite`. InputError : something else to resume, or not readable."""
         if self.used and not (resume or overwrite):
             problem = "already holds results; go on with --resume, replace them with --overwrite"
             raise OutputError(f"{self.path}: {problem}, or name another folder with --out")
@@ -223,9 +216,7 @@ CSV, PARQUET = ".csv", ".parquet"
 
 def write_table(table: pd.DataFrame, path: Path | str) -> Path:
     """Write a table as .csv (nine digits) or .parquet (exact), by the ending of the file's name.
-
-    InputError : another ending, or Parquet without pyarrow. OutputError.
-    """
+    InputError : another ending, or Parquet without pyarrow. OutputError."""
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in (CSV, PARQUET):
@@ -284,15 +275,13 @@ class RunRecords:
                 strain = np.array(content["strain"], dtype=float)
                 arrays = {n: np.array(content[f"of_{n}"], dtype=float) for n in words["arrays"]}
             return RunRecord(
-                float(words["seconds"]),
-                early=str(words["early"]),
-                strain=strain if len(strain) else None,
-                arrays=arrays,
+                float(words["seconds"]), early=str(words["early"]),
+                strain=strain if len(strain) else None, arrays=arrays,
                 iterations=int(words["iterations"]),
                 unstable=None if words["unstable"] is None else tuple(words["unstable"]),
                 remarks=tuple(Note(NoteKind(kind), *said) for kind, *said in words["remarks"]),
                 from_cache=bool(words.get("from_cache", False)),
-            )
+            )  # fmt: skip
         return None
 
     def _file(self, mark: str) -> Path:
@@ -304,9 +293,7 @@ FOLDER = "analyses"
 
 class KeptAnalyses(RunCache):
     """The analyses of a study that writes into `folder`, each under a key of all it depends on.
-
-    Before the first analysis, unless `resume`, earlier ones are removed.
-    """
+    Before the first analysis, unless `resume`, earlier ones are removed."""
 
     def __init__(self, folder: Path, resume: bool) -> None:
         super().__init__(folder / FOLDER)
@@ -332,25 +319,18 @@ class KeptAnalyses(RunCache):
 
 #: Module of `reports` and its function, by the type of the result.
 PRESENTERS = {
-    "Bootstrap": ("study_pages", "write_study"),
-    "Check": ("run_pages", "write_check"),
-    "Fit": ("fit_page", "write_fit"),
-    "LawComparison": ("study_pages", "write_comparison"),
-    "Nu12Study": ("study_pages", "write_study"),
-    "Plan": ("study_pages", "write_study"),
-    "Predictions": ("run_pages", "write_predictions"),
-    "Profiles": ("study_pages", "write_study"),
-    "Refinement": ("study_pages", "write_study"),
-    "Validation": ("study_pages", "write_study"),
+    "Bootstrap": ("study_pages", "write_study"), "Check": ("run_pages", "write_check"),
+    "Fit": ("fit_page", "write_fit"), "LawComparison": ("study_pages", "write_comparison"),
+    "Nu12Study": ("study_pages", "write_study"), "Plan": ("study_pages", "write_study"),
+    "Predictions": ("run_pages", "write_predictions"), "Profiles": ("study_pages", "write_study"),
+    "Refinement": ("study_pages", "write_study"), "Validation": ("study_pages", "write_study"),
     "WeightStudy": ("study_pages", "write_study"),
-}
+}  # fmt: skip
 
 
 def write_report(result: Any, folder: Path | str) -> Path:
     """Write all files of a result, report.html among them, and return the page's path.
-
-    Presenters look at results from above, so that no result imports them. Raises OutputError.
-    """
+    Presenters look at results from above, so that no result imports them. Raises OutputError."""
     module, function = PRESENTERS[type(result).__name__]
     page: Path = getattr(import_module(f"bubblefit.reports.{module}"), function)(
         result, Path(folder)
@@ -392,9 +372,7 @@ class Presented:
 @contextmanager
 def failure_page(folder: Path | None, title: str) -> Iterator[list[str]]:
     """Write report.html of a failure within the block, if there is a folder, and raise it again.
-
-    Yields further lines of the page, to be filled. title : of the project.
-    """
+    Yields further lines of the page, to be filled. title : of the project."""
     more: list[str] = []
     try:
         yield more
@@ -419,10 +397,8 @@ def versions() -> dict[str, str]:
 @dataclass(frozen=True, eq=False)
 class Record:
     """The origin of a folder's results.
-
     project : path of its file. text : of that file. settings : of `settings_of`; None if it cannot
-    be run again. data : of `data_rows`. runs : of `this_run`, those that were resumed first.
-    """
+    be run again. data : of `data_rows`. runs : of `this_run`, those that were resumed first."""
 
     project: Path
     text: str | None
@@ -433,13 +409,9 @@ class Record:
 
     @classmethod
     def of(
-        cls,
-        project: Project,
-        settings: Mapping[str, Any] | None,
-        tests: Iterable[tuple[str, object]],
-        solver: Solver,
-        command_line: Sequence[str] | None,
-    ) -> Record:
+        cls, project: Project, settings: Mapping[str, Any] | None,
+        tests: Iterable[tuple[str, object]], solver: Solver, command_line: Sequence[str] | None,
+    ) -> Record:  # fmt: skip
         """Return the record of a run that begins now; command_line : None if called from Python."""
         text = None if project.written is None else project.written.text
         facts = solver_facts(project.fit.solver, solver.identity)

@@ -70,10 +70,8 @@ def words(sigma: float) -> str:
 @dataclass(frozen=True, eq=False)
 class Prospect:
     """The predicted uncertainty of the moduli with one more test.
-
     name, kind : of the test; NOW and "" for the present tests alone. noise : of its values, in
-    words. sigma : by modulus, 1-sigma relative uncertainty (n,) along its strain.
-    """
+    words. sigma : by modulus, 1-sigma relative uncertainty (n,) along its strain."""
 
     name: str
     kind: str
@@ -105,11 +103,9 @@ class Prospect:
 @dataclass(frozen=True, eq=False)
 class Plan(Presented):
     """The tests that could be made next, best first.
-
     card : its name. tests : the present ones. ends : (3,) largest strains (eps1, eps2, gamma12) of
     the moduli. rank : WORST, or a modulus. now : of the present tests alone. candidates : ranked.
-    following : the best test after the first, None where there is none.
-    """
+    following : the best test after the first, None where there is none."""
 
     title: str
     project: Path
@@ -147,17 +143,11 @@ class Plan(Presented):
 
         table = []
         for place, test in enumerate((self.now, *self.candidates)):
-            row: dict[str, object] = {
-                "rank": place,
-                **test.row,
-            }
+            row: dict[str, object] = {"rank": place, **test.row}
             row |= {f"sigma_{name}": value for name, value in test.summary.items()}
             for name, values in self.at(test).items():
-                strains = self.strains[name]
-                row |= {
-                    f"sigma_{name}_at_{strain:.4g}": value
-                    for strain, value in zip(strains, values, strict=True)
-                }
+                for strain, value in zip(self.strains[name], values, strict=True):
+                    row[f"sigma_{name}_at_{strain:.4g}"] = value
             table.append(row)
         return pd.DataFrame(table)
 
@@ -234,13 +224,11 @@ class Present:
 
 def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
     """Run the tests with a card, offsets and surface fitted; raises SolverFailure."""
-    law = _law(setup, card)
-    make = setup.make_leading
-    comparisons = tuple(
-        comparison
-        for test, weighting in zip(setup.tests, setup.weightings, strict=True)
-        for comparison in test.comparisons(make, weighting)
-    )
+    law = card.law
+    if law.form == setup.law.form:
+        law = replace(setup.law, beta=law.beta, nu12=law.nu12)
+    weighted = zip(setup.tests, setup.weightings, strict=True)
+    comparisons = tuple(c for t, w in weighted for c in t.comparisons(setup.make_leading, w))
     problem, y = problem_at(law, comparisons)
     point = evaluate_law(problem, y, with_jacobian=True)
     if point is None:
@@ -256,13 +244,6 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
     return Present(problem, point, law, precision)
 
 
-def _law(setup: FitSetup, card: MaterialCard) -> HypoelasticLaw:
-    """Return the card's law over the strains of the project's, where both are of one form."""
-    if card.law.form != setup.law.form:
-        return card.law
-    return replace(setup.law, beta=card.law.beta, nu12=card.law.nu12)
-
-
 @checked
 def plan(
     project: Project, card: MaterialCard | Path | str | None = None,
@@ -272,7 +253,6 @@ def plan(
     progress: Progress | bool | None = None,
 ) -> Plan:  # fmt: skip
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
-
     The information of the present tests (misfit or noise, whichever is larger; neighbours that err
     as one counted as one) and that of the candidate, from the derivatives at a law, are added.
     Nothing is fitted but offsets and the sheet's surface. card : the present optimum, as itself,
@@ -283,8 +263,7 @@ def plan(
     number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
     of the project's own tests. out : folder of the study. progress : as for `fit`. Raises
     InputError: in the project or its data, no card, no candidates; OutputError: the folder is used;
-    SolverFailure: the present tests cannot be run with the card.
-    """
+    SolverFailure: the present tests cannot be run with the card."""
     check_unused(out, False, overwrite)
     tell = listener(progress)
     if rank not in (WORST, *COMPONENTS):
@@ -328,9 +307,7 @@ def plan(
         raise InputError(project.path, "", "no test could be made that a plan can compute")
     found.sort(key=lambda pair: pair[0].value(rank))
     made = Plan(
-        project.title,
-        project.path,
-        card_words(card),
+        project.title, project.path, card_words(card),
         [test.name for test in chosen], asked.ends, rank,
         Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
         _following(asked, before, found, rank), notes,

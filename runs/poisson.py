@@ -60,10 +60,9 @@ def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
 
 
 def by_response(
-    nu12: Sequence[float],
-    responses: Sequence[Mapping[str, float] | None],
+    nu12: Sequence[float], responses: Sequence[Mapping[str, float] | None],
     base: Mapping[str, float],
-) -> dict[str, Ratios]:
+) -> dict[str, Ratios]:  # fmt: skip
     """Return the ratios of every response of the base run; a run that failed is None."""
     return {
         name: ratios(nu12, [np.nan if r is None else r.get(name, np.nan) for r in responses], value)
@@ -107,10 +106,8 @@ class Nu12Study(Presented):
                 name: {
                     "responses": {
                         response: {
-                            "nu12": r.nu12.tolist(),
-                            "value": _known(r.values),
-                            "to_base": _known(r.to_base),
-                            "to_mean": _known(r.to_mean),
+                            "nu12": r.nu12.tolist(), "value": _known(r.values),
+                            "to_base": _known(r.to_base), "to_mean": _known(r.to_mean),
                         }
                         for response, r in part.responses.items()
                     },

@@ -137,13 +137,9 @@ class Predictions:
 
     def silent(self) -> list[int]:
         """Return the numbers of the runs of measured tests that gave nothing to compare."""
-        return [
-            i
-            for i, run in enumerate(self.each)
-            if run.predicted
-            and predicted_kind(run.test.kind).measured(run.test)
-            and self.error(i) is None
-        ]
+        each = [(i, run.test) for i, run in enumerate(self.each) if run.predicted]
+        measured = [i for i, test in each if predicted_kind(test.kind).measured(test)]
+        return [i for i in measured if self.error(i) is None]
 
     def runs(self) -> pd.DataFrame:
         """Return a row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
@@ -219,19 +215,11 @@ Progress = Callable[[RunEvent | None], None]
 
 @checked
 def predict(
-    project: Project,
-    tests: str | Sequence[str] | None = None,
-    cards: Cards = None,
-    *,
-    samples: int | None = None,
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress | bool | None = None,
-    command_line: Sequence[str] | None = None,
-) -> Predictions:
+    project: Project, tests: str | Sequence[str] | None = None, cards: Cards = None, *,
+    samples: int | None = None, jobs: int | None = None, scheduler: str | None = None,
+    out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
+    progress: Progress | bool | None = None, command_line: Sequence[str] | None = None,
+) -> Predictions:  # fmt: skip
     """Run every chosen test that is predicted with every chosen card.
 
     Both ends of a solver's band are run (`PredictedRun.end`), and laws around that of a card with a
@@ -247,8 +235,7 @@ def predict(
     out : folder in which runs are written as they end, for `resume`. overwrite : its content.
     progress : receives every run that ended, None now and then. command_line : for the record.
     InputError : no such test or card, no model of a card's thickness, nothing to resume.
-        OutputError. SolverFailure : the solver is not there, or no run ended well.
-    """
+        OutputError. SolverFailure : the solver is not there, or no run ended well."""
     begun = time.perf_counter()
     check_asked(out, resume, overwrite)
     project = project.with_scheduler(scheduler)
@@ -277,7 +264,14 @@ def predict(
         others = _around(project, pairs, some)
         every = [*pairs, *(run for _, run in others)]
         ended = _run(project, every, records, jobs, listener(progress))
-        runs = _with_others(ended, [number for number, _ in others])
+        numbers = [number for number, _ in others]
+        count = len(ended) - len(numbers)
+        runs = list(ended[:count])
+        for place in dict.fromkeys(numbers):
+            own = [run for n, run in zip(numbers, ended[count:], strict=True) if n == place]
+            assert own[0].around is not None
+            around = replace(own[0].around, records=tuple(run.record for run in own))
+            runs[place] = replace(runs[place], around=around)
         if all(run.record.failure for run in runs):
             said += [f"{r.title}: failed: {r.record.failure}" for r in runs]
             failure = f"no run ended well: {runs[0].record.failure}"
@@ -364,26 +358,10 @@ def _around(
     return others
 
 
-def _with_others(ended: Sequence[PredictedRun], numbers: Sequence[int]) -> list[PredictedRun]:
-    """Return predictions with the records of the runs around; `numbers` of the last runs."""
-    count = len(ended) - len(numbers)
-    runs = list(ended[:count])
-    for number in dict.fromkeys(numbers):
-        own = [run for n, run in zip(numbers, ended[count:], strict=True) if n == number]
-        around = own[0].around
-        assert around is not None
-        records = tuple(run.record for run in own)
-        runs[number] = replace(runs[number], around=replace(around, records=records))
-    return runs
-
-
 def _run(
-    project: Project,
-    pairs: Sequence[PredictedRun],
-    records: RunRecords | None,
-    jobs: int | None,
+    project: Project, pairs: Sequence[PredictedRun], records: RunRecords | None, jobs: int | None,
     progress: Progress,
-) -> list[PredictedRun]:
+) -> list[PredictedRun]:  # fmt: skip
     """Return every pair with its record: from the folder, or run side by side."""
     kinds = [predicted_kind(pair.test.kind) for pair in pairs]
     solver_of = _solvers(project)

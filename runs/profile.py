@@ -60,10 +60,8 @@ METHOD = (
 @dataclass(frozen=True, eq=False)
 class Profile:
     """The profile of one modulus at one strain, MPa.
-
     best, sigma : of the fit. band : its band by the noise, within the bounds. below, above : the
-    profile to either side. allowed : range within the bounds of the fit.
-    """
+    profile to either side. allowed : range within the bounds of the fit."""
 
     modulus: str
     strain: float
@@ -106,12 +104,7 @@ class Profile:
     @property
     def words(self) -> str:
         """The interval in a line."""
-        low, high = (
-            _end(end, side, limit)
-            for end, side, limit in zip(
-                self.ends, (self.below, self.above), self.allowed, strict=True
-            )
-        )
+        low, high = map(_end, self.ends, (self.below, self.above), self.allowed)
         said = (
             f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
             f"(the fit's band {self.band[0]:.4g} to {self.band[1]:.4g})"
@@ -126,17 +119,18 @@ class Profile:
         return said
 
     @property
+    def open_sides(self) -> dict[str, Side]:
+        """The sides without an end."""
+        return {k: one for k, one in (("below", self.below), ("above", self.above)) if one.why}
+
+    @property
     def notes(self) -> list[Note]:
         """Notes on sides without an end, or on a better optimum."""
         notes = []
-        for word, side in (("below", self.below), ("above", self.above)):
-            if side.why:
-                ratio = round(side.ratios[-1], 3) + 0.0
-                words = (
-                    f"not closed {word}: {_why(side)}; -2 log L is {ratio:.2g} of "
-                    f"{THRESHOLD:.3g} there"
-                )
-                notes.append(Note(NOT_CLOSED, words, self.name))
+        for word, side in self.open_sides.items():
+            ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"
+            words = f"not closed {word}: {_why(side)}; -2 log L is {ratio} there"
+            notes.append(Note(NOT_CLOSED, words, self.name))
         if min(*self.below.ratios, *self.above.ratios) < BETTER:
             words = "another optimum fits the data better than the card's: fit with more starts"
             notes.append(Note(NOT_THE_CARD, words, self.name))
@@ -151,11 +145,7 @@ class Profile:
             "lower_MPa": self.ends[0], "upper_MPa": self.ends[1], "fit_sigma_MPa": self.sigma,
             "fit_lower_MPa": self.band[0], "fit_upper_MPa": self.band[1],
             "asymmetry": self.asymmetry,
-            "not_closed": {
-                word: side.why
-                for word, side in (("below", self.below), ("above", self.above))
-                if side.why
-            },
+            "not_closed": {word: side.why for word, side in self.open_sides.items()},
             "curve_MPa": values, "curve_minus_2_log_L": ratios, "analyses": self.analyses,
         }  # fmt: skip
 
@@ -225,18 +215,34 @@ def profile(
     overwrite: bool = False, progress: Progress | bool | None = None,
 ) -> Profiles:  # fmt: skip
     """Hold moduli away from their best and refit everything else, until the data contradict.
-
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
     where a modulus has no strains. card : the one that the project's fit left in its usual folder
     unless given. tests, progress : as for `fit`. out : folder of the study. Raises InputError: in
     the project or its data; no such modulus, or a strain beyond the law's; OutputError: the folder
-    is used; SolverFailure: the tests cannot be run with the card.
-    """
+    is used; SolverFailure: the tests cannot be run with the card."""
     check_unused(out, False, overwrite)
-    asked = _asked(moduli)
+    asked = {name: list(strains) for name, strains in (moduli or {}).items()}
+    for name, strains in asked.items():
+        if name not in COMPONENTS:
+            problem = f"expected one of {', '.join(COMPONENTS)}, got {name!r}"
+            raise InputError(None, "--modulus", problem)
+        for strain in strains:
+            if not 0.0 <= strain < np.inf:
+                problem = f"expected strains of 0 or more, got {strain:g}"
+                raise InputError(None, "--modulus", problem)
+    asked = asked or {name: [] for name in COMPONENTS}
     found = find_optimum(project, card, tests)
-    places = _places(found, asked)
+    places = []
+    for modulus, strains in asked.items():
+        component = COMPONENTS[modulus]
+        reached = float(found.best.valid[component])
+        for at in strains:
+            if at > reached * (1 + 1e-9):
+                end, given = apart(reached, at, 4)
+                problem = f"{modulus} is fitted up to a strain of {end}; got {given}"
+                raise InputError(found.setup.project.path, "--modulus", problem)
+        places += [(modulus, at) for at in strains or (SHARE * reached,)]
     numbers = list(range(len(SIGNS) * len(places)))
     prepare = functools.partial(_task, found, places)
     sides: dict[int, Side] = {}
@@ -251,42 +257,12 @@ def profile(
         for k, (name, strain) in enumerate(places)
     )
     # Every process runs the optimum once more.
-    analyses = (
-        found.analyses
-        + min(project.fit.jobs or cores(), len(numbers))
-        + sum(p.analyses for p in each)
-    )
+    analyses = found.analyses + min(project.fit.jobs or cores(), len(numbers))
+    analyses += sum(p.analyses for p in each)
     tested, notes = tuple(t.test.name for t in found.setup.tests), [*found.notes]
     notes += [note for one in each for note in one.notes]
     done = Profiles(project.title, project.path, found.card, tested, each, analyses, tuple(notes))
     return finished(done, out)
-
-
-def _asked(moduli: Mapping[str, Sequence[float]] | None) -> dict[str, list[float]]:
-    asked = {name: list(strains) for name, strains in (moduli or {}).items()}
-    for name, strains in asked.items():
-        if name not in COMPONENTS:
-            problem = f"expected one of {', '.join(COMPONENTS)}, got {name!r}"
-            raise InputError(None, "--modulus", problem)
-        for strain in strains:
-            if not 0.0 <= strain < np.inf:
-                problem = f"expected strains of 0 or more, got {strain:g}"
-                raise InputError(None, "--modulus", problem)
-    return asked or {name: [] for name in COMPONENTS}
-
-
-def _places(found: Optimum, asked: Mapping[str, Sequence[float]]) -> list[tuple[str, float]]:
-    places = []
-    for name, strains in asked.items():
-        component = COMPONENTS[name]
-        reached = float(found.best.valid[component])
-        for strain in strains:
-            if strain > reached * (1 + 1e-9):
-                end, given = apart(reached, strain, 4)
-                problem = f"{name} is fitted up to a strain of {end}; got {given}"
-                raise InputError(found.setup.project.path, "--modulus", problem)
-        places += [(name, strain) for strain in strains or (SHARE * reached,)]
-    return places
 
 
 def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:

@@ -16,9 +16,7 @@ EVERY_S, PLAIN_EVERY_S = 0.2, 10.0
 
 def listener(progress: Callable[..., None] | bool | None) -> Callable[..., None]:
     """Return what receives progress: a callback as it is; None: a bar, in a notebook only.
-
-    True : a bar, and outside notebooks a line every ten seconds. False : nothing.
-    """
+    True : a bar, and outside notebooks a line every ten seconds. False : nothing."""
     if callable(progress):
         return progress
     if progress or (progress is None and in_notebook()):

@@ -2,8 +2,7 @@
 
 A discretisation of size h gives f(h) = f(0) + C h^p + smaller terms, once h is small enough. Three
 values determine p, C and f(0), whatever the ratios of their sizes (P. J. Roache's generalised
-Richardson extrapolation). Each result has a remark where the values contradict that assumption.
-"""
+Richardson extrapolation). Each result has a remark where the values contradict that assumption."""
 
 from __future__ import annotations
 
@@ -54,11 +53,9 @@ RMS = "RMS of the load to the next finer level, N"
 @dataclass(frozen=True)
 class Convergence:
     """Order and limit of a sequence of refinements.
-
     order : observed on the three finest levels, None where there is none. limit : the value at size
     zero by Richardson's extrapolation. previous : the order observed one level coarser. remark : ""
-    where nothing speaks against the limit.
-    """
+    where nothing speaks against the limit."""
 
     order: float | None = None
     limit: float | None = None
@@ -68,12 +65,10 @@ class Convergence:
 
 def observed_order(sizes: ArrayLike, changes: ArrayLike) -> float | None:
     """Return the order p with which two successive changes fall.
-
     sizes : (3,) coarse to fine, decreasing. changes : (2,) from the coarse to the middle level and
     from the middle to the fine one: of a value, or a norm of what changes. Returns: p, or None:
     changes of opposite sign, or a ratio that no order from `LOWEST` to `HIGHEST` has. Raises
-    ValueError: sizes that do not decrease.
-    """
+    ValueError: sizes that do not decrease."""
     h, d = _sizes(sizes, 3), np.asarray(changes, dtype=float)
     if d[1] == 0 or not np.isfinite(d).all() or d[0] / d[1] <= 0:
         return None
@@ -96,11 +91,9 @@ def richardson(sizes: ArrayLike, values: ArrayLike, order: float) -> float:
 
 def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 0.0) -> Convergence:
     """Return order and limit of a sequence of refinements.
-
     sizes, values : (levels,) coarse to fine; sizes decrease, in any unit. noise : relative change
     that is not the refinement's: the accuracy of solver and files. Raises ValueError: sizes that do
-    not decrease, or not one for each value.
-    """
+    not decrease, or not one for each value."""
     h, f = _sizes(sizes, len(values)), np.asarray(values, dtype=float)
     changes = np.diff(f)
     least = noise * np.abs(f).max(initial=0.0)
@@ -169,11 +162,9 @@ class Level:
 @dataclass(frozen=True, eq=False)
 class LevelRun:
     """The run of a level.
-
     values : quantities of interest by name, None where the run failed, with the reason in
     `failure`. curve : (x, y) of the response, where levels are compared along one. seconds : wall
-    clock.
-    """
+    clock."""
 
     level: Level
     seconds: float
@@ -283,13 +274,12 @@ def _quantity_words(name: str, found: Mapping[str, Any]) -> str:
 
 def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
     good = ended(runs)
-    levels = []
-    for run in runs:
-        levels.append({
-            **run.level.row, "seconds": run.seconds, "iterations": run.iterations,
-            "values": None if run.values is None else dict(run.values),
-            **({"failed": run.failure} if run.failure else {}),
-        })  # fmt: skip
+    levels = [
+        {**run.level.row, "seconds": run.seconds, "iterations": run.iterations,
+         "values": None if run.values is None else dict(run.values),
+         **({"failed": run.failure} if run.failure else {})}
+        for run in runs
+    ]  # fmt: skip
     result: dict[str, Any] = {"levels": levels, "quantities": {}}
     if len(good) < 2:
         return result
@@ -359,7 +349,6 @@ def refine(
     progress: Progress | bool | None = None,
 ) -> Refinement:  # fmt: skip
     """Run tests with a card on finer and finer meshes, or with more and more increments.
-
     card : itself, its file, or its name in the project; the one that the project's fit left in its
     usual folder unless given. tests : names or kinds, all unless given.
     levels : number of refinements of `what`. factor : edges, or increments, are divided by it from
@@ -368,8 +357,7 @@ def refine(
     study, which keeps the analyses that ended, from which an interrupted study resumes. Raises
     InputError: a level that cannot be meshed, or equals another; OutputError: the folder is used;
     SolverFailure: nothing can be compared, because fewer than two levels
-    ended well anywhere.
-    """
+    ended well anywhere."""
     check_unused(out, resume, overwrite)
     below = (1 if what == "elements" else 0) if coarser is None else coarser
     if below >= levels:
@@ -377,14 +365,14 @@ def refine(
     material = card_of(project, card)
     series = Series(project, material, progress, out, resume)
     chosen = studied_tests(project, tests)
+
+    def size(part: Part) -> float:
+        return edge_length(part.model.mesh) if what == "elements" else 1.0 / part.increments
+
     # All before the first run: a level that cannot be meshed is a mistake in the options.
     every = [
         {
-            name: Level(
-                part,
-                own,
-                edge_length(part.model.mesh) if what == "elements" else 1.0 / part.increments,
-            )
+            name: Level(part, own, size(part))
             for name, part in parts_of(project, chosen, material.thickness, what, own).items()
         }
         for own in (float(factor) ** (k - below) for k in range(levels))

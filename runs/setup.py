@@ -40,7 +40,7 @@ from ..materials.forms.base import Form, form_named, form_settings, of_strain
 from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from ..project.schema import BoundsSection, UnknownSection
+from ..project.schema import UnknownSection
 from ..readers.sections import beside
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
@@ -58,11 +58,9 @@ THIRDS = (1 / 3, 2 / 3)
 
 def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     """Return the law of a fit with coefficients of zero; reaches : of the data of each test.
-
     Raises
     ------
-    InputError : no such form, an unknown setting, no strain range that follows from the tests.
-    """
+    InputError : no such form, an unknown setting, no strain range that follows from the tests."""
     section, path = project.law, project.path
     ends = _strain_range(project, reaches)
     try:
@@ -112,17 +110,27 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
 
 def bounds_of(project: Project, form: Form) -> LawBounds:
     """Return the bounds of the moduli or of their coefficients, MPa.
-
     Raises
     ------
-    InputError : no bounds, crossed ones, too few or too many, or some of both kinds.
-    """
+    InputError : no bounds, crossed ones, too few or too many, or some of both kinds."""
     path, section, margin = project.path, project.law.bounds, project.law.margin
     unit = project.scales.modulus
     if section is None:
         problem = "this section is missing; give [least, largest] of E1, E2 and G12"
         raise InputError(path, "law.bounds", problem)
-    of_moduli = _of_one_kind(project, section)
+    ranges = {name: getattr(section, name) for name in ("E1", "E2", "G12")}
+    listed = {name: getattr(section, name) for name in ("lower", "upper")}
+    of_moduli = any(v is not None for v in ranges.values())
+    of_entries = any(v is not None for v in listed.values())
+    if of_moduli and of_entries:
+        expected = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
+        raise InputError(project.path, "law.bounds", expected)
+    if not of_moduli and not of_entries:
+        expected = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
+        raise InputError(project.path, "law.bounds", expected)
+    for name, value in (ranges if of_moduli else listed).items():
+        if value is None:
+            raise InputError(project.path, f"law.bounds.{name}", "this key is missing; add it")
     if of_moduli and margin is not None:
         problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
         raise InputError(path, "law.margin", problem)
@@ -141,24 +149,6 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
     e, g = (margin.E * unit, margin.G12 * unit) if margin else (MARGIN_E, MARGIN_G)
     margins = {"E1": e, "E2": e, "G12": g}
     return LawBounds.of_entries(np.array(lower) * unit, np.array(upper) * unit, margins)
-
-
-def _of_one_kind(project: Project, section: BoundsSection) -> bool:
-    """Return True if the moduli are bounded, not their coefficients."""
-    ranges = {name: getattr(section, name) for name in ("E1", "E2", "G12")}
-    listed = {name: getattr(section, name) for name in ("lower", "upper")}
-    of_moduli = any(v is not None for v in ranges.values())
-    of_entries = any(v is not None for v in listed.values())
-    if of_moduli and of_entries:
-        problem = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
-        raise InputError(project.path, "law.bounds", problem)
-    if not of_moduli and not of_entries:
-        problem = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
-        raise InputError(project.path, "law.bounds", problem)
-    for name, value in (ranges if of_moduli else listed).items():
-        if value is None:
-            raise InputError(project.path, f"law.bounds.{name}", "this key is missing; add it")
-    return of_moduli
 
 
 def _ordered(project: Project, name: str, pair: Sequence[float]) -> tuple[float, float]:
@@ -191,12 +181,10 @@ PRODUCT = "a membrane under load knows moduli times thickness only"
 
 def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
     """Return the unknowns of [fit.unknowns]; a fit starts from the values of [law] and [fabric].
-
     Raises
     ------
     InputError : bounds out of order, impossible, or not around the value to start from; a thickness
-        without a prior, which no data could tell from the moduli.
-    """
+        without a prior, which no data could tell from the moduli."""
     asked, shared = project.fit.unknowns, []
     if asked.nu12 is not None:
         start = project.law.nu12
@@ -228,13 +216,9 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
 
 
 def _bounds(
-    project: Project,
-    name: str,
-    section: UnknownSection,
-    usual: tuple[float, float],
-    start: float,
+    project: Project, name: str, section: UnknownSection, usual: tuple[float, float], start: float,
     unit: float,
-) -> tuple[float, float]:
+) -> tuple[float, float]:  # fmt: skip
     low, high = (unit * value for value in section.bounds or usual)
     if not low < high:
         problem = f"expected [least, largest], got [{low / unit:g}, {high / unit:g}]"
@@ -252,9 +236,7 @@ def with_shared(
     comparisons: Iterable[Comparison], shared: Iterable[Nuisance]
 ) -> tuple[Comparison, ...]:
     """Return the comparisons with the shared unknowns before their own.
-
-    A prior weighs as one value of a block whose norm is that of its noise.
-    """
+    A prior weighs as one value of a block whose norm is that of its noise."""
     several, unknowns = tuple(comparisons), tuple(shared)
     if not unknowns:
         return several
@@ -279,10 +261,8 @@ def proposals(
     folder: Path, parts: dict[str, str], columns: list[str], scale: float
 ) -> ProposedStarts:
     """Return starts proposed by the evaluations in the folder of an earlier fit.
-
     parts : `fingerprints` of this fit. columns : of the coefficients in a history. scale : MPa per
-    unit of it. Raises InputError for no such folder, a fit of another model, no evaluation.
-    """
+    unit of it. Raises InputError for no such folder, a fit of another model, no evaluation."""
     try:
         before = dict(json.loads((folder / RUN).read_text(encoding="utf-8"))[PARTS])
         text = (folder / HISTORY).read_text(encoding="utf-8", errors="replace")
@@ -321,9 +301,7 @@ UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlie
 @dataclass(frozen=True, eq=False)
 class FitSetup:
     """A fit ready to run, without a solver, for worker processes.
-
-    law : without coefficients. counts : factors of the tests' weights by name.
-    """
+    law : without coefficients. counts : factors of the tests' weights by name."""
 
     project: Project
     law: HypoelasticLaw
@@ -423,12 +401,10 @@ def prepare_fit(
     project: Project, tests: Sequence[FittableTest], saw: Saw = lambda words: None
 ) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
-
     Raises
     ------
     InputError : in the project or its data. SolverFailure : the solver is not there, or a known
-        solution cannot be run.
-    """
+        solution cannot be run."""
     with project.naming_arguments():
         return _prepared(project, tests, saw)
 
@@ -526,10 +502,8 @@ def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Compar
 @dataclass(frozen=True)
 class CoarseToFine:
     """The starts and analyses on each mesh.
-
     quads : of the coarse and the full mesh by comparison, if meshed. starts : on the coarse mesh.
-    distinct : optima fitted on the full mesh.
-    """
+    distinct : optima fitted on the full mesh."""
 
     quads: dict[str, tuple[int, int]]
     starts: int

@@ -60,10 +60,8 @@ Progress = Callable[[Step], None]
 
 class Analyses:
     """A series of analyses by the project's solver; `total` : their number, for the progress.
-
     kept : cache of finished analyses beside the cache of runs. Raises InputError or SolverFailure
-    if the solver cannot be used.
-    """
+    if the solver cannot be used."""
 
     def __init__(
         self, project: Project, progress: Progress | bool | None = None,
@@ -104,10 +102,8 @@ class Histories(dict[str, History]):
         component: int = 0, frame: int = -1,
     ) -> Any:  # fmt: skip
         """Return a drawing of a deformed mesh, the first unless named; see `Fit.plot_moduli`.
-
         component : 0 along the warp, 1 along the fill, 2 in shear. frame : from 0; -1 the last.
-        InputError : no analysis of that name, or no such component or frame.
-        """
+        InputError : no analysis of that name, or no such component or frame."""
         chosen = next(iter(self)) if name is None else name
         if chosen not in self:
             raise InputError(None, "name", f"expected one of {', '.join(self)}, got {chosen!r}")
@@ -117,9 +113,7 @@ class Histories(dict[str, History]):
 @checked
 def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options: Any) -> Histories:
     """Run one test with a card and its thickness; return histories by part of the test.
-
-    InputError : no such solver, or an option it does not know. SolverFailure.
-    """
+    InputError : no such solver, or an option it does not know. SolverFailure."""
     runs = usable_solver(solver, options, cache=run_cache())
     check_carries(runs, card.law)
     models = test.models(card.thickness)
@@ -130,22 +124,15 @@ def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options
 
 
 def simulate_cards(
-    project: Project,
-    tests: Sequence[Test],
-    cards: Mapping[str, MaterialCard],
-    folder: Path,
-    within_range: bool = False,
-    progress: Progress | bool | None = None,
-    command: str = "simulate test",
-    kept: RunCache | None = None,
-) -> Simulation:
+    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], folder: Path,
+    within_range: bool = False, progress: Progress | bool | None = None,
+    command: str = "simulate test", kept: RunCache | None = None,
+) -> Simulation:  # fmt: skip
     """Run tests with cards; write files of their kinds, notes.csv and result.json.
-
     cards : by name; the thickness of each counts, not the fabric's. within_range : show curves only
     within a card's valid range. kept : finished analyses, to resume an interrupted series. Numbers
     of a single test stand at the top level. SolverFailure : nothing ended well. InputError,
-    OutputError.
-    """
+    OutputError."""
     analyses = Analyses(project, progress, kept)
     models = {
         (test.name, name): test.models(card.thickness)
@@ -181,13 +168,10 @@ def simulate_cards(
         for note in other_thickness(card, project.fabric.thickness)
     ]
     result = {
-        "command": command,
-        "project": str(project.path),
-        "solver": analyses.solver.name,
-        "notes": rows(notes),
-        "tests": {name: one.numbers for name, one in shown.items()},
+        "command": command, "project": str(project.path), "solver": analyses.solver.name,
+        "notes": rows(notes), "tests": {name: one.numbers for name, one in shown.items()},
         **(shown[tests[0].name].numbers if len(tests) == 1 else {}),
-    }
+    }  # fmt: skip
     write_notes(folder, notes)
     write_text(folder / RESULT, json_text(result))
     several = "{0}: {1}" if len(shown) > 1 else "{1}"
@@ -234,13 +218,9 @@ class Series(Analyses):
     """The analyses of a study, all with one card, kept in the folder `out`; as `Analyses`."""
 
     def __init__(
-        self,
-        project: Project,
-        card: MaterialCard,
-        progress: Progress | bool | None = None,
-        out: Path | str | None = None,
-        resume: bool = False,
-    ) -> None:
+        self, project: Project, card: MaterialCard, progress: Progress | bool | None = None,
+        out: Path | str | None = None, resume: bool = False,
+    ) -> None:  # fmt: skip
         kept = None if out is None else KeptAnalyses(Path(out), resume)
         super().__init__(project, progress, kept)
         self.card = card
@@ -263,12 +243,9 @@ def studied_tests(project: Project, tests: str | Sequence[str] | None = None) ->
 
 
 def parts_of(
-    project: Project,
-    tests: Sequence[Test],
-    thickness: float,
-    what: Refined = "elements",
+    project: Project, tests: Sequence[Test], thickness: float, what: Refined = "elements",
     factor: float = 1.0,
-) -> dict[str, Part]:
+) -> dict[str, Part]:  # fmt: skip
     """Return every model of the tests by name, refined, with a thickness (mm); InputError."""
     parts: dict[str, Part] = {}
     for test in tests:
@@ -296,9 +273,7 @@ def part_name(test: Test, part: str, parts: int, tests: int) -> str:
 
 def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
     """Return a card that is given as itself, its file, or its name in the project; InputError.
-
-    None : the one that the project's fit left in its usual folder.
-    """
+    None : the one that the project's fit left in its usual folder."""
     card = fitted_card(project) if card is None else card
     if isinstance(card, MaterialCard):
         return card
@@ -328,15 +303,10 @@ def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
 
 
 def begin_study(
-    folder: Path,
-    parts: Mapping[str, str],
-    resume: bool,
-    overwrite: bool,
-    fits: Iterable[str],
+    folder: Path, parts: Mapping[str, str], resume: bool, overwrite: bool, fits: Iterable[str],
     records: Sequence[str] = (),
-) -> None:
+) -> None:  # fmt: skip
     """Prepare the folder of a study with a folder for each fit; raises as `Store.begin`.
-
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
     for name in fits if overwrite else ():
@@ -365,11 +335,9 @@ def write_marked(folder: Path, file: str, mark: str, content: Mapping[str, Any])
 
 class StudyRecord(Generic[R]):
     """Rows of a study under a mark of all that they depend on, each written as it ends.
-
     folder : None where nothing is read or written. file : its name. name : of the rows in the file.
     row : their class, a dataclass of plain values. key : field by which `rows` are sorted.
-    depends : on what they depend, in plain values. read : take over what the file holds.
-    """
+    depends : on what they depend, in plain values. read : take over what the file holds."""
 
     def __init__(
         self, folder: Path | None, file: str, name: str, row: type[R], key: str,

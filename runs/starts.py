@@ -55,12 +55,10 @@ class EvaluationRecord:
 @dataclass(frozen=True)
 class StartRecord:
     """The end of one start; unknowns : of the optimiser. objective : None without a fit.
-
     analyses : in all, of them external_runs by an external solver and cached_runs by one earlier.
     failure : of the solver, if that ended the start, which is run again on resuming. reached :
     (eps1, eps2, gamma12) at the optimum. mesh : of the objective. same_as : the start with the same
-    optimum on the coarse mesh, which alone was fitted on the full one.
-    """
+    optimum on the coarse mesh, which alone was fitted on the full one."""
 
     number: int
     seed: tuple[int, int]
@@ -99,16 +97,11 @@ class StartRecord:
 
 
 def run_start(
-    problem: FitProblem,
-    options: FitOptions,
-    seed: int,
-    number: int,
-    tell: Callable[[EvaluationRecord], None],
-    mesh: MeshName = "full",
+    problem: FitProblem, options: FitOptions, seed: int, number: int,
+    tell: Callable[[EvaluationRecord], None], mesh: MeshName = "full",
     coarse: StartRecord | None = None,
-) -> StartRecord:
+) -> StartRecord:  # fmt: skip
     """Draw feasible start `number` of `seed` and fit from it; report every evaluation to `tell`.
-
     coarse : its end on the coarse mesh, at whose optimum the fit begins; its analyses are included.
     """
     begun = time.perf_counter()

@@ -1,8 +1,7 @@
 """Cross-validate fits: leave tests, or parts of them, out in turn and judge the fits there.
 
 Every fit without a part begins at random starts of its own. From the optimum of the fit to all of
-the data, a modulus that the rest does not determine would keep the value that the part gave it.
-"""
+the data, a modulus that the rest does not determine would keep the value that the part gave it."""
 
 from __future__ import annotations
 
@@ -65,10 +64,8 @@ NuisanceValues = Mapping[str, Mapping[str, float]]
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """The errors of a law at one test.
-
     error : mean relative RMS error, None where an analysis failed. rms : by comparison, in `units`.
-    words, numbers : the quality in the test's own terms, as of a fit.
-    """
+    words, numbers : the quality in the test's own terms, as of a fit."""
 
     test: str
     error: float | None
@@ -194,8 +191,7 @@ class Validation(Presented):
                 "foretold_rms": one.predicted.rms.get(name, np.nan),
                 "fitted_rms": np.nan if one.fitted is None else one.fitted.rms.get(name, np.nan),
                 "foretold_relative": _relative(one.predicted),
-                "fitted_relative": _relative(one.fitted),
-                "foretold_words": one.predicted.words,
+                "fitted_relative": _relative(one.fitted), "foretold_words": one.predicted.words,
             }
             for one in self.judged
             for name, unit in one.predicted.units.items()
@@ -383,7 +379,6 @@ def validate(
     command_line: Sequence[str] | None = None,
 ) -> Validation:  # fmt: skip
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
-
     Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
     a part of a test (a frame) they are those of the fit to the rest of the test. tests : by name or
     kind; every test that can be fitted unless given. forms : of the moduli, as for `compare`;
@@ -392,8 +387,7 @@ def validate(
     instead, without a fit: by name, or names and files as for the command. out : folder of the
     study, with a folder for each fit, written as the fits end. trust, progress, command_line : as
     for `fit`. Raises InputError: in the project or its data, fewer than two tests or parts, nothing
-    to resume; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
-    """
+    to resume; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`."""
     if cards:
         check_unused(out, False, overwrite)
         given = cards if isinstance(cards, Mapping) else chosen_cards(project, cards)
@@ -447,14 +441,10 @@ def validate(
 
 
 def judge_cards(
-    project: Project,
-    cards: Mapping[str, MaterialCard],
-    tests: str | Sequence[str] | None = None,
-) -> Validation:
+    project: Project, cards: Mapping[str, MaterialCard], tests: str | Sequence[str] | None = None,
+) -> Validation:  # fmt: skip
     """Judge cards at tests without any fit of the law, predicted ones by their measured loads.
-
-    InputError : another thickness, no test to judge them at.
-    """
+    InputError : another thickness, no test to judge them at."""
     for name, card in cards.items():
         if (words := thickness_difference(card, project.fabric.thickness)) is not None:
             raise InputError(project.path, "fabric.thickness", f"{name}: {words}")

@@ -40,11 +40,9 @@ Progress = Callable[[str | FitEvent | None], None]
 @dataclass(frozen=True)
 class WeightedFit:
     """The optimum where the weight of some tests is multiplied by `count`.
-
     relative : mean relative RMS error by test; rms : by comparison, in its unit. moduli : MPa at
     the `PLACES` of the strain that the fit at the project's weights reached. unknowns : the
-    optimiser's. failure : why there is no fit, "" where there is one.
-    """
+    optimiser's. failure : why there is no fit, "" where there is one."""
 
     count: float
     relative: Mapping[str, float]
@@ -127,9 +125,7 @@ class WeightStudy(Presented):
             "change": {name: list(self.change(name)) for name in COMPONENTS},
             "rows": [
                 {
-                    "weight_times": run.count,
-                    "relative": dict(run.relative),
-                    "rms": dict(run.rms),
+                    "weight_times": run.count, "relative": dict(run.relative), "rms": dict(run.rms),
                     "moduli_MPa": {name: list(values) for name, values in run.moduli.items()},
                     "analyses": run.analyses,
                 }
@@ -168,14 +164,12 @@ def weights(
     progress: Progress | bool | None = None, command_line: Sequence[str] | None = None,
 ) -> WeightStudy:  # fmt: skip
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
-
     counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
     starts : of the fit at the project's weights; the others begin at the optimum beside them.
     counts : factors of the weight in the project. out : folder of the study, in which every fit is
     written as it ends. trust, progress, command_line : as for `fit`. Raises InputError: in the
     project or its data; no test of that kind or name, or no other one; OutputError,
-    NoFeasibleStart, SolverFailure: as `bubblefit.fit`.
-    """
+    NoFeasibleStart, SolverFailure: as `bubblefit.fit`."""
     check_asked(out, resume, overwrite)
     tell = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])

@@ -41,10 +41,8 @@ def plain_ratio(ratio: str) -> str:
 
 def nearest_ratio(loads: Sequence[float]) -> str:
     """Return the ratio of loads along warp and fill; their own numbers where none is near.
-
     >>> nearest_ratio([30.0, 14.8]), nearest_ratio([25.0, 0.5])
-    ('2:1', '1:0')
-    """
+    ('2:1', '1:0')"""
     warp, fill = (max(x, 0.0) for x in loads)
     own = math.degrees(math.atan2(fill, warp))
     angles = {name: math.degrees(math.atan2(*shares(name)[::-1])) for name in KNOWN}
@@ -86,10 +84,8 @@ def read_biaxial_table(
     format: str | None = None,
 ) -> BiaxialTable:
     """Read a table; names, units, separator and decimal mark are found as for load curves.
-
     columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
-    file names none. width : mm of the arms, for forces. sheet : of a workbook.
-    """
+    file names none. width : mm of the arms, for forces. sheet : of a workbook."""
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
     if unknown:
@@ -140,9 +136,7 @@ HOLD = 0.01
 @dataclass(frozen=True)
 class Cycle:
     """One cycle, `number` (from 1) of a phase of consecutive ones of its ratio, `count` of all.
-
-    first, last : rows where the loading begins and is highest.
-    """
+    first, last : rows where the loading begins and is highest."""
 
     ratio: str
     phase: int
@@ -179,29 +173,24 @@ def _loadings(s: Array) -> list[tuple[int, int]]:
     if not least > 0:
         return []
     found = []
-    for low, high in _rises(s, least):
+    rises, valley, peak, rising = [], 0, 0, False
+    for i in range(len(s)):
+        if rising:
+            if s[i] > s[peak]:
+                peak = i
+            elif s[i] < s[peak] - least:
+                rises.append((valley, peak))
+                rising, valley = False, i
+        elif s[i] < s[valley]:
+            valley = i
+        elif s[i] > s[valley] + least:
+            rising, peak = True, i
+    for low, high in [*rises, (valley, peak)] if rising else rises:
         hold = HOLD * (s[high] - s[low])
         first = low + int(np.flatnonzero(s[low : high + 1] <= s[low] + hold)[-1])
         last = first + int(np.flatnonzero(s[first : high + 1] >= s[high] - hold)[0])
         found.append((first, last))
     return found
-
-
-def _rises(s: Array, least: float) -> list[tuple[int, int]]:
-    """Return rows of a valley and of the peak after it, for each rise of more than `least`."""
-    found, low, high, rising = [], 0, 0, False
-    for i in range(len(s)):
-        if rising:
-            if s[i] > s[high]:
-                high = i
-            elif s[i] < s[high] - least:
-                found.append((low, high))
-                rising, low = False, i
-        elif s[i] < s[low]:
-            low = i
-        elif s[i] > s[low] + least:
-            rising, high = True, i
-    return [*found, (low, high)] if rising else found
 
 
 #: Which cycle of a ratio is evaluated: the last of its phase, or by number from 1.
@@ -274,17 +263,12 @@ def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> li
 
 
 def evaluated_paths(
-    tables: Sequence[BiaxialTable],
-    cycles: Sequence[Sequence[Cycle]],
-    which: Which = "last",
-    conditioning: int = 0,
-    ratios: Collection[str] | None = None,
-) -> list[BiaxialPath]:
+    tables: Sequence[BiaxialTable], cycles: Sequence[Sequence[Cycle]], which: Which = "last",
+    conditioning: int = 0, ratios: Collection[str] | None = None,
+) -> list[BiaxialPath]:  # fmt: skip
     """Return the loading of one cycle of each ratio, in the order of `RATIOS`, then by name.
-
     Of a ratio that comes several times, the first phase after the conditioning counts. conditioning
-    : cycles at the beginning of each file. ratios : those wanted; all unless given.
-    """
+    : cycles at the beginning of each file. ratios : those wanted; all unless given."""
     found: dict[str, BiaxialPath] = {}
     for table, own in zip(tables, cycles, strict=True):
         phases: dict[int, list[Cycle]] = {}

@@ -21,7 +21,7 @@ from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Option
 from ..kinds import UNMATCHED, UNSTABLE
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
-from .test import BiaxialData, BiaxialTest
+from .test import BiaxialTest
 
 Array = NDArray[np.float64]
 #: Of a loading's range: how near both loads must be to those of the first row.
@@ -31,9 +31,7 @@ BACK = 0.01
 @dataclass(frozen=True, eq=False)
 class KeptStrain:
     """Residual strains (2,) before the first loading of a phase and after its last.
-
-    None where the loads are not those of the first row, load (2,) kN/m.
-    """
+    None where the loads are not those of the first row, load (2,) kN/m."""
 
     file: str
     ratio: str
@@ -42,27 +40,6 @@ class KeptStrain:
     before: Array | None
     after: Array | None
     load: Array
-
-
-def kept_strains(data: BiaxialData) -> tuple[KeptStrain, ...]:
-    """Return residual strains phase by phase in the order of the files."""
-    found = []
-    for table, cycles in zip(data.tables, data.cycles, strict=True):
-        away = np.abs(table.load - table.load[0]).max(axis=1)
-        least = BACK * float(np.ptp(table.load.max(axis=1)))
-        for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
-            same = list(phase)
-            last = same[-1]
-            later = [cycle.first for cycle in cycles if cycle.first > last.last]
-            stop = (later[0] if later else len(table.load) - 1) + 1
-            back = last.last + int(np.argmin(away[last.last : stop]))
-            before, after = (
-                table.strain[row] - table.strain[0] if away[row] <= least else None
-                for row in (same[0].first, back)
-            )
-            name, load = table.path.name, table.load[0]
-            found.append(KeptStrain(name, last.ratio, last.phase, len(same), before, after, load))
-    return tuple(found)
 
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
@@ -74,9 +51,7 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "n
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
     """Elastic constants of one test, by the options chosen and by others that the paths settle.
-
-    first, last : with the first and the last cycle of each ratio, None where these settle none.
-    """
+    first, last : with the first and the last cycle of each ratio, None where these settle none."""
 
     test: str
     paths: tuple[BiaxialPath, ...]
@@ -128,7 +103,23 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
         chosen = designers.evaluate(lines, options)
     except InputError as error:
         raise test.place.error("data", error.problem) from None
-    others, kept = tuple(designers.evaluate_others(lines, options)), kept_strains(test.data)
+    found = []
+    for table, cycles in zip(test.data.tables, test.data.cycles, strict=True):
+        away = np.abs(table.load - table.load[0]).max(axis=1)
+        least = BACK * float(np.ptp(table.load.max(axis=1)))
+        for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
+            same = list(phase)
+            last = same[-1]
+            later = [cycle.first for cycle in cycles if cycle.first > last.last]
+            stop = (later[0] if later else len(table.load) - 1) + 1
+            back = last.last + int(np.argmin(away[last.last : stop]))
+            before, after = (
+                table.strain[row] - table.strain[0] if away[row] <= least else None
+                for row in (same[0].first, back)
+            )
+            name, load = table.path.name, table.load[0]
+            found.append(KeptStrain(name, last.ratio, last.phase, len(same), before, after, load))
+    others, kept = tuple(designers.evaluate_others(lines, options)), tuple(found)
     ends = _of_cycle(test, 1, options), _of_cycle(test, "last", options)
     return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, kept)
 
@@ -169,47 +160,10 @@ def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
     return pd.DataFrame([{"what": what, **designers.row_of(one)} for what, one in named])
 
 
-def line_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """Return a table of the regression lines, by ratio."""
-    table = []
-    for path, line in zip(found.paths, found.lines, strict=True):
-        row = {
-            "ratio": path.ratio,
-            "file": path.table.path.name,
-            "cycle": path.cycle.number,
-            "cycles": path.cycles,
-            "readings": len(path.load),
-            "from_kN_per_m": float(path.larger[0]),
-            "to_kN_per_m": float(path.larger[-1]),
-        }
-        for what, values in (
-            ("load_change_kN_per_m", line.load),
-            ("strain_change_percent", PERCENT * np.asarray(line.strain)),
-            ("rms_about_line_percent", PERCENT * np.asarray(line.residual)),
-        ):
-            row |= {f"warp_{what}": values[0], f"fill_{what}": values[1]}
-        table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
-    return pd.DataFrame(table)
-
-
-def kept_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """Return a table of residual strains before and after each phase of cycles, %."""
-    table = []
-    for k in found.kept:
-        row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
-        for when, strain in (("before", k.before), ("after", k.after)):
-            values = np.full(2, np.nan) if strain is None else PERCENT * strain
-            row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
-        table.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
-    return pd.DataFrame(table)
-
-
 def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
-
     Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
-    Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither.
-    """
+    Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither."""
     evaluated = {
         (path.table.path.name, path.cycle.phase): (path, line)
         for path, line in zip(found.paths, found.lines, strict=True)
@@ -252,8 +206,29 @@ STANDARD = "en-17117"
 
 def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     """Return all tables by name."""
+    table = []
+    for path, line in zip(found.paths, found.lines, strict=True):
+        row = {
+            "ratio": path.ratio, "file": path.table.path.name, "cycle": path.cycle.number,
+            "cycles": path.cycles, "readings": len(path.load),
+            "from_kN_per_m": float(path.larger[0]), "to_kN_per_m": float(path.larger[-1]),
+        }  # fmt: skip
+        for what, values in (
+            ("load_change_kN_per_m", line.load),
+            ("strain_change_percent", PERCENT * np.asarray(line.strain)),
+            ("rms_about_line_percent", PERCENT * np.asarray(line.residual)),
+        ):
+            row |= {f"warp_{what}": values[0], f"fill_{what}": values[1]}
+        table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
+    phases = []
+    for k in found.kept:
+        row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
+        for when, strain in (("before", k.before), ("after", k.after)):
+            values = np.full(2, np.nan) if strain is None else PERCENT * strain
+            row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
+        phases.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
     return {"constants": option_table(found), STANDARD: standard_table(found),
-            "lines": line_table(found), "kept": kept_table(found)}  # fmt: skip
+            "lines": pd.DataFrame(table), "kept": pd.DataFrame(phases)}  # fmt: skip
 
 
 def lines_of(found: BiaxialEvaluation) -> list[str]:
@@ -303,10 +278,8 @@ def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
         for name, table in tables_of(found).items()
     }
     return {
-        "options": in_words(found.chosen.options),
-        "convention": CONVENTION,
-        "points_a_path": POINTS,
-        **plain,
+        "options": in_words(found.chosen.options), "convention": CONVENTION,
+        "points_a_path": POINTS, **plain,
         "spread": {name: list(ends) for name, ends in found.spread.items()},
         "notes": rows(found.notes),
-    }
+    }  # fmt: skip

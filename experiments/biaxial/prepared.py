@@ -47,9 +47,7 @@ PRESTRESS = 0.05
 
 class StrainObjective:
     """Residuals (model - measured) / (scale sqrt(n)) of n strains along warp, then fill.
-
-    Strains count from the first load of the path, (n, 2). scale : strain that counts as one.
-    """
+    Strains count from the first load of the path, (n, 2). scale : strain that counts as one."""
 
     unit = "%"
 

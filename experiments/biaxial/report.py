@@ -55,19 +55,6 @@ def misfit_table(paths: Sequence[FittedPath]) -> Table:
     return Table("Misfit by ratio", header, rows, note, text=(0, 3))
 
 
-def path_table(paths: Sequence[FittedPath]) -> pd.DataFrame:
-    """Return loads and strains of every ratio, measured and modelled, along the path."""
-    parts = []
-    for p in paths:
-        parts.append(_columns(p.path.load, "load_kN_per_m"))
-        parts[-1].insert(0, "ratio", p.path.ratio)
-        strains = (("strain", p.objective.strain), ("model", p.objective.modelled(p.history)))
-        parts[-1][[f"{yarn}_{name}_percent" for name, _ in strains for yarn in YARNS]] = (
-            PERCENT * np.hstack([strain for _, strain in strains])
-        )
-    return pd.concat(parts, ignore_index=True)
-
-
 def _columns(values: Array, name: str) -> pd.DataFrame:
     return pd.DataFrame(values, columns=[f"{yarn}_{name}" for yarn in YARNS])
 
@@ -99,24 +86,55 @@ Loadings = Mapping[tuple[str, str], "Loading | SolverFailure"]
 
 
 def simulate(
-    test: BiaxialTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-    within_range: bool = False,
-) -> Simulation:
+    test: BiaxialTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
+    out: Output, within_range: bool = False,
+) -> Simulation:  # fmt: skip
     """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
     found: Loadings = {
         (name, path.ratio): _loading(path, card, runs[name, path.ratio], within_range)
         for path in test.data.paths
         for name, card in cards.items()
     }
-    _write_paths(test, found, out)
+    ended = {key: one for key, one in found.items() if isinstance(one, Loading)}
+    tables = []
+    for (card, ratio), one in ended.items():
+        table = _columns(one.path.load[: len(one.larger)], "load_kN_per_m")
+        table[[f"{yarn}_strain_percent" for yarn in YARNS]] = one.strain
+        table.insert(0, "card", card)
+        table.insert(1, "ratio", ratio)
+        tables.append(table)
+    if tables:
+        with replacing(out.path("paths.csv")) as file:
+            pd.concat(tables, ignore_index=True).to_csv(file, index=False, float_format="%.9g")
+    panels = []
+    for path in test.data.paths:
+        curves = tuple(
+            (card, one.larger, one.strain)
+            for (card, ratio), one in ended.items()
+            if ratio == path.ratio and len(one.larger)
+        )
+        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
+    save(out.path("paths.png"), biaxial_charts("ratios", panels))
     numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
-    for (name, ratio), one in found.items():
-        numbers[name]["ratios"][ratio] = _loading_numbers(one)
+    lines = []
+    for (name, ratio), run in found.items():
+        if isinstance(run, SolverFailure):
+            numbers[name]["ratios"][ratio] = {"failed": run.reason}
+            lines.append(f"{name}: ratio {ratio} failed: {run.reason}")
+            continue
+        end = float(run.larger[-1]) if len(run.larger) else 0.0
+        numbers[name]["ratios"][ratio] = {
+            "rms_warp_percent": run.rms[0], "rms_fill_percent": run.rms[1],
+            "shown_to_kN_per_m": end,
+            "strain_reached": dict(zip(kinds.STRAINS, run.reached.tolist(), strict=True)),
+        }  # fmt: skip
+        if len(run.larger):
+            lines.append(
+                f"{name}: ratio {ratio}: RMS of strain {run.rms[0]:.3g} % along warp, "
+                f"{run.rms[1]:.3g} % along fill, to {end:.3g} kN/m"
+            )
     figures = [(out.name("paths.png"), "Strain over the larger load")]
-    return Simulation({"cards": numbers}, _lines_of_cards(found), figures)
+    return Simulation({"cards": numbers}, lines, figures)
 
 
 def _loading(
@@ -133,71 +151,19 @@ def _loading(
     return Loading(path, path.larger[:shown], strain, (warp, fill), kinds.strains_of(run.outcome))
 
 
-def _loading_numbers(one: Loading | SolverFailure) -> dict[str, Any]:
-    """Return the results for result.json."""
-    if isinstance(one, SolverFailure):
-        return {"failed": one.reason}
-    return {
-        "rms_warp_percent": one.rms[0],
-        "rms_fill_percent": one.rms[1],
-        "shown_to_kN_per_m": float(one.larger[-1]) if len(one.larger) else 0.0,
-        "strain_reached": dict(zip(kinds.STRAINS, one.reached.tolist(), strict=True)),
-    }
-
-
-def _lines_of_cards(found: Loadings) -> list[str]:
-    """Return the results as lines for the terminal."""
-    lines = []
-    for (name, ratio), one in found.items():
-        if isinstance(one, SolverFailure):
-            lines.append(f"{name}: ratio {ratio} failed: {one.reason}")
-        elif len(one.larger):
-            lines.append(
-                f"{name}: ratio {ratio}: RMS of strain {one.rms[0]:.3g} % along warp, "
-                f"{one.rms[1]:.3g} % along fill, to {one.larger[-1]:.3g} kN/m"
-            )
-    return lines
-
-
-def _write_paths(test: BiaxialTest, found: Loadings, out: Output) -> None:
-    ended = {key: one for key, one in found.items() if isinstance(one, Loading)}
-    tables = []
-    for (name, ratio), one in ended.items():
-        table = _columns(one.path.load[: len(one.larger)], "load_kN_per_m")
-        table[[f"{yarn}_strain_percent" for yarn in YARNS]] = one.strain
-        table.insert(0, "card", name)
-        table.insert(1, "ratio", ratio)
-        tables.append(table)
-    if tables:
-        with replacing(out.path("paths.csv")) as file:
-            pd.concat(tables, ignore_index=True).to_csv(file, index=False, float_format="%.9g")
-    panels = []
-    for path in test.data.paths:
-        curves = tuple(
-            (name, one.larger, one.strain)
-            for (name, ratio), one in ended.items()
-            if ratio == path.ratio and len(one.larger)
-        )
-        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
-    save(out.path("paths.png"), biaxial_charts("ratios", panels))
-
-
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
     paths, numbers = prepared.fitted_paths(fitted), {}
     for p in paths:
         warp, fill = p.rms
         numbers[p.path.ratio] = {
-            "rms_warp_percent": warp,
-            "rms_fill_percent": fill,
-            "matched": len(p.path.load),
-            "cycle": p.path.cycle.number,
-            "cycles": p.path.cycles,
+            "rms_warp_percent": warp, "rms_fill_percent": fill, "matched": len(p.path.load),
+            "cycle": p.path.cycle.number, "cycles": p.path.cycles,
             "end_load_warp_kN_per_m": float(p.path.load[-1, 0]),
             "end_load_fill_kN_per_m": float(p.path.load[-1, 1]),
             "residual_warp_percent": 100 * float(p.path.residual[0]),
             "residual_fill_percent": 100 * float(p.path.residual[1]),
-        }
+        }  # fmt: skip
     errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
     warnings = tuple(_warnings(prepared.test))
@@ -223,7 +189,15 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
     """Write paths.csv and the figure of the ratios."""
     paths = prepared.fitted_paths(fitted)
     with replacing(out.path("paths.csv")) as path:
-        path_table(paths).to_csv(path, index=False, float_format="%.9g")
+        parts = []
+        for p in paths:
+            parts.append(_columns(p.path.load, "load_kN_per_m"))
+            parts[-1].insert(0, "ratio", p.path.ratio)
+            strains = (("strain", p.objective.strain), ("model", p.objective.modelled(p.history)))
+            parts[-1][[f"{yarn}_{name}_percent" for name, _ in strains for yarn in YARNS]] = (
+                PERCENT * np.hstack([strain for _, strain in strains])
+            )
+        pd.concat(parts, ignore_index=True).to_csv(path, index=False, float_format="%.9g")
     charts = fitted_paths(prepared, fitted)
     save(out.path("paths.png"), charts)
     facts = [("ratios matched", ", ".join(p.path.ratio for p in paths))]

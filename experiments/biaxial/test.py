@@ -64,11 +64,9 @@ class TablesSection(Section):
 
 class BiaxialSection(Section):
     """Section [[biaxial]]: a cruciform, its loads in kN/m and strains as one test.
-
     width : of the arms, where files hold forces. range : kN/m of the larger load. cycle : of each
     ratio. conditioning : cycles at the beginning of each file that count for nothing. noise : of
-    one measured strain, in %.
-    """
+    one measured strain, in %."""
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
@@ -105,17 +103,12 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
             raise place.error(field, f"there is no file {path}; --data DIR names another folder")
         tables.append(
             read_biaxial_table(
-                path,
-                columns=columns,
-                load_unit=data.load_unit,
-                strain_unit=data.strain_unit,
-                width=section.width and section.width * place.scales.length,
-                sheet=data.sheet,
-                decimal=data.decimal,
-                comment=data.comment,
+                path, columns=columns, load_unit=data.load_unit, strain_unit=data.strain_unit,
+                width=section.width and section.width * place.scales.length, sheet=data.sheet,
+                decimal=data.decimal, comment=data.comment,
                 format=named_format(place, "data.format", "machine table", data.format),
             )
-        )
+        )  # fmt: skip
         named.append(ratio)
     cycles = cycles_of(tables, named)
     wanted = None

@@ -1,7 +1,6 @@
 """Doubts about the data of a bubble test: traps that measured fields may have fallen into.
 
-Each check, one function in `CHECKS`, looks at the measured fields (`View`) and yields doubts.
-"""
+Each check, one function in `CHECKS`, looks at the measured fields (`View`) and yields doubts."""
 
 from __future__ import annotations
 
@@ -18,18 +17,7 @@ from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ..kinds import Doubt, Expected
-from .registration import (
-    POWERS,
-    Axes,
-    ClampEdge,
-    Rim,
-    apex_shape,
-    clamp_of_motion,
-    in_all_quarters,
-    line_angle,
-    rim_of_motion,
-    symmetry_axes,
-)
+from . import registration
 from .sheet import fit_disk_polynomial
 
 Array = NDArray[np.float64]
@@ -81,7 +69,6 @@ TELLING = 0.002
 @dataclass(frozen=True)
 class Apex:
     """Equilibrium at the apex of one field without any model: n1 k1 + n2 k2 = p from its shape.
-
     pressure : MPa. height : mm, rise of the centre. curvature : 1/mm, k1 + k2 of the inflated
     surface; positive where it is a dome. force : N/mm, p / (k1 + k2), that of all directions if
     alike. error : N/mm, of the force by the points' scatter. strain : logarithmic, along x and y.
@@ -106,7 +93,7 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     before = field.frame.points
     after = before + field.displacement
     try:
-        shape = apex_shape(field.points, np.hstack([after, before]), radius)
+        shape = registration.apex_shape(field.points, np.hstack([after, before]), radius)
     except InputError as error:
         raise InputError(field.path, error.field, error.problem) from None
     left = after[shape.near, 2] - shape.terms @ shape.coefficients[:, 2]
@@ -118,9 +105,9 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     xx, xy, yy = (shape.at_centre(i, j)[:3] @ normal for i, j in ((2, 0), (1, 1), (0, 2)))
     second = np.array([[xx, xy], [xy, yy]])
     curvature = -float(np.trace(np.linalg.solve(metric, second)))
-    variance = float(left @ left) / (len(left) - len(POWERS))
+    variance = float(left @ left) / (len(left) - len(registration.POWERS))
     inverse = np.linalg.pinv(shape.terms.T @ shape.terms)
-    both = [POWERS.index((2, 0)), POWERS.index((0, 2))]
+    both = [registration.POWERS.index((2, 0)), registration.POWERS.index((0, 2))]
     spread = float(np.sqrt(variance * inverse[np.ix_(both, both)].sum())) * 2 / radius**2
     stretch = np.sqrt(np.diag(metric) / np.diag(first))
     strain = float(np.log(stretch[0])), float(np.log(stretch[1]))
@@ -135,7 +122,6 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
 @dataclass(frozen=True, eq=False)
 class View:
     """Measured fields by rising pressure, in the test's coordinates; thickness mm.
-
     flat : nothing is said of the sheet's first shape. numbers : doubts about the frames' numbers.
     """
 
@@ -185,25 +171,29 @@ class View:
         return [(f.points, f.displacement[:, 2]) for f in high]
 
     @cached_property
-    def clamp(self) -> ClampEdge | None:
+    def clamp(self) -> registration.ClampEdge | None:
         """Find the edge of the clamp; None where no points stand still around the disk."""
         outline = self.outline
-        return clamp_of_motion(self.surfaces, (outline.major, outline.minor), outline.angle)
+        return registration.clamp_of_motion(
+            self.surfaces, (outline.major, outline.minor), outline.angle
+        )
 
     @cached_property
-    def rim(self) -> Rim | None:
+    def rim(self) -> registration.Rim | None:
         """Find the rim, of an ellipse its turn; None where points do not reach it all around."""
         try:
-            return rim_of_motion(self.surfaces, (self.outline.major, self.outline.minor))
+            return registration.rim_of_motion(
+                self.surfaces, (self.outline.major, self.outline.minor)
+            )
         except InputError:
             return None
 
     @cached_property
-    def axes(self) -> Axes | None:
+    def axes(self) -> registration.Axes | None:
         """Find the axes of symmetry; None of an ellipse or where points lie on one side only."""
-        if not self.outline.round or not in_all_quarters(self.last.points):
+        if not self.outline.round or not registration.in_all_quarters(self.last.points):
             return None
-        return symmetry_axes([field.frame for field in self.fields], self.radius)
+        return registration.symmetry_axes([field.frame for field in self.fields], self.radius)
 
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
         """Return which points lie well within the rim."""
@@ -349,9 +339,7 @@ def _same_points(
     last: DisplacementField, other: DisplacementField
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the rows of points that are in both frames: by their places, before or after.
-
-    Rows are paired as they stand where most of the places are found in neither way.
-    """
+    Rows are paired as they stand where most of the places are found in neither way."""
     moved = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
     for taken_off in (0.0, 1.0):
         a, b = (f.points - taken_off * f.displacement[:, :2] for f in (last, other))
@@ -478,7 +466,7 @@ def turned(view: View, expected: Expected) -> Iterator[Doubt]:
         return
     if not view.outline.round:
         said = view.outline.angle
-        off = line_angle(view.rim.angle - said)
+        off = registration.line_angle(view.rim.angle - said)
         error, where = view.rim.turn_error, f"{said + off:.3g} degrees from x"
         text = (
             f"the sheet rises within an ellipse whose major axis lies {where} (+- {error:.2g}), not"

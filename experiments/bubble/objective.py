@@ -2,8 +2,7 @@
 
 A block is one displacement direction at one pressure: (model - measured) / (largest measured
 |value| * sqrt(n)). Its norm is e_x/max(P_x) of Eq. 4.8, e is the sum of the norms. With plain
-millimetres the scale is one and e is a sum of RMS errors in mm.
-"""
+millimetres the scale is one and e is a sum of RMS errors in mm."""
 
 from __future__ import annotations
 
@@ -46,12 +45,10 @@ def displacement_offset(nuisance: Unknowns | None) -> Array:
 @dataclass(frozen=True, eq=False)
 class FieldTarget:
     """The displacement field that was measured at one pressure.
-
     displacement (n, 3) mm; `sample` (n, nodes) takes model nodes to the places (None: the nodes).
     places : (n,) numbers, equal for a place in all targets, for a constant field. frame : of the
     model's history, the target's number unless given; since : the frame from which displacements
-    are counted, None: the reference state. at_rest : (n, 2) mm before the test.
-    """
+    are counted, None: the reference state. at_rest : (n, 2) mm before the test."""
 
     pressure: float
     displacement: Array
@@ -81,23 +78,17 @@ class FieldTarget:
 
 class FieldObjective:
     """Residual blocks for displacement fields at several pressures, x, y, z at each.
-
     targets : one a reported pressure, in the order of the model's frames. weight : of every block
     in e. noise : mm of one displacement, at least. constant : directions (0 to 2) in which at every
     place the weighted mean over the pressures of model less measured is projected out. Raises
-    InputError for a direction without any displacement to normalise by.
-    """
+    InputError for a direction without any displacement to normalise by."""
 
     unit, columns = "mm", 3
 
     def __init__(
-        self,
-        targets: Sequence[FieldTarget],
-        normalise: Literal["e", "mm"] = "e",
-        weight: float = 1.0,
-        noise: float | None = None,
-        constant: Sequence[int] = (),
-    ) -> None:
+        self, targets: Sequence[FieldTarget], normalise: Literal["e", "mm"] = "e",
+        weight: float = 1.0, noise: float | None = None, constant: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         self.least_noise = CORRELATION if noise is None else noise
         self.noise_is: NoiseIs = "assumed" if noise is None else "given"
         self.targets, self.constant = tuple(targets), tuple(constant)
@@ -165,10 +156,8 @@ class FieldObjective:
 
     def _placed(self, amounts: Array) -> list[Array]:
         """Return (n, 3) mm of each target that amounts (4,) of `PLACED` add to model less measured.
-
         The measured field is turned into the model's frame. Where the model is read at a given
-        place it moves less than at the true one by what the measured field grows up to there.
-        """
+        place it moves less than at the true one by what the measured field grows up to there."""
         turned, found = _tilted(amounts[:2])[0], []
         for target, grown in zip(self.targets, self._grown(amounts[2:]), strict=True):
             found.append((grown - target.displacement) @ turned + target.displacement)
@@ -250,10 +239,8 @@ class FieldObjective:
 
     def causes(self, history: History) -> dict[str, Array]:
         """Return (m, k) a cause, by its words, slopes of the residual by its amounts.
-
         Of the model's own field u(x) at pressure p: a place is off by d where u is read at x + d; a
-        larger disk has R u(x / R, R p); turned axes turn places and u, a tilted plane u alone.
-        """
+        larger disk has R u(x / R, R p); turned axes turn places and u, a tilted plane u alone."""
         pressures = [0.0, *(target.pressure for target in self.targets)]
         if not self.places or len(pressures) < 3 or not (np.diff(pressures) > 0).all():
             return {}
@@ -453,10 +440,8 @@ POWER = 2.0 / 3.0
 
 def at_rest(fields: Sequence[DisplacementField], since: int) -> list[DisplacementField]:
     """Return fields with places in the sheet without load, where they are those of frame `since`.
-
     Nothing moves in a frame that the others are counted from. The next one shows how far its places
-    have moved already: in-plane displacements grow with p^(2/3). Other fields stay as they are.
-    """
+    have moved already: in-plane displacements grow with p^(2/3). Other fields stay as they are."""
     first = fields[since]
     if first.displacement.any():
         return list(fields)

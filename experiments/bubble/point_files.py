@@ -29,19 +29,14 @@ AT = "data.points.pressure"
 
 
 def pressures_by_log(
-    section: LogSection,
-    files: Sequence[Path],
-    options: FrameOptions,
-    format: str | None,
-    place: Place,
-    folder: Path,
-) -> tuple[pressure_log.ClockOffset, list[str], list[str]]:
+    section: LogSection, files: Sequence[Path], options: FrameOptions, format: str | None,
+    place: Place, folder: Path,
+) -> tuple[pressure_log.ClockOffset, list[str], list[str]]:  # fmt: skip
     """Return the pressures of all frames by a log, their names, and doubts about their numbers.
 
     Raises InputError.
 
-    folder : of the data, where the log may be too.
-    """
+    folder : of the data, where the log may be too."""
     at = f"{AT}.log"
     file = _beside(section.file, place, folder, f"{at}.file")
     kind = named_format(place, f"{at}.format", "machine table", section.format)
@@ -73,16 +68,11 @@ def pressures_by_log(
 
 
 def _frame_times(
-    section: LogSection,
-    files: Sequence[Path],
-    own: Sequence[float | None],
-    place: Place,
+    section: LogSection, files: Sequence[Path], own: Sequence[float | None], place: Place,
     folder: Path,
-) -> tuple[Array, list[str]]:
+) -> tuple[Array, list[str]]:  # fmt: skip
     """Return times (frames,) in s by the camera's clock, and doubts about the numbers they are of.
-
-    own : numbers of the frames in their files.
-    """
+    own : numbers of the frames in their files."""
     by_name, count = bool(section.time_in_name), len(own)
     if by_name == (section.times is not None) and (by_name or section.rate is None):
         problem = "expected one of 'rate', 'times' and 'time_in_name' for the times of the frames"
@@ -126,13 +116,11 @@ def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
 @dataclass(frozen=True, eq=False)
 class RecordedFrames:
     """The frames that a test takes, by rising pressure.
-
     files : of the frames taken; all files where one holds several. frames : numbers among all
     frames of the files, None where each file holds one. pressure, asked : (n,) MPa. source : of the
     pressures, in words. count : of all frames. left_out : number of frames not used, by why. doubt
     : (n,) MPa, by the uncertain offset of the clocks. logs : a log, a table of times. numbers :
-    doubts about the frames' numbers, of which their times are.
-    """
+    doubts about the frames' numbers, of which their times are."""
 
     files: tuple[Path, ...]
     frames: tuple[int, ...] | None
@@ -149,18 +137,11 @@ class RecordedFrames:
 
 
 def recorded_frames(
-    section: PressureSection,
-    asked: Sequence[float] | None,
-    files: Sequence[Path],
-    options: FrameOptions,
-    format: str | None,
-    place: Place,
-    folder: Path,
-) -> RecordedFrames:
+    section: PressureSection, asked: Sequence[float] | None, files: Sequence[Path],
+    options: FrameOptions, format: str | None, place: Place, folder: Path,
+) -> RecordedFrames:  # fmt: skip
     """Choose the frames of a test by the pressures that were recorded; raises InputError.
-
-    asked : MPa, the test's `pressures`; None takes all frames, or `frames` of them.
-    """
+    asked : MPa, the test's `pressures`; None takes all frames, or `frames` of them."""
     _check(section, asked, place)
     clock, names, said = None, [file.name for file in files], list[str]()
     if section.log is not None:
@@ -195,18 +176,12 @@ def recorded_frames(
     single = len(names) == len(files)
     return RecordedFrames(
         files=tuple(files[i] for i in taken) if single else tuple(files),
-        frames=None if single else chosen.frames,
-        names=tuple(names[i] for i in taken),
-        pressure=pressures[taken],
-        asked=None if asked is None else np.array(asked),
-        source=source,
-        count=len(names),
-        left_out=chosen.left_out,
-        doubt=None if clock is None else clock.doubt[taken],
-        clock=clock,
-        logs=tuple(logs),
+        frames=None if single else chosen.frames, names=tuple(names[i] for i in taken),
+        pressure=pressures[taken], asked=None if asked is None else np.array(asked), source=source,
+        count=len(names), left_out=chosen.left_out,
+        doubt=None if clock is None else clock.doubt[taken], clock=clock, logs=tuple(logs),
         numbers=tuple(said),
-    )
+    )  # fmt: skip
 
 
 def _check(section: PressureSection, asked: Sequence[float] | None, place: Place) -> None:
@@ -233,9 +208,7 @@ def _check(section: PressureSection, asked: Sequence[float] | None, place: Place
 @dataclass(frozen=True)
 class PointFiles:
     """Measured displacements: files by pressure, how they are read, frames chosen among them.
-
-    correlation : words by the keys of [bubble.data.points.correlation].
-    """
+    correlation : words by the keys of [bubble.data.points.correlation]."""
 
     files: tuple[Path, ...]
     options: FrameOptions
@@ -249,24 +222,13 @@ def measured_files(
     section: BubbleSection, place: Place, pressures: Sequence[float] | None
 ) -> PointFiles | None:
     """Return the files of [bubble.data.points]; None for a known solution; raises InputError.
-
-    pressures : MPa, None where the project names none.
-    """
+    pressures : MPa, None where the project names none."""
     known, points = section.data.known_solution, section.data.points
     if (known is None) == (points is None):
         problem = "expected exactly one of [bubble.data.known_solution] and [bubble.data.points]"
         raise place.error("data", problem)
     if points is None:
         return None
-    measured = _points(points, place)
-    if points.pressure is None or (pressures is not None and not place.need_data):
-        return measured
-    how = measured.files, measured.options, measured.format
-    recorded = recorded_frames(points.pressure, pressures, *how, place, _folder(points, place))
-    return replace(measured, files=recorded.files, recorded=recorded)
-
-
-def _points(points: PointsSection, place: Place) -> PointFiles:
     columns = points.columns.model_dump(exclude_none=True)
     for name, column in columns.items():
         first = next(other for other in columns if columns[other] == column)
@@ -277,13 +239,17 @@ def _points(points: PointsSection, place: Place) -> PointFiles:
     scale = LENGTH_UNITS[points.length_unit or place.scales.length_unit]
     options = FrameOptions(
         FIELD, columns or None, points.flag_column, points.comment, scale, points.valid_column,
-        points.decimal, points.coordinates, points.camera_axes,
-        reference=_reference(points, place),
+        points.decimal, points.coordinates, points.camera_axes, reference=_reference(points, place),
     )  # fmt: skip
     kind = named_format(place, "data.points.format", "frame", points.format)
     registration = registration_options(points.registration, place, scale)
     correlation = points.correlation.model_dump(exclude_none=True)
-    return PointFiles(files, options, kind, registration, correlation=correlation)
+    measured = PointFiles(files, options, kind, registration, correlation=correlation)
+    if points.pressure is None or (pressures is not None and not place.need_data):
+        return measured
+    how = measured.files, measured.options, measured.format
+    recorded = recorded_frames(points.pressure, pressures, *how, place, _folder(points, place))
+    return replace(measured, files=recorded.files, recorded=recorded)
 
 
 def _reference(points: PointsSection, place: Place) -> Path | None:

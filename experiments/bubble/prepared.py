@@ -62,11 +62,9 @@ INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 @dataclass(frozen=True, eq=False)
 class PreparedBubble:
     """The test, its fields as read (or computed), and polynomial surfaces of them.
-
     known : the law behind computed data. registration : None where the files were in the test's
     coordinates. by_this_model : the data were computed with the mesh, the increments and the solver
-    of the fit. sheet : surface and rim as measured.
-    """
+    of the fit. sheet : surface and rim as measured."""
 
     test: BubbleTest
     fields: tuple[DisplacementField, ...]
@@ -170,10 +168,8 @@ class PreparedBubble:
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
         """Return the comparison of the measured shapes with equilibrium, on few quads.
-
         A constant field is not taken out. InputError for displacements that count from a pressure,
-        at which the shape is not known; for too few points.
-        """
+        at which the shape is not known; for too few points."""
         test, sheet = self.test, self.test.sheet
         if sheet.since is not None:
             raise test.place.error("sheet.from_pressure", "leaves the shapes of the sheet unknown")
@@ -194,9 +190,7 @@ class PreparedBubble:
 
     def _refined(self, own: Comparison, factor: float) -> Comparison:
         """Return a comparison of quads and increments divided by a factor, read as the fit reads.
-
-        Raises InputError for a mesh too coarse for a disk, or for the places of the data.
-        """
+        Raises InputError for a mesh too coarse for a disk, or for the places of the data."""
         test = self.test
         finer = test.models(what="elements", factor=factor)[PART]
         whole = len(finer.mesh.quads) * (4 if test.symmetry == "quarter" else 1)
@@ -270,9 +264,7 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
 
 def registration_nuisance(test: BubbleTest, objective: FieldObjective) -> list[Nuisance]:
     """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
-
-    Their priors weigh as the noise does: the field's symmetry tells far more.
-    """
+    Their priors weigh as the noise does: the field's symmetry tells far more."""
     known, found = test.registration, list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
     for name, prior in known.items():
@@ -290,11 +282,9 @@ def registration_nuisance(test: BubbleTest, objective: FieldObjective) -> list[N
 
 
 def resampled(
-    targets: tuple[FieldTarget, ...],
-    own: Mesh,
-    other: Mesh,
+    targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh,
     reading: SmoothReading | FacetReading | None = None,
-) -> tuple[FieldTarget, ...]:
+) -> tuple[FieldTarget, ...]:  # fmt: skip
     """Return the targets at the same places of another mesh; its reading is smooth unless given."""
     reading = reading or SmoothReading.of(other)
     found: list[tuple[Array, sp.csr_matrix]] = []
@@ -312,9 +302,7 @@ def resampled(
 
 def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     """Return starts of a finer model from a path (steps, nodes, 3): one, NaN before it.
-
-    The sheet is taut there; with less pressure a slack one has folds that depend on the mesh.
-    """
+    The sheet is taut there; with less pressure a slack one has folds that depend on the mesh."""
     sample = _sample(SmoothReading.of(own.mesh), finer.mesh.points[:, :2])
     k = min(LEAD, len(path) - 1)
     last = int(np.argmin(np.abs(np.array(finer.increments) - own.increments[k])))
@@ -506,10 +494,8 @@ def _made(test: BubbleTest, sight: Precision, planning: Planning) -> PreparedBub
 
 def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
     """Return the test with a rim as long as its own, at pressures that strain it about as much.
-
     Of a shallow dome of height h, p = h (N1/a^2 + N2/b^2) up to a factor; alike strained it is h
-    that goes with the minor semi-axis b.
-    """
+    that goes with the minor semi-axis b."""
     rim = Outline(test.outline.major, SLENDER * test.outline.major, angle)
     curved = rim.minor * (rim.major**-2 + rim.minor**-2)
     times = curved * test.outline.radius / 2.0
@@ -525,23 +511,13 @@ def _usual(planning: Planning) -> BubbleTest:
     pressures = tuple(share * top for share in LEVELS)
     increments = default_increments(pressures)
     return BubbleTest(
-        name="bubble",
-        place=planning.place,
-        weight=1.0,
-        outline=Outline.circle(RADIUS),
-        elements=ELEMENTS,
-        symmetry="quarter",
-        generator="blocks",
-        pressures=pressures,
+        name="bubble", place=planning.place, weight=1.0, outline=Outline.circle(RADIUS),
+        elements=ELEMENTS, symmetry="quarter", generator="blocks", pressures=pressures,
         increments=increments,
         data=KnownSolution(law.beta, law.form.name, ELEMENTS, increments, "quarter"),
-        match_by="points",
-        match_degree=4,
-        objective="mm",
-        displacement_offset=False,
-        pressure_offset=False,
-        sheet=Sheet(),
-    )
+        match_by="points", match_degree=4, objective="mm", displacement_offset=False,
+        pressure_offset=False, sheet=Sheet(),
+    )  # fmt: skip
 
 
 def _pressure(law: HypoelasticLaw, strain: float, thickness: float) -> float:

@@ -5,8 +5,7 @@ is the polynomial about the centre. The rim is where the sheet does not rise (`r
 disk of orthotropic fabric moves symmetrically about warp and fill: in polar components u_r and u_z
 have only cosines of the angle from the warp, u_theta only sines (`symmetry_axes`). The sheet's
 first shape adds much the same at every pressure: two frames are subtracted. `register` puts plane,
-centre, clamp motion and warp together.
-"""
+centre, clamp motion and warp together."""
 
 from __future__ import annotations
 
@@ -84,10 +83,8 @@ def shifted(x: float, y: float, z: float = 0.0) -> Placement:
 
 def plane_through(points: Array, up: Array) -> tuple[Placement, float]:
     """Fit a plane through points (n, 3); return it and their robust deviation from it in mm.
-
     Its origin is the mean of the points that count, its z the normal on the side of `up` (3,), its
-    x the camera's x laid into the plane. Raises InputError for points on a line.
-    """
+    x the camera's x laid into the plane. Raises InputError for points on a line."""
     points = points[np.isfinite(points).all(axis=1)]
     kept = np.ones(len(points), dtype=bool)
     for _ in range(ROUNDS):
@@ -169,9 +166,7 @@ def without(frame: Frame, motion: RigidMotion) -> Frame:
 @dataclass(frozen=True, eq=False)
 class ApexShape:
     """A polynomial of x and y in radii (mm) about the centre, coefficients (15, values).
-
-    near : (points,) which of those given it was fitted to. terms : (near, 15) at those points.
-    """
+    near : (points,) which of those given it was fitted to. terms : (near, 15) at those points."""
 
     radius: float
     near: NDArray[np.bool_]
@@ -187,9 +182,7 @@ class ApexShape:
 
 def apex_shape(points: Array, values: Array, radius: float) -> ApexShape:
     """Fit a polynomial to finite values (n, k) at points (n, 2) mm near the rim's centre.
-
-    Raises InputError for too few.
-    """
+    Raises InputError for too few."""
     x = points / radius
     near = np.isfinite(values).all(axis=1) & (np.hypot(*x.T) < WITHIN)
     if near.sum() < 2 * len(POWERS):
@@ -235,10 +228,8 @@ HIGH = 0.5
 @dataclass(frozen=True)
 class Rim:
     """The clamped edge in the plane of the sheet: centre x, y and its standard error, mm.
-
     angle : of the first semi-axis from x towards y, degrees (0 for a circle). turn_error : of an
-    angle that was found, degrees; 0 where it was not looked for.
-    """
+    angle that was found, degrees; 0 where it was not looked for."""
 
     x: float
     y: float
@@ -248,11 +239,9 @@ class Rim:
 
 
 def rim_of_motion(
-    surfaces: Sequence[tuple[Array, Array]],
-    semi_axes: tuple[float, float],
-    start: tuple[float, float] = (0.0, 0.0),
-    angle: float | None = None,
-) -> Rim:
+    surfaces: Sequence[tuple[Array, Array]], semi_axes: tuple[float, float],
+    start: tuple[float, float] = (0.0, 0.0), angle: float | None = None,
+) -> Rim:  # fmt: skip
     """Find the rim of known size through which the sheet does not rise.
 
     The rise of every frame is a polynomial times a factor that is zero on the rim, about the centre
@@ -261,8 +250,7 @@ def rim_of_motion(
 
     surfaces : places (n, 2) mm in the plane and rises (n,) mm, by rising pressure: the last few are
     taken. semi_axes, start : mm. angle : degrees, of the first semi-axis; found unless given where
-    the axes differ. Raises InputError for too few points, or none near the rim all around it.
-    """
+    the axes differ. Raises InputError for too few points, or none near the rim all around it."""
     free = semi_axes[0] != semi_axes[1] and angle is None
     fixed = 0.0 if angle is None else angle
     guess = np.array([*start, _long_axis(*surfaces[-1], semi_axes) if free else fixed])
@@ -291,10 +279,8 @@ def rim_of_motion(
 @dataclass(frozen=True)
 class ClampEdge:
     """The edge of the clamp by the points that stand still: a centre x, y, mm, and its size.
-
     scale : of the semi-axes that were said. error : standard error of the centre, mm. still :
-    points beyond the edge.
-    """
+    points beyond the edge."""
 
     x: float
     y: float
@@ -307,10 +293,8 @@ def clamp_of_motion(
     surfaces: Sequence[tuple[Array, Array]], semi_axes: tuple[float, float], angle: float = 0.0
 ) -> ClampEdge | None:
     """Find the edge beyond which points stand still; None where too few around the disk do.
-
     The rise of every frame is a polynomial times a factor that is zero from the edge on, whose
-    centre and size are looked for. surfaces, semi_axes, angle : as those of `rim_of_motion`.
-    """
+    centre and size are looked for. surfaces, semi_axes, angle : as those of `rim_of_motion`."""
     few = []
     for points, rise in surfaces[-FRAMES:]:
         near = np.hypot(*_local(points, np.array([0.0, 0.0, angle]), semi_axes)) < AROUND
@@ -361,10 +345,8 @@ def clamp_radius(
     fields: Sequence[DisplacementField], options: RegistrationOptions | None = None
 ) -> tuple[float, ClampEdge]:
     """Return the radius (mm) of the circle beyond which points stand still, and its edge.
-
     fields : by rising pressure. options : of the registration, None for fields in the test's
-    coordinates. Raises InputError where too few points around the disk stand still.
-    """
+    coordinates. Raises InputError where too few points around the disk stand still."""
     points, moved = _whole(fields[-1].frame)
     weight = np.linalg.norm(moved, axis=1)
     off = points - weight @ points / weight.sum()
@@ -434,10 +416,8 @@ def _terms(local: Array, still: bool = False) -> Array:
 @dataclass(frozen=True)
 class Axes:
     """Two axes of symmetry at right angles, one at `angle` (0 to 90 degrees) from x towards y.
-
     error : standard error, degrees, from frame to frame and between parts of the points. clear : 1
-    where the field is wholly symmetric about the axes, 0 where no axes are better.
-    """
+    where the field is wholly symmetric about the axes, 0 where no axes are better."""
 
     angle: float
     error: float
@@ -537,10 +517,8 @@ def _asymmetry(profile: Array) -> Array:
 @dataclass(frozen=True)
 class WarpDirection:
     """The direction of the warp, -90 to 90 degrees from x towards y, and its standard error.
-
     clear : as that of `Axes`; None by an elliptic rim. strains : Green-Lagrange at the centre in
-    the highest frame less those of the lowest, warp and fill.
-    """
+    the highest frame less those of the lowest, warp and fill."""
 
     angle: float
     error: float
@@ -552,9 +530,7 @@ def warp_of_field(
     frames: Sequence[Frame], radius: float, warp_is_stiff: bool = True
 ) -> WarpDirection:
     """Find the axis of symmetry along which the centre is strained less (warp stiff), or more.
-
-    Raises InputError for too few points about the centre, and for a field without clear axes.
-    """
+    Raises InputError for too few points about the centre, and for a field without clear axes."""
     axes = symmetry_axes(frames, radius)
     if axes.error > UNSURE or axes.clear < CLEAR:
         problem = (
@@ -600,14 +576,12 @@ def warp_of_points(first: Array, second: Array) -> float:
 @dataclass(frozen=True)
 class RegistrationOptions:
     """The given steps of a registration; everything else is found.
-
     plane : through points on the "clamp", through the "edge" of the sheet, the "camera"'s own x and
     y, or "found": the clamp where it was seen, else the edge. centre, warp_points : (3,) of the rim
     and two marks along the warp, mm, in the camera's coordinates. rim_angle : degrees, of the first
     semi-axis of an ellipse from the warp towards the fill. warp : degrees from the camera's x,
     towards its y where the sheet rises towards its z. warp_is_stiff : the direction strained less
-    is the warp, where it is found.
-    """
+    is the warp, where it is found."""
 
     plane: PlaneOf = "found"
     centre: Point | None = None
@@ -629,12 +603,10 @@ ALL_FOUND = RegistrationOptions()
 @dataclass(frozen=True, eq=False)
 class Registration:
     """The result of a registration, and how each step came about.
-
     placement : of the test's coordinates in the camera's. plane_of : "clamp", "edge" or "camera".
     flatness : mm, robust deviation of its points. rim : x along the warp; None where the centre is
     given. warp : None where it is given. warp_angle : degrees, as `RegistrationOptions.warp`.
-    motions : of the clamp, one a frame, in the test's coordinates.
-    """
+    motions : of the clamp, one a frame, in the test's coordinates."""
 
     placement: Placement
     plane_of: str
@@ -647,16 +619,13 @@ class Registration:
 
 
 def register(
-    frames: Sequence[Frame],
-    semi_axes: tuple[float, float],
+    frames: Sequence[Frame], semi_axes: tuple[float, float],
     options: RegistrationOptions = ALL_FOUND,
-) -> tuple[tuple[Frame, ...], Registration]:
+) -> tuple[tuple[Frame, ...], Registration]:  # fmt: skip
     """Return the frames in the test's coordinates, and how these were found.
-
     frames : in the camera's coordinates, mm, by rising pressure; unless the clamp is seen, the rim
     must not turn between them. semi_axes : of the rim, mm, first the one that `rim_angle` belongs
-    to. Raises InputError for a step that cannot be found and must be given.
-    """
+    to. Raises InputError for a step that cannot be found and must be given."""
     reference = frames[-1]
     moving = reference.displacement[np.isfinite(reference.displacement).all(axis=1)]
     if not len(moving) or not np.abs(moving).max() > 0:
@@ -695,11 +664,9 @@ def register(
 
 
 def _centred(
-    frames: Sequence[Frame],
-    placement: Placement,
-    semi_axes: tuple[float, float],
+    frames: Sequence[Frame], placement: Placement, semi_axes: tuple[float, float],
     options: RegistrationOptions,
-) -> tuple[Placement, Rim | None]:
+) -> tuple[Placement, Rim | None]:  # fmt: skip
     """Return the same plane with its origin in the centre of the rim."""
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
@@ -756,12 +723,9 @@ def _given_warp(placement: Placement, options: RegistrationOptions) -> float | N
 
 
 def _warp(
-    frames: Sequence[Frame],
-    placement: Placement,
-    semi_axes: tuple[float, float],
-    rim: Rim | None,
+    frames: Sequence[Frame], placement: Placement, semi_axes: tuple[float, float], rim: Rim | None,
     options: RegistrationOptions,
-) -> tuple[float, WarpDirection | None]:
+) -> tuple[float, WarpDirection | None]:  # fmt: skip
     """Return degrees from the plane's x to the warp, and how it was found unless given."""
     given = _given_warp(placement, options)
     if given is not None:
@@ -788,9 +752,7 @@ def register_fields(
     fields: Sequence[DisplacementField], outline: Outline, options: RegistrationOptions = ALL_FOUND
 ) -> tuple[tuple[DisplacementField, ...], Registration]:
     """Register fields by rising pressure as `register` does frames; outline from the warp.
-
-    Without measured heights the plane is the camera's; one to be found raises InputError.
-    """
+    Without measured heights the plane is the camera's; one to be found raises InputError."""
     measured = all(field.z is not None for field in fields)
     if not measured:
         if options.plane not in ("found", "camera"):

@@ -1,8 +1,7 @@
 """The presenter of bubble tests.
 
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
-fit, `residuals` the table of all matched values, `simulate` the results of forward analyses.
-"""
+fit, `residuals` the table of all matched values, `simulate` the results of forward analyses."""
 
 from __future__ import annotations
 
@@ -67,21 +66,15 @@ GUIDE = (
 #: Names on the page of the section's keys for hardware and analysis, which exports of image
 #: correlation do not hold.
 ASKED = {
-    "camera": "camera",
-    "resolution": "image resolution",
-    "lens": "lens and aperture",
-    "field_of_view": "field of view",
-    "scale": "image scale",
-    "stereo": "stereo angle and stand-off",
-    "exposure": "exposure and frame rate",
-    "pattern": "patterning technique",
-    "pattern_size": "pattern feature size",
-    "subset": "subset size",
-    "step": "step size",
+    "camera": "camera", "resolution": "image resolution", "lens": "lens and aperture",
+    "field_of_view": "field of view", "scale": "image scale",
+    "stereo": "stereo angle and stand-off", "exposure": "exposure and frame rate",
+    "pattern": "patterning technique", "pattern_size": "pattern feature size",
+    "subset": "subset size", "step": "step size",
     "strain_window": "strain window and virtual gauge length",
     "matching": "shape function, matching criterion, interpolant",
     "prefilter": "prefilter and data filter",
-}
+}  # fmt: skip
 NOT_MATCHED = "for the record: the fit matched the points themselves"
 #: Points that are drawn of one pressure.
 POINTS = 120
@@ -104,13 +97,11 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
             "pressure_offset_kPa": fitted.nuisance.get("pressure_offset"),
         },
         "data": {
-            "matched_by": test.match_by,
-            "places": [len(t.displacement) for t in objective.targets],
-            "doubtful_dropped": prepared.dropped,
-            **wording.read_numbers(prepared),
+            "matched_by": test.match_by, "places": [len(t.displacement) for t in objective.targets],
+            "doubtful_dropped": prepared.dropped, **wording.read_numbers(prepared),
             "outside_dropped": prepared.outside,
         },
-    }
+    }  # fmt: skip
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
     taken = wording.recorded_of(prepared)
     if taken is not None:
@@ -126,10 +117,8 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         ends = {name: float(fitted.reached[c]) for name, c in COMPONENTS.items()}
         numbers["moduli_error"] = errors
         numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
-        said = ", ".join(
-            f"{name} {percent(errors[name])} (up to {100 * end:.3g} %)"
-            for name, end in ends.items()
-        )
+        each = [f"{n} {percent(errors[n])} (up to {100 * end:.3g} %)" for n, end in ends.items()]
+        said = ", ".join(each)
         lines.append(f"largest error of the moduli over the strain reached: {said}")
     if prepared.registration is not None:
         numbers["registration"] = wording.registration_numbers(prepared.registration)
@@ -150,15 +139,10 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
         places = target.at(nodes)
         for axis, name in enumerate(DIRECTIONS):
             columns = {
-                "part": "bubble",
-                "frame": frame,
-                "pressure_kPa": 1e3 * target.pressure,
-                "x_mm": places[:, 0],
-                "y_mm": places[:, 1],
-                "quantity": name,
-                "measured": np.asarray(target.displacement)[:, axis],
-                "modelled": modelled[:, axis],
-            }
+                "part": "bubble", "frame": frame, "pressure_kPa": 1e3 * target.pressure,
+                "x_mm": places[:, 0], "y_mm": places[:, 1], "quantity": name,
+                "measured": np.asarray(target.displacement)[:, axis], "modelled": modelled[:, axis],
+            }  # fmt: skip
             frames.append(pd.DataFrame(columns))
     table = pd.concat(frames, ignore_index=True)
     return table.assign(difference=table["modelled"] - table["measured"], unit=objective.unit)
@@ -380,7 +364,13 @@ def _sizes(left: Array | None, quads: NDArray[np.intp]) -> Array:
 
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     """Write the maps and the rise by pressure; return the page of the data before a fit."""
-    view, facts, tables = prepared.view, [], [_frames(prepared)]
+    rows: list[list[object]] = []
+    for field, rise in zip(prepared.fields, prepared.view.rises, strict=True):
+        dropped = ", ".join(f"{count} {why}" for why, count in field.dropped.items()) or "none"
+        name = "computed" if field.path is None else field.path.name
+        rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
+    header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
+    view, facts, tables = prepared.view, [], [Table("Frames", header, rows, text=(1, 3))]
     if view.rim is not None:
         where = f"{view.rim.x:.2f}, {view.rim.y:.2f} (+- {view.rim.error:.2g})"
         facts.append(("the sheet rises about, mm", where))
@@ -395,16 +385,6 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     rises = bubbles.rise_charts([field.pressure for field in prepared.fields], view.rises)
     figure = _saved(out, "rises.png", rises, "rise about the centre against pressure")
     return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
-
-
-def _frames(prepared: PreparedBubble) -> Table:
-    rows: list[list[object]] = []
-    for field, rise in zip(prepared.fields, prepared.view.rises, strict=True):
-        dropped = ", ".join(f"{count} {why}" for why, count in field.dropped.items()) or "none"
-        name = "computed" if field.path is None else field.path.name
-        rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
-    header = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
-    return Table("Frames", header, rows, text=(1, 3))
 
 
 def _equilibrium(prepared: PreparedBubble) -> Table:
@@ -544,9 +524,8 @@ def correlation_table(prepared: PreparedBubble) -> list[Table]:
     if not isinstance(test.data, PointFiles) or not prepared.fields:
         return []
     facet = () if test.facet is None else (("subset", test.facet.size), ("step", test.facet.step))
-    given = {key: words for key, value in facet if (words := _mm(value))} | {
-        **test.data.correlation
-    }
+    given = {key: words for key, value in facet if (words := _mm(value))}
+    given |= test.data.correlation
     formats = sorted({f.source.format for f in prepared.fields if f.source.format})
     points = [len(f.points) for f in prepared.fields]
     software = [given.get("software", ""), ", ".join(formats)]
@@ -569,25 +548,17 @@ def _mm(value: float | None) -> str:
 
 
 def write_series(
-    model: BubbleModel,
-    history: History,
-    law: HypoelasticLaw,
-    path: Path,
+    model: BubbleModel, history: History, law: HypoelasticLaw, path: Path,
     residuals: Sequence[Array | None] = (),
-) -> Path:
+) -> Path:  # fmt: skip
     """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
-
-    residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without.
-    """
+    residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without."""
     folder, files = path.with_name(f"{path.stem}-vtu"), []
     for number, sheet in enumerate(inflated_sheets(model, history, law)):
         own = residuals[number] if number < len(residuals) else None
         file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
-        cells = {
-            "log_strain_1_2_12": sheet.strain,
-            "stress_1_2_12_MPa": sheet.stress,
-            "wrinkling": sheet.state,
-        }
+        cells = {"log_strain_1_2_12": sheet.strain, "stress_1_2_12_MPa": sheet.stress,
+                 "wrinkling": sheet.state}  # fmt: skip
         nodal = {} if own is None else {"residual_mm": own}
         write_vtu(model.mesh, sheet.displacement, file, nodal, cells)
         files.append((1e3 * sheet.pressure, file))
@@ -595,12 +566,9 @@ def write_series(
 
 
 def simulate(
-    test: BubbleTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-    within_range: bool = False,
-) -> Simulation:
+    test: BubbleTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
+    out: Output, within_range: bool = False,
+) -> Simulation:  # fmt: skip
     """Write displacement.csv, bubble.pvd and profiles.png of every card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
@@ -625,10 +593,8 @@ def simulate(
         lines += [f"{name}:"] if len(cards) > 1 else []
         lines += [f"{p:8.1f} kPa   apex {z:8.3f} mm" for p, z in zip(kilos, heights, strict=True)]
     if test.sheet != Sheet():
-        lines.append(
-            "note: simulated from a flat and taut sheet with a fixed rim, whatever [bubble.sheet] "
-            "says"
-        )
+        said = "a flat and taut sheet with a fixed rim, whatever [bubble.sheet] says"
+        lines.append(f"note: simulated from {said}")
     only = numbers[next(iter(cards))] if len(cards) == 1 else {}
     return Simulation({**only, "cards": numbers}, lines)
 

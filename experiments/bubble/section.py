@@ -12,15 +12,7 @@ from pydantic import Field, StringConstraints
 from ...errors import InputError
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
 from ...meshes.mesh import Facet
-from ...readers.sections import (
-    Length,
-    LengthUnit,
-    Modulus,
-    Number,
-    Positive,
-    Pressure,
-    Section,
-)
+from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
 from ..kinds import ChannelSection, Place, Scales
 from .registration import PlaneOf, RegistrationOptions
@@ -31,7 +23,7 @@ Words = Annotated[
 ]
 
 
-class CorrelationSection(Section):
+class CorrelationSection(sections.Section):
     """Words with their units, as they are to stand in a report; no result depends on them."""
 
     software: Words | None = None
@@ -51,13 +43,13 @@ class CorrelationSection(Section):
     prefilter: Words | None = None
 
 
-class FilterSection(Section):
+class FilterSection(sections.Section):
     """The camera's filter: the model is read as the camera reads the fabric."""
 
-    facet: Length
+    facet: sections.Length
     order: Literal[1, 2] = 1
     smoothing: int = 1
-    step: Length | None = None
+    step: sections.Length | None = None
 
 
 def facet_of(
@@ -79,19 +71,17 @@ def facet_of(
         raise place.error(f"{at}.{error.field}", error.problem) from None
 
 
-class EllipseSection(Section):
+class EllipseSection(sections.Section):
     """[bubble.ellipse]: the clamped edge is an ellipse, in place of `radius`."""
 
-    major: Length
-    minor: Length
+    major: sections.Length
+    minor: sections.Length
     angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
 
 
 def outline_of(section: BubbleSection, place: Place, of_clamp: Callable[[], float]) -> Outline:
     """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius.
-
-    of_clamp : finds the radius of the clamp in the data, mm.
-    """
+    of_clamp : finds the radius of the clamp in the data, mm."""
     length, ellipse = place.scales.length, section.ellipse
     if section.radius is not None and ellipse is not None:
         raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
@@ -125,7 +115,7 @@ Unit = Literal["Pa", "hPa", "mbar", "kPa", "psi", "bar", "MPa"]
 Name = Annotated[str, Field(min_length=1)]
 
 
-class LogSection(Section):
+class LogSection(sections.Section):
     """[bubble.data.points.pressure.log]: readings by a clock of their own."""
 
     file: Name
@@ -134,31 +124,31 @@ class LogSection(Section):
     decimal: Literal[".", ","] | None = None
     pressure: ChannelSection = ChannelSection()
     time: ChannelSection = ChannelSection()
-    rate: Positive | None = None
+    rate: sections.Positive | None = None
     times: Name | None = None
     times_column: Name | None = None
     time_in_name: bool | Name | None = None
-    offset: Number | None = None
+    offset: sections.Number | None = None
 
 
-class PressureSection(Section):
+class PressureSection(sections.Section):
     """One of `from_name`, `column` and `log` says the pressures; `frames` are evenly spread."""
 
     from_name: bool | Name = False
     column: Name | None = None
     unit: Unit | None = None
-    scale: Number | None = None
-    offset: Number = 0.0
+    scale: sections.Number | None = None
+    offset: sections.Number = 0.0
     log: LogSection | None = None
     frames: Annotated[int, Field(ge=1, le=10000)] | None = None
-    tolerance: Pressure | None = None
+    tolerance: sections.Pressure | None = None
 
 
-Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Triple = Annotated[list[sections.Number], Field(min_length=3, max_length=3)]
 Degrees = Annotated[float, Field(ge=-180, le=180)]
 
 
-class RegistrationSection(Section):
+class RegistrationSection(sections.Section):
     """The given steps of a registration of files in the camera's coordinates."""
 
     plane: PlaneOf = "found"
@@ -210,32 +200,30 @@ DIRECTIONS: tuple[Direction, ...] = ("dx", "dy", "dz")
 FULL = "a sheet that is not doubly symmetric needs symmetry = 'full'"
 
 
-class SheetSection(Section):
+class SheetSection(sections.Section):
     """The sheet of the test: flat and taut unless something is said."""
 
     surface: Literal["flat", "measured"] = "flat"
     degree: Annotated[int, Field(ge=2, le=14)] = 8
     modes: Annotated[int, Field(ge=0, le=45)] = 0
-    prior: Length | None = None
+    prior: sections.Length | None = None
     slack: bool = False
-    slack_prior: Positive = 0.3
-    misfit: Length | None = None
+    slack_prior: sections.Positive = 0.3
+    misfit: sections.Length | None = None
     rim: Literal["fixed", "measured"] = "fixed"
     constant_field: list[Direction] = Field(default_factory=list)
-    from_pressure: Pressure | None = None
+    from_pressure: sections.Pressure | None = None
 
 
 @dataclass(frozen=True)
 class Sheet:
     """The first shape of the sheet, and its unknowns.
-
     measured : the measured z is the reference surface. degree : of the polynomials through measured
     heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
     slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against which priors
     are weighed. moving_rim : the rim follows the measurement. constant : directions (0 to 2) in
     which a field that is the same at all pressures is projected out. since : number of the frame
-    from which displacements are counted, None for the reference picture.
-    """
+    from which displacements are counted, None for the reference picture."""
 
     measured: bool = False
     degree: int = 8
@@ -260,9 +248,7 @@ LEFT_OPEN = {"turn": 10.0, "tilt": 3.0, "shift": 3.0}
 
 def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
     """Return one standard deviation of each unknown of the registration (degrees, mm).
-
-    Raises InputError where such an unknown needs more of the test than there is.
-    """
+    Raises InputError where such an unknown needs more of the test than there is."""
     nuisance, length = section.nuisance, place.scales.length
     usual = LEFT_OPEN if nuisance.registration == "fitted" else {}
     given = {name: getattr(nuisance, name) for name in LEFT_OPEN}
@@ -276,17 +262,11 @@ def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float
 
 
 def sheet_of(
-    section: SheetSection,
-    place: Place,
-    pressures: Sequence[float],
-    symmetry: str,
-    of_files: bool,
+    section: SheetSection, place: Place, pressures: Sequence[float], symmetry: str, of_files: bool,
     offset: bool,
-) -> Sheet:
+) -> Sheet:  # fmt: skip
     """Return the section in mm; pressures in MPa; raises InputError for keys at odds.
-
-    of_files : the data are measured points. offset : a displacement offset is an unknown.
-    """
+    of_files : the data are measured points. offset : a displacement offset is an unknown."""
     for key in ("surface", "rim"):
         if not of_files and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
@@ -315,17 +295,13 @@ def sheet_of(
             raise place.error(key, problem)
     scale = place.scales.length
     return Sheet(
-        measured=measured,
-        degree=section.degree,
-        modes=section.modes,
-        prior=3.0 if section.prior is None else section.prior * scale,
-        slack=section.slack,
+        measured=measured, degree=section.degree, modes=section.modes,
+        prior=3.0 if section.prior is None else section.prior * scale, slack=section.slack,
         slack_prior=section.slack_prior,
         misfit=0.5 if section.misfit is None else section.misfit * scale,
         moving_rim=section.rim == "measured",
-        constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})),
-        since=since,
-    )
+        constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
+    )  # fmt: skip
 
 
 def _frame(section: SheetSection, place: Place, pressures: Sequence[float]) -> int | None:
@@ -342,18 +318,18 @@ Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
 
 
-class KnownSolutionSection(Section):
+class KnownSolutionSection(sections.Section):
     """[bubble.data.known_solution]: data are computed from these coefficients."""
 
-    beta: list[Modulus]
+    beta: list[sections.Modulus]
     form: str = "cubic"
     elements: Elements | None = None
-    increments: list[Pressure] | None = None
+    increments: list[sections.Pressure] | None = None
     symmetry: Symmetry | None = None
     solver: Name_of_sections | None = None
 
 
-class ColumnsSection(Section):
+class ColumnsSection(sections.Section):
     """Names of columns in the files, where they are not found."""
 
     x: str | None = None
@@ -364,7 +340,7 @@ class ColumnsSection(Section):
     dz: str | None = None
 
 
-class PointsSection(Section):
+class PointsSection(sections.Section):
     """[bubble.data.points]: files of measured points, one a pressure or all in one."""
 
     files: list[str] | None = None
@@ -380,55 +356,53 @@ class PointsSection(Section):
     coordinates: Literal["reference", "deformed"] | None = None
     camera_axes: bool | None = None
     comment: str = "#"
-    length_unit: LengthUnit | None = None
+    length_unit: sections.LengthUnit | None = None
     pressure: PressureSection | None = None
     registration: RegistrationSection | None = None
     filter: FilterSection | None = None
     correlation: CorrelationSection = CorrelationSection()
 
 
-class DataSection(Section):
+class DataSection(sections.Section):
     """[bubble.data]: one of the two sources."""
 
     known_solution: KnownSolutionSection | None = None
     points: PointsSection | None = None
 
 
-class MatchSection(Section):
+class MatchSection(sections.Section):
     """Points or polynomial surfaces through them, to be matched."""
 
     by: Literal["surfaces", "points"] = "points"
     degree: Annotated[int, Field(ge=1, le=12)] = 4
 
 
-class NuisanceSection(Section):
+class NuisanceSection(sections.Section):
     """Offsets of a measurement, and its registration, fitted beside the moduli.
-
-    turn, tilt (degrees), shift : one standard deviation of each around what was registered.
-    """
+    turn, tilt (degrees), shift : one standard deviation of each around what was registered."""
 
     displacement_offset: bool = False
     pressure_offset: bool = False
     registration: Literal["given", "fitted"] = "given"
-    turn: Positive | None = None
-    tilt: Positive | None = None
-    shift: Positive | None = None
+    turn: sections.Positive | None = None
+    tilt: sections.Positive | None = None
+    shift: sections.Positive | None = None
 
 
-class BubbleSection(Section):
+class BubbleSection(sections.Section):
     """[[bubble]]: a clamped disk, inflated."""
 
     name: Name_of_sections | None = None
-    weight: Positive = 1.0
-    radius: Length | Literal["clamp"] | None = None
+    weight: sections.Positive = 1.0
+    radius: sections.Length | Literal["clamp"] | None = None
     ellipse: EllipseSection | None = None
-    pressures: Annotated[list[Pressure], Field(min_length=1)] | None = None
-    increments: list[Pressure] | None = None
+    pressures: Annotated[list[sections.Pressure], Field(min_length=1)] | None = None
+    increments: list[sections.Pressure] | None = None
     elements: Elements = 800
     symmetry: Symmetry = "full"
     generator: Literal["blocks", "gmsh"] = "blocks"
     objective: Literal["e", "mm"] = "e"
-    noise: Length | None = None
+    noise: sections.Length | None = None
     match: MatchSection = MatchSection()
     nuisance: NuisanceSection = NuisanceSection()
     sheet: SheetSection = SheetSection()

@@ -28,9 +28,7 @@ LEAST_POINTS = 2
 @dataclass(frozen=True, eq=False)
 class DiskPolynomial:
     """A polynomial of x and y of several values: coefficients (terms, values) of Legendre products.
-
-    radius : mm, of the disk; degree : in x and y together. rms : (values,) left at its points.
-    """
+    radius : mm, of the disk; degree : in x and y together. rms : (values,) left at its points."""
 
     radius: float
     degree: int
@@ -187,7 +185,6 @@ FAR = 2.0
 @dataclass(frozen=True, eq=False)
 class InflatedSheet:
     """The sheet at one reported pressure (MPa), displaced by (nodes, 3) mm.
-
     strain : (quads, 3) log strain (eps1, eps2, gamma12) in the middle of the quads; stress : MPa,
     Cauchy, along the turned yarns. state : `TAUT`, `WRINKLED` (tension in one direction), `LOOSE`.
     """

@@ -36,9 +36,7 @@ def merge_increments(
     place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
 ) -> tuple[float, ...]:
     """Return load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
-
-    Raises InputError for an extra one, of key `field`, beyond the last pressure.
-    """
+    Raises InputError for an extra one, of key `field`, beyond the last pressure."""
     steps = list(pressures)
     for i, step in enumerate(extra):
         value = step * place.scales.pressure
@@ -64,12 +62,9 @@ class KnownSolution:
 
 
 def data_source(
-    section: BubbleSection,
-    place: Place,
-    pressures: Sequence[float],
-    increments: Sequence[float],
+    section: BubbleSection, place: Place, pressures: Sequence[float], increments: Sequence[float],
     measured: PointFiles | None,
-) -> KnownSolution | PointFiles:
+) -> KnownSolution | PointFiles:  # fmt: skip
     """Return the measured files, as many as pressures (MPa), or the known solution."""
     known, points = section.data.known_solution, section.data.points
     if known is not None:
@@ -77,13 +72,10 @@ def data_source(
         if known.increments is not None:
             increments = merge_increments(place, f"{field}.increments", known.increments, pressures)
         return KnownSolution(
-            beta=np.array(known.beta) * place.scales.modulus,
-            form=known.form,
-            elements=known.elements or section.elements,
-            increments=tuple(increments),
-            symmetry=known.symmetry or section.symmetry,
-            solver=known.solver,
-        )
+            beta=np.array(known.beta) * place.scales.modulus, form=known.form,
+            elements=known.elements or section.elements, increments=tuple(increments),
+            symmetry=known.symmetry or section.symmetry, solver=known.solver,
+        )  # fmt: skip
     assert points is not None and measured is not None
     found, count = len(measured.files), len(pressures)
     # Where no data are needed, the files may not be there to be counted.
@@ -103,11 +95,9 @@ PART = "bubble"
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BubbleTest:
     """A clamped disk that is inflated. Lengths mm, pressures MPa.
-
     `pressures` are reported and matched, `increments` are the load steps and contain them. `noise`
     of one displacement. `facet` : by which the camera reads displacements, None for points.
-    `registration` : one standard deviation (degrees, mm) of each of its unknowns.
-    """
+    `registration` : one standard deviation (degrees, mm) of each of its unknowns."""
 
     name: str
     place: Place
@@ -153,12 +143,9 @@ class BubbleTest:
         return isinstance(self.data, PointFiles)
 
     def model(
-        self,
-        thickness: float | None = None,
-        elements: int | None = None,
-        symmetry: Symmetry | None = None,
-        increments: tuple[float, ...] | None = None,
-    ) -> BubbleModel:
+        self, thickness: float | None = None, elements: int | None = None,
+        symmetry: Symmetry | None = None, increments: tuple[float, ...] | None = None,
+    ) -> BubbleModel:  # fmt: skip
         """Return the test's model, or one of the same disk with another mesh or increments."""
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
@@ -225,27 +212,16 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     of_files, offset = isinstance(source, PointFiles), section.nuisance.displacement_offset
     sheet = sheet_of(section.sheet, place, pressures, section.symmetry, of_files, offset)
     return BubbleTest(
-        name=name,
-        place=place,
-        weight=section.weight,
-        outline=outline,
-        elements=section.elements,
-        symmetry=section.symmetry,
-        generator=section.generator,
-        pressures=pressures,
-        increments=increments,
-        data=source,
-        match_by=section.match.by,
-        match_degree=section.match.degree,
-        objective=section.objective,
+        name=name, place=place, weight=section.weight, outline=outline, elements=section.elements,
+        symmetry=section.symmetry, generator=section.generator, pressures=pressures,
+        increments=increments, data=source, match_by=section.match.by,
+        match_degree=section.match.degree, objective=section.objective,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         noise=None if section.noise is None else section.noise * length,
-        facet=facet_of(camera, place, length, section.symmetry, section.match.by),
-        sheet=sheet,
-        of_clamp=section.radius == "clamp",
-        registration=fitted_registration(section, place),
-    )
+        facet=facet_of(camera, place, length, section.symmetry, section.match.by), sheet=sheet,
+        of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
+    )  # fmt: skip
 
 
 def measured_fields(

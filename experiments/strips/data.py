@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class OrderScore:
     """Scores of one order of a load polynomial.
-
     R^2 and rmse (N) are best for the highest order offered (thesis section 3.2): each contains the
     ones below it. left_out : N, RMS error at points, or whole specimens, that the fit did not see.
     """
@@ -43,17 +42,12 @@ class OrderScore:
 
 
 def compare_orders(
-    elongation: ArrayLike,
-    load: ArrayLike,
-    orders: Sequence[int] = range(1, 9),
-    through_origin: bool = True,
-    specimens: Sequence[object] | None = None,
-) -> tuple[OrderScore, ...]:
+    elongation: ArrayLike, load: ArrayLike, orders: Sequence[int] = range(1, 9),
+    through_origin: bool = True, specimens: Sequence[object] | None = None,
+) -> tuple[OrderScore, ...]:  # fmt: skip
     """Fit each order to the points (n,) mm and (n,) N and return its scores, by rising order.
-
     specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
-    specimen err together, so leaving out one of them flatters.
-    """
+    specimen err together, so leaving out one of them flatters."""
     u, f = checked_points(elongation, load)
     names = list(range(len(u))) if specimens is None else list(specimens)
     if len(names) != len(u):
@@ -95,10 +89,8 @@ BREAKS = 40
 
 def strain_regions(strain: ArrayLike, load: ArrayLike) -> tuple[float, float]:
     """Return the two breaks of the broken line through the origin nearest to the curve.
-
     By least squares over a grid of 40 places, as Ambroziak and Klosowski read the regions of a
-    coated fabric by eye. strain, load : (n,) of one curve, strain above zero.
-    """
+    coated fabric by eye. strain, load : (n,) of one curve, strain above zero."""
     x, f = np.asarray(strain, dtype=float), np.asarray(load, dtype=float)
     if len(x) < 5 or not x.max() > 0:
         raise InputError(None, "load curve", f"five points are needed for regions, got {len(x)}")
@@ -126,12 +118,10 @@ PLACES = 200  # at which a polynomial is asked for its regions
 @dataclass(frozen=True, eq=False)
 class Strip:
     """Data of one direction; lengths mm, loads N.
-
     gauge_length, final_length : of the virtual strain gauge. polynomial : given or fitted to the
     curves; None in a forward analysis without data. scatter : standard deviation of points about
     the polynomial. open_end : the final length is where the points end. published : file of a given
-    polynomial.
-    """
+    polynomial."""
 
     direction: str
     gauge_length: float
@@ -251,12 +241,9 @@ STIFFER = 1.15
 
 
 def doubts_of_strips(
-    strips: Mapping[str, Strip],
-    width: float,
-    thickness: float,
-    expected: Expected,
+    strips: Mapping[str, Strip], width: float, thickness: float, expected: Expected,
     grip_distance: float,
-) -> Sequence[Doubt]:
+) -> Sequence[Doubt]:  # fmt: skip
     """Return the doubts about the strips of a test, by direction; lengths mm."""
     found: list[Doubt] = []
     moduli: dict[str, list[float]] = {}
@@ -267,7 +254,10 @@ def doubts_of_strips(
             found += _of_curve(what, strip, elongation, load)
             if direction not in ALONG or not expected.moduli:
                 continue
-            modulus = _modulus(strip, elongation, load, width * thickness)
+            strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
+            near = np.argsort(np.abs(strain - SLOPE_AT * float(strain.max())))[:5]
+            value = np.median(load[near] / np.where(strain[near] > 0, strain[near], np.nan))
+            modulus = float(value) / (width * thickness) if np.isfinite(value) else float("nan")
             moduli.setdefault(direction, []).append(modulus)
             if far := expected.outside(modulus, [ALONG[direction]]):
                 text = (
@@ -363,11 +353,3 @@ def _of_curve(what: str, strip: Strip, elongation: Array, load: Array) -> Iterat
             )
             yield Doubt("after-failure", share == FAILED, text)
             break
-
-
-def _modulus(strip: Strip, elongation: Array, load: Array, area: float) -> float:
-    """Return secant modulus (MPa) at half of the end strain."""
-    strain = np.log1p(np.clip(elongation / strip.gauge_length, -0.9, None))
-    near = np.argsort(np.abs(strain - SLOPE_AT * float(strain.max())))[:5]
-    value = np.median(load[near] / np.where(strain[near] > 0, strain[near], np.nan))
-    return float(value) / area if np.isfinite(value) else float("nan")

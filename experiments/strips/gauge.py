@@ -32,9 +32,7 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True, eq=False)
 class Surface:
     """The correlated points of a frame, triangulated by their reference x and y.
-
-    places : (points, 2, 3) mm, before and after.
-    """
+    places : (points, 2, 3) mm, before and after."""
 
     mesh: Delaunay
     places: Array
@@ -48,10 +46,8 @@ class Surface:
 
 def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
     """Triangulate a frame; None where fewer than three points, or a line, were correlated.
-
     before : a surface; its triangles are taken where the reference points are the same:
-    triangulating is what costs.
-    """
+    triangulating is what costs."""
     from scipy.spatial import Delaunay, QhullError
 
     places = np.stack([frame.points, frame.points + frame.displacement], axis=1)
@@ -68,9 +64,7 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
 
 def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
     """Return place (2, 3) mm before and after of the point (2,), or the reason for none.
-
-    limit : mm; a triangle with a longer edge spans a hole.
-    """
+    limit : mm; a triangle with a longer edge spans a hole."""
     if surface is None:
         return "no three correlated points that span a surface"
     # Delaunay.find_simplex first inverts a matrix for every triangle, which costs more than
@@ -92,7 +86,6 @@ def place_of(end: Array, surface: Surface | None, limit: float) -> Array | str:
 @dataclass(frozen=True, eq=False)
 class GaugeRecord:
     """A virtual strain gauge through n frames; NaN in the frames where it was lost.
-
     reference_length, length : mm, by x, y and z. strain : engineering, elongation / reference
     length; log_strain : ln(length / reference length). lost : frames without surface around an end.
     """
@@ -110,12 +103,10 @@ def virtual_strain_gauge(
     frames: Sequence[Frame], lower: ArrayLike, upper: ArrayLike, max_gap: float = 1.35
 ) -> GaugeRecord:
     """Follow the two ends of a gauge, interpolating linearly in the triangle around each.
-
     An end is lost in a frame where it lies outside the triangulated points, or in a triangle with
     an edge longer than `max_gap` times the usual longest edge: a value would be interpolated over a
     hole. lower, upper : (2,) mm, x and y in the reference state. max_gap : 1.35 finds one missing
-    point of a square grid (1.41 there); points scattered at random need about 2.5.
-    """
+    point of a square grid (1.41 there); points scattered at random need about 2.5."""
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
     ends = [_end(lower, "lower"), _end(upper, "upper")]
@@ -185,20 +176,13 @@ def _end(point: ArrayLike, name: str) -> Array:
 
 
 def gauge_load_curve(
-    record: GaugeRecord,
-    loads: ArrayLike,
-    *,
-    direction: str,
-    specimen: str,
-    frame_times: ArrayLike | None = None,
-    load_times: ArrayLike | None = None,
+    record: GaugeRecord, loads: ArrayLike, *, direction: str, specimen: str,
+    frame_times: ArrayLike | None = None, load_times: ArrayLike | None = None,
     path: Path | None = None,
-) -> LoadCurve:
+) -> LoadCurve:  # fmt: skip
     """Return the machine's load over the gauge's elongation; lost frames are left out.
-
     loads : (n,) N, or (k,) at rising load_times, interpolated at frame_times (n,); frames before
-    the first or after the last load are left out, which is logged.
-    """
+    the first or after the last load are left out, which is logged."""
     way = direction_named(direction)
     load, count = np.asarray(loads, dtype=float), len(record.length)
     if not np.isfinite(load).all():
@@ -240,11 +224,9 @@ def _at_times(
 @dataclass(frozen=True)
 class PairedLoads:
     """A machine's loads, and their pairing with the frames of a gauge.
-
     load_column, load_unit, decimal, format : of the export, where not found. frame_times : a table
     of the frames' times, or frame_interval : s between frames, the first at 0: pair the loads by
-    time. time_offset : s, the machine's clock less the frames'.
-    """
+    time. time_offset : s, the machine's clock less the frames'."""
 
     path: Path
     direction: str
@@ -307,14 +289,10 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
         )
         raise InputError(loads.path, "", problem)
     return gauge_load_curve(
-        record,
-        machine.load,
-        direction=loads.direction,
-        specimen=loads.specimen.strip(),
+        record, machine.load, direction=loads.direction, specimen=loads.specimen.strip(),
         frame_times=None if times is None else times + (loads.time_offset or 0.0),
-        load_times=machine.time,
-        path=loads.path,
-    )
+        load_times=machine.time, path=loads.path,
+    )  # fmt: skip
 
 
 @contextmanager
@@ -337,10 +315,8 @@ COLUMNS = {
 @dataclass(frozen=True, eq=False)
 class GaugeTable:
     """A gauge through the frames of a test, with the machine's loads where there are any.
-
     lower, upper : (x, y) mm of the ends. curve : without lost frames and those without load. note :
-    on the order of the frames.
-    """
+    on the order of the frames."""
 
     files: Sequence[str]
     lower: tuple[float, float]

@@ -2,8 +2,7 @@
 
 Specimens differ as a whole: one is stiffer along all of its curve. A hundred loads of it are not a
 hundred measurements: five specimens reduce an uncertainty by the root of five, whatever the number
-of readings.
-"""
+of readings."""
 
 from __future__ import annotations
 
@@ -44,27 +43,18 @@ Array = NDArray[np.float64]
 
 class LoadObjective:
     """Residuals (model - measured) / (scale sqrt(n)) at n elongations of the gauge.
-
     increments : (frames,) mm of the model; its load is interpolated by a cubic spline from the
     origin. elongation, load : (n,) mm, N, measured. scale : N: 1 for errors in N (Eq. 3.7), the
     largest load for relative errors. least_noise, noise_is : N, and its origin. alike : number of
-    loads that err as one, at least. specimens : (n,) number of each load's specimen.
-    """
+    loads that err as one, at least. specimens : (n,) number of each load's specimen."""
 
     unit, columns = "N", 1
 
     def __init__(
-        self,
-        increments: ArrayLike,
-        elongation: ArrayLike,
-        load: ArrayLike,
-        scale: float = 1.0,
-        weight: float = 1.0,
-        least_noise: float = 0.0,
-        noise_is: NoiseIs = "assumed",
-        alike: float = 1.0,
-        specimens: ArrayLike | None = None,
-    ) -> None:
+        self, increments: ArrayLike, elongation: ArrayLike, load: ArrayLike, scale: float = 1.0,
+        weight: float = 1.0, least_noise: float = 0.0, noise_is: NoiseIs = "assumed",
+        alike: float = 1.0, specimens: ArrayLike | None = None,
+    ) -> None:  # fmt: skip
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
         if not len(self.load):
@@ -168,9 +158,7 @@ def loads_alike(
     strip: Strip, loads: int, noise: float | None, specimens: int | None = None
 ) -> float:
     """Return the number of loads of a direction that err as one.
-
-    noise : N, that the project gives of one load.
-    """
+    noise : N, that the project gives of one load."""
     if noise is not None and specimens is None and len(np.unique(strip.specimen_of)) < 2:
         return 1.0
     return max(1.0, loads / independent_loads(strip, specimens))
@@ -179,12 +167,10 @@ def loads_alike(
 @lru_cache(maxsize=64)
 def independent_loads(strip: Strip, specimens: int | None = None) -> float:
     """Return the number of independent loads of all specimens of a direction together.
-
     Of two or more specimens: places a specimen that do not err as one, by the correlation along it
     of what it lies beside the polynomial of all, or by the factor by which it is stiffer, whichever
     are fewer; times the specimens less one. Else `PLACES` a specimen, likewise, with `specimens`,
-    one, or `SPECIMENS` behind a polynomial.
-    """
+    one, or `SPECIMENS` behind a polynomial."""
     numbers = np.unique(strip.specimen_of).tolist()
     if len(numbers) < 2 or strip.polynomial is None:
         behind = specimens or (1 if strip.curves else SPECIMENS)
@@ -434,9 +420,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
 
 def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
     """Return the strip with the loads that the law gives, one value an increment.
-
-    It is as long as the project's own, else pulled up to the end of the known law.
-    """
+    It is as long as the project's own, else pulled up to the end of the known law."""
     own = None if template is None else template.test
     strip = None if own is None else own.strips.get(pull.direction)
     gauge = GAUGE if strip is None else strip.gauge_length
@@ -447,18 +431,11 @@ def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Pr
     strip = Strip(pull.direction, gauge, final)
     width, grips = (WIDTH, GRIP_DISTANCE) if own is None else (own.width, own.grip_distance)
     test = StripsTest(
-        name=pull.name,
-        place=planning.place,
-        weight=1.0,
-        width=width,
-        grip_distance=grips,
-        bias_angle=pull.angle if pull.direction == "bias" else 45.0,
-        increments=INCREMENTS,
-        strips={pull.direction: strip},
-        match_by="points",
-        weights=dict.fromkeys(DIRECTIONS, 1.0),
+        name=pull.name, place=planning.place, weight=1.0, width=width, grip_distance=grips,
+        bias_angle=pull.angle if pull.direction == "bias" else 45.0, increments=INCREMENTS,
+        strips={pull.direction: strip}, match_by="points", weights=dict.fromkeys(DIRECTIONS, 1.0),
         objective="N",
-    )
+    )  # fmt: skip
     (model,) = test.models().values()
     load = np.asarray(planning.make_solver().run(model, planning.law).load)
     noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
@@ -469,7 +446,6 @@ def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> Pr
 
 def _strain(pull: Pull, planning: Planning) -> float:
     """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
-
     A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
     """
     warp, fill, shear = planning.ends.tolist()

@@ -84,22 +84,6 @@ def misfit_table(strips: Sequence[FittedStrip]) -> Table:
     return Table("Misfit by strip", header, rows, note)
 
 
-def load_table(strips: Sequence[FittedStrip]) -> pd.DataFrame:
-    """Return load curves of the model, and the polynomials (NaN where there are none)."""
-    parts = []
-    for s in strips:
-        u, polynomial = np.array(s.model.elongations), s.strip.polynomial
-        columns = {
-            "direction": s.direction,
-            "elongation_mm": u,
-            "engineering_strain": u / s.strip.gauge_length,
-            "model_N": s.history.load,
-            "polynomial_N": np.nan if polynomial is None else polynomial(u),
-        }
-        parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True)
-
-
 Array = NDArray[np.float64]
 #: Name, elongation (mm), load (N).
 Curve = tuple[str, Array, Array]
@@ -110,10 +94,9 @@ ORDERS = range(1, 9)
 
 
 def load_panels(
-    strips: Sequence[Strip],
-    models: Mapping[str, Sequence[Curve]],
+    strips: Sequence[Strip], models: Mapping[str, Sequence[Curve]],
     rms: Mapping[str, Sequence[float]],
-) -> list[StripCurves]:
+) -> list[StripCurves]:  # fmt: skip
     """Return the panels of `load_charts`; `models` and their `rms` (N) by direction."""
     panels = []
     for strip in strips:
@@ -144,9 +127,7 @@ def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path
 
 def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
     """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
-
-    valid : (3,) the ends of the moduli, which no strain shown exceeds.
-    """
+    valid : (3,) the ends of the moduli, which no strain shown exceeds."""
     ends = np.array(valid, dtype=float)
     for s in strips:
         if s.direction == "bias":  # the largest shear of the quads between the gauge's ends
@@ -176,9 +157,8 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
             )
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
-        orders, rms, left_out = (
-            [getattr(s, n) for s in scores] for n in ("order", "rmse", "left_out")
-        )
+        names = "order", "rmse", "left_out"
+        orders, rms, left_out = ([getattr(s, n) for s in scores] for n in names)
         order = strip.polynomial.order
         panels.append(OrderErrors(strip.direction, orders, rms, left_out, order))
     if panels:
@@ -205,16 +185,11 @@ Pulls = Mapping[tuple[str, str], "Pull | SolverFailure"]
 
 
 def simulate(
-    test: StripsTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-    within_range: bool = False,
-) -> Simulation:
+    test: StripsTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
+    out: Output, within_range: bool = False,
+) -> Simulation:  # fmt: skip
     """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
-
-    within_range : show each curve only to where the card's valid range ends.
-    """
+    within_range : show each curve only to where the card's valid range ends."""
     pulls = {
         (name, direction): _pull(test, cards[name], direction, run, within_range)
         for (name, direction), run in runs.items()
@@ -320,23 +295,17 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     test, strips = prepared.test, prepared.fitted_strips(fitted)
     total = sum(s.rms for s in strips)
     errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
-    line = ", ".join(
-        f"{s.direction} {s.rms:.3g}"
-        + ("" if s.strip.scatter is None else f" (specimens scatter by {s.strip.scatter:.3g})")
-        for s in strips
-    )
+    scatter = [s.strip.scatter for s in strips]
+    beside = ["" if own is None else f" (specimens scatter by {own:.3g})" for own in scatter]
+    line = ", ".join(f"{s.direction} {s.rms:.3g}{b}" for s, b in zip(strips, beside, strict=True))
     numbers = {
         s.direction: {
-            "rms_N": s.rms,
-            "scatter_N": s.strip.scatter,
-            "weight": test.weights[s.direction],
-            "matched": len(s.objective.load),
-            "gauge_length_mm": s.strip.gauge_length,
-            "final_length_mm": s.strip.final_length,
-            "end_load_N": float(s.history.load[-1]),
+            "rms_N": s.rms, "scatter_N": s.strip.scatter, "weight": test.weights[s.direction],
+            "matched": len(s.objective.load), "gauge_length_mm": s.strip.gauge_length,
+            "final_length_mm": s.strip.final_length, "end_load_N": float(s.history.load[-1]),
         }
         for s in strips
-    }
+    }  # fmt: skip
     return Findings(
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
         tuple(_warnings(test, strips)),
@@ -365,7 +334,16 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
     test, strips = prepared.test, prepared.fitted_strips(fitted)
     with replacing(out.path("loads.csv")) as path:
-        load_table(strips).to_csv(path, index=False)
+        parts = []
+        for s in strips:
+            u, polynomial = np.array(s.model.elongations), s.strip.polynomial
+            columns = {
+                "direction": s.direction, "elongation_mm": u,
+                "engineering_strain": u / s.strip.gauge_length, "model_N": s.history.load,
+                "polynomial_N": np.nan if polynomial is None else polynomial(u),
+            }  # fmt: skip
+            parts.append(pd.DataFrame(columns))
+        pd.concat(parts, ignore_index=True).to_csv(path, index=False)
     charts = fitted_loads(prepared, fitted)
     save(out.path("loads.png"), charts)
     figures: list[Shown] = []
@@ -386,23 +364,17 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
         figures.append((out.name("orders.png"), caption))
     standards, more = show_standard(test, out)
     return Exhibit(
-        facts=[("matched", MATCHED[test.match_by])],
-        figures=figures,
-        tables=[misfit_table(strips)],
-        files=[*files, *more],
-        parts=[charts],
-        standards=standards,
-    )
+        facts=[("matched", MATCHED[test.match_by])], figures=figures, tables=[misfit_table(strips)],
+        files=[*files, *more], parts=[charts], standards=standards,
+    )  # fmt: skip
 
 
 #: File of the table after EN ISO 1421, the width (mm) for which it gives forces, its quantities.
 STANDARD, PER_WIDTH = "en-iso-1421.csv", 50.0
 QUANTITIES = {
-    "max_force_N": "largest force, N",
-    "max_force_N_per_50mm": "N/50 mm",
-    "max_force_kN_per_m": "kN/m",
-    "elongation_at_max_force_percent": "elongation at it, %",
-}
+    "max_force_N": "largest force, N", "max_force_N_per_50mm": "N/50 mm",
+    "max_force_kN_per_m": "kN/m", "elongation_at_max_force_percent": "elongation at it, %",
+}  # fmt: skip
 ABOUT = ("width_mm", "gauge_length_mm", "rate_mm_per_min", "conditioning")
 
 
@@ -480,13 +452,9 @@ def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     for s in prepared.fitted_strips(fitted):
         modelled, measured = s.objective.modelled(s.history), s.objective.load
         columns = {
-            "part": s.direction,
-            "elongation_mm": s.objective.elongation,
-            "quantity": "load",
-            "measured": measured,
-            "modelled": modelled,
-            "difference": modelled - measured,
+            "part": s.direction, "elongation_mm": s.objective.elongation, "quantity": "load",
+            "measured": measured, "modelled": modelled, "difference": modelled - measured,
             "unit": s.objective.unit,
-        }
+        }  # fmt: skip
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)

@@ -129,10 +129,8 @@ class StripsSection(Section):
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
-
     strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
-    unknown. rate : mm a minute, and conditioning in words: for the report only.
-    """
+    unknown. rate : mm a minute, and conditioning in words: for the report only."""
 
     name: str
     place: Place
@@ -223,26 +221,17 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
                 raise place.error(f"{direction}.final_length", problem)
     same = ("weight", "bias_angle", "increments", "objective", "noise")
     return StripsTest(
-        name=name,
-        place=place,
-        width=width,
-        grip_distance=grips,
-        strips=strips,
-        match_by=section.match,
-        weights=weights,
-        specimens=section.data.specimens,
+        name=name, place=place, width=width, grip_distance=grips, strips=strips,
+        match_by=section.match, weights=weights, specimens=section.data.specimens,
         rate=None if section.rate is None else section.rate * length,
-        conditioning=section.conditioning,
-        **{key: getattr(section, key) for key in same},
-    )
+        conditioning=section.conditioning, **{key: getattr(section, key) for key in same},
+    )  # fmt: skip
 
 
 def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -> Reach:
     """Return the final strains of the strips, and the breaks of their load curves.
-
     Shear of a strip that keeps its area is 2 sin(2 angle) ln(l_f/l_i). Breaks : shares of the
-    strain of the gauge. masks : which points a curve follows, by direction.
-    """
+    strain of the gauge. masks : which points a curve follows, by direction."""
     known = {d: mask for d, mask in (masks or {}).items() if mask is not None}
     strips = {d: s for d, s in test.strips.items() if d not in known or known[d].any()}
     per_stretch = {"bias": 2 * math.sin(math.radians(2 * test.bias_angle))}
@@ -289,18 +278,13 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
 
 
 def measured_curves(
-    place: Place,
-    data: CurvesSection,
-    listed: Sequence[ListedFile],
-    width: float,
+    place: Place, data: CurvesSection, listed: Sequence[ListedFile], width: float,
     gauges: Mapping[str, float],
-) -> dict[str, tuple[LoadCurve, ...]]:
+) -> dict[str, tuple[LoadCurve, ...]]:  # fmt: skip
     """Return the specimens' curves by direction, in the order of `DIRECTIONS`.
-
     A file with one curve in a direction perhaps lists several specimens, one after the other and
     not named: it is split where the elongation starts again. width : of the strips, gauges : by
-    direction, mm.
-    """
+    direction, mm."""
     format = named_format(place, "data.format", "machine table", data.format)
     columns = data.columns.model_dump(exclude_none=True)
     keys = ("load_unit", "length_unit", "comment", "decimal", "sheet")
@@ -336,9 +320,7 @@ EXTRAPOLATED = 0.05
 
 def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
     """Read the strips of a section (width mm), by direction: those with a table or data.
-
-    Missing files are no error where the place needs none and all lengths are given.
-    """
+    Missing files are no error where the place needs none and all lengths are given."""
     data, length = section.data, place.scales.length
     if (data.polynomials is None) == (data.files is None):
         raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
@@ -387,12 +369,9 @@ def _published(
 
 
 def _measured(
-    place: Place,
-    data: CurvesSection,
-    tables: Mapping[str, GaugeSection],
-    listed: Sequence[ListedFile],
-    width: float,
-) -> dict[str, Strip]:
+    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection],
+    listed: Sequence[ListedFile], width: float,
+) -> dict[str, Strip]:  # fmt: skip
     said = {file.direction for file in listed}
     strips, length = {}, place.scales.length
     gauges = {d: t.gauge_length * length for d, t in tables.items() if t.gauge_length is not None}
@@ -422,13 +401,9 @@ def _measured(
 
 
 def _strip(
-    place: Place,
-    direction: str,
-    start: float,
-    end: float,
-    polynomial: LoadPolynomial | None = None,
-    **data: Any,
-) -> Strip:
+    place: Place, direction: str, start: float, end: float,
+    polynomial: LoadPolynomial | None = None, **data: Any,
+) -> Strip:  # fmt: skip
     problem = ""
     if not end > start:
         problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"

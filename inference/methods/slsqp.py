@@ -2,8 +2,7 @@
 
 A NaN makes SLSQP run on to maxeval and COBYLA report success at the start; boolean +-1 constraints
 have no slope; COBYLA can return an infeasible point as a success. So NLopt never sees NaN or
-infinity, always has limits, and the best feasible point is our own record, not NLopt's answer.
-"""
+infinity, always has limits, and the best feasible point is our own record, not NLopt's answer."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -119,17 +118,12 @@ class Record:
 
 
 def nlopt_minimise(
-    algorithm: int,
-    problem: FitProblem,
-    start: Array,
-    options: FitOptions,
+    algorithm: int, problem: FitProblem, start: Array, options: FitOptions,
     first_step: float | None = None,
-) -> Optimum | None:
+) -> Optimum | None:  # fmt: skip
     """Minimise e by NLopt's algorithm `algorithm`; None when the analysis at `start` fails.
-
     Returns the best feasible, stable point that was seen, whatever NLopt itself says. first_step :
-    of each bound's width; NLopt's own unless given.
-    """
+    of each bound's width; NLopt's own unless given."""
     problem.warm_starts = False  # e has to be a function of the point alone
     first = problem.evaluate(start, False)
     if first is None:

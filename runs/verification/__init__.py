@@ -100,8 +100,7 @@ SOURCE_MARC_BUBBLE = "MSC Marc; Jekel et al., preprint of SMO (2016)"
 #: Table 4.2, "solution", GPa.
 SOLUTION = (
     -7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2,
-    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1,
-    -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
+    -1.06241e1, 1.37830e1, -9.31830e-1, 1.39437e-1, -4.79622e2, 2.12650e2, -2.02028e1, 8.06350e-1,
 )  # fmt: skip
 STRAIN_RANGE = (0.13, 0.13, 0.13)
 PRESSURES = (0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.3)
@@ -201,11 +200,9 @@ def strip(direction: str) -> UniaxialModel:
 
 def end_load(direction: str, strain: float) -> float:
     """Return the load (N) of a homogeneous strip of Table 4.2's law at a log strain.
-
     Across, d eps1 = -nu21 d eps2 with nu21 = nu12 E2/E1, and d eps2 = -nu12 d eps1. In the fill
     test E1 is held at its value at zero strain, because the warp gets shorter. A modulus is held
-    beyond its strain range.
-    """
+    beyond its strain range."""
     law = known_law()
     modulus, end = (law.E1, 0) if direction == "warp" else (law.E2, 1)
     knots = [0.0, min(strain, float(law.strain_range[end])), strain]
@@ -238,8 +235,7 @@ def with_calculix() -> Iterator[Number]:
 SUBJECTS: Mapping[str, Callable[[], Iterable[Number]]] = {
     "bars": marc_bars, "hencky": hencky_membranes, "abaqus": abaqus_bubbles,
     "marc bubble": marc_bubble, "strips": strips, "thin walls": thin_walls, "bent tube": bent_tubes,
-    "loaded tubes": loaded_tubes,
-    "nu12": poisson_ratios, "calculix": with_calculix,
+    "loaded tubes": loaded_tubes, "nu12": poisson_ratios, "calculix": with_calculix,
 }  # fmt: skip
 
 
@@ -274,11 +270,9 @@ def verify(
     saw: Callable[[str, Sequence[Number]], None] = lambda subject, found: None,
 ) -> Verification:  # fmt: skip
     """Compare this installation with published numbers and closed forms; takes a few minutes.
-
     subjects : by name, all unless given. data : folder of the measured strips, compared at last.
     progress : receives subjects done, all, and the one that begins. saw : receives the numbers of
-    each subject as it ends. InputError : no such subject.
-    """
+    each subject as it ends. InputError : no such subject."""
     chosen = list(SUBJECTS if subjects is None else subjects)
     for subject in chosen:
         if subject not in SUBJECTS:

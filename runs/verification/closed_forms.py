@@ -8,8 +8,7 @@ dome is -r/(2 S) (p R/(E t))^(1/3), whose integral is the height of the apex.
 
 A tube under pressure p bent beyond its first wrinkle (Comer and Levy 1963), its ends plane and
 turned against each other: no stress at angles below t from the compressed side, where cos t =
-(mean strain over strain by bending), and M/(pi p r^3) between 1/2 (first wrinkle) and 1.
-"""
+(mean strain over strain by bending), and M/(pi p r^3) between 1/2 (first wrinkle) and 1."""
 
 from __future__ import annotations
 
@@ -40,11 +39,9 @@ from ...solvers.membrane.solver import MembraneSolver
 @dataclass(frozen=True)
 class Number:
     """A published or closed-form number, and the one that this program computes for it.
-
     what : the quantity and the case. ours, theirs : in `unit` ("" for a pure number). allowed :
     largest deviation, relative or in `unit` where `absolute`, by the error of model, mesh or the
-    reading of a figure. source : publication or closed form.
-    """
+    reading of a figure. source : publication or closed form."""
 
     what: str
     ours: float
@@ -161,7 +158,10 @@ def thin_walls() -> Iterator[Number]:
     steps = TUBE_MPA * np.array([0.05, *np.arange(1, 11) / 10])
     exact = (radius, hoop / 2, hoop)
     names = (("radius", "mm"), ("axial stress", "MPa"), ("hoop stress", "MPa"))
-    for (name, unit), ours, theirs in zip(names, middle_of_tube(steps), exact, strict=True):
+    model, solver = tube_model(24, 12, 600.0, steps), MembraneSolver(1e-9)
+    for (name, unit), ours, theirs in zip(
+        names, in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress), exact, strict=True
+    ):
         what, source = f"{name} of a capped tube", "p r/t and p r/(2 t)"
         yield Number(what, ours, theirs, unit, ALLOWED_THIN_WALLS, source)
     strain_of_sphere = sphere_strain(SPHERE_MPA)
@@ -199,12 +199,6 @@ def sphere_strain(pressure: float) -> float:
         )
 
     return float(brentq(excess, 0.0, 0.9))
-
-
-def middle_of_tube(pressures: Sequence[float] | NDArray[np.float64]) -> tuple[float, float, float]:
-    """Compute radius (mm), axial and hoop stress (MPa) in the middle of a tube with flat caps."""
-    model, solver = tube_model(24, 12, 600.0, pressures), MembraneSolver(1e-9)
-    return in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
 
 
 def tube_model(
@@ -286,11 +280,9 @@ def published_moment(curvature: float, radius: float) -> tuple[float, float]:
 
 class PlaneEnds:
     """A quarter of a tube whose end at `LENGTH` stays plane, at a given turn and stretch.
-
     across : facets around the half circle. share : of its stiffness that the wall keeps across
     wrinkles; None carries compression. Raises SolverFailure: here and in `moment`, no equilibrium
-    was found.
-    """
+    was found."""
 
     def __init__(self, across: int, share: float | None) -> None:
         tube = half_tube(across, across // 8, RADIUS_BENT_TUBE, LENGTH, caps=False)
