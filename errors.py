@@ -1,9 +1,7 @@
 """Errors and notes: what bubblefit says of its input and of its results.
 
-An error is raised on purpose, and its message says what to do next. A `Note` is a remark on a
-result, of a `NoteKind` that the module declares which makes it; every command presents notes alike:
-`lines` on the terminal and the page, `rows` in result.json and notes.csv. A run is marked in
-tables by the kinds of its notes (`marks`).
+An error is raised on purpose; its message says what to do next. A `Note` is a remark on a result,
+of a `NoteKind` of the module that makes it: `lines` on the terminal, `rows` in files.
 """
 
 from __future__ import annotations
@@ -167,10 +165,9 @@ def one_line(text: str) -> str:
 
 
 class NoteKind(str):
-    """Name a kind of note by the words that tables and result.json have for it.
+    """Name a kind of note by its words; the same words are the same kind.
 
-    weight : place among the notes of a fit, of which the terminal prints the weightiest. mark :
-    place among the marks of a run in tables of runs, 0 for none. The same words are the same kind.
+    weight : place among the notes of a fit. mark : among those of a run in tables, 0 for none.
     """
 
     weight: float

@@ -1,9 +1,8 @@
 """Files and what lies around them: reading, writing, templates, plug-ins, caches of compiled code.
 
-Untrusted files are read only where regular, no larger than expected, and within a time limit; files
-are written whole or not at all. Templates may be somebody else's: a sandbox gives them values and
-nothing to change. Plug-ins are looked up without being imported; one that does not work gives one
-line that names its distribution. Heavy libraries are imported where they are used.
+Untrusted files are read only where regular, not too large, and in time; written files are whole or
+not there. Templates are rendered in a sandbox. A plug-in that does not work gives one line that
+names its distribution. Heavy libraries are imported where they are used.
 """
 
 from __future__ import annotations
@@ -69,18 +68,30 @@ def content_of(path: Path | str, most: int = LARGEST) -> bytes:
     return b"".join(pieces)
 
 
-def toml_of(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+@contextmanager
+def reading(path: Path | str, field: str = "") -> Iterator[None]:
+    """Turn an OSError within the block into an InputError about `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(path, field, f"cannot be read: {error.strerror}") from None
 
-    Raises InputError : as `content_of`. OSError : it cannot be read. UnicodeDecodeError : it is not
-    in UTF-8. ValueError, RecursionError : it is not TOML.
-    """
-    text = content_of(path, LARGEST_WRITTEN).decode("utf-8")
-    # A key of n parts costs tomllib n squared, in time and memory.
-    plain = text.replace(" ", "").replace("\t", "")
-    if any(part.count(".") > MOST_PARTS for part in re.split(r"[^\w.\"'-]", plain)):
-        raise ValueError(f"a key, or a text, of more than {MOST_PARTS} parts with points between")
-    return tomllib.loads(text)
+
+def toml_of(path: Path, field: str = "") -> dict[str, Any]:
+    """Read a TOML file; InputError (about `field` where it cannot be read at all)."""
+    try:
+        with reading(path, field):
+            text = content_of(path, LARGEST_WRITTEN).decode("utf-8")
+        # A key of n parts costs tomllib n squared, in time and memory.
+        plain = text.replace(" ", "").replace("\t", "")
+        if any(part.count(".") > MOST_PARTS for part in re.split(r"[^\w.\"'-]", plain)):
+            problem = f"a key, or a text, of more than {MOST_PARTS} parts with points between"
+            raise ValueError(problem)
+        return tomllib.loads(text)
+    except UnicodeDecodeError:
+        raise InputError(path, field, "is not a text file in UTF-8") from None
+    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
+        raise InputError(path, "TOML syntax", str(error)) from None
 
 
 def is_file(path: Path) -> bool:
@@ -101,11 +112,8 @@ def check_regular(path: Path | str) -> None:
 
 def checksum(path: Path | str) -> str:
     """Return the SHA-256 of a file's content in hexadecimal digits; InputError if unreadable."""
-    try:
-        with open(path, "rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    with reading(path), open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def process_context() -> Any:
@@ -386,12 +394,7 @@ def compiled(**options: Any) -> Callable[[Any], Any]:
 
 
 def write_notes(folder: Path, notes: Iterable[Note]) -> None:
-    """Write notes.csv: of, kind, note; a header alone where there are none.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
+    """Write notes.csv (of, kind, note), a header alone without any; OutputError."""
     with replacing(folder / NOTES) as path, open(path, "w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, ["of", "kind", "note"], lineterminator="\n")
         table.writeheader()

@@ -1,9 +1,8 @@
 """Read and write the material card `material.toml`: a law, its thickness, source and certainty.
 
-Format 2 names its form and what the form needs (`breaks`, `knots`). Format 3 also has
-`[certainty]`: independent directions whose products add up to the covariance of the free
-coefficients, and `[certainty.band]`, the ends of the fit's band of each modulus. A file without
-`format` is of format 1: cubics, and tri-linear laws by their breaks.
+Format 2 names its form and settings; 3 has `[certainty]`, directions whose products add up to the
+covariance of the free coefficients, and `[certainty.band]`, the ends of the fit's band. A file
+without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
 import functools
@@ -25,16 +24,7 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError, checked
 from ..files import toml_of, write_text
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
-from .forms.base import (
-    COMPONENTS,
-    STRAIN_NAMES,
-    UNLIMITED,
-    Array,
-    form_named,
-    form_names,
-    form_settings,
-    ratios_of,
-)
+from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
 
@@ -56,21 +46,23 @@ class CardCertainty:
     by modulus, strain and ends of the fit's own band in MPa; empty where the card has none.
     """
 
-    directions: Array
+    directions: base.Array
     words: str = ""
-    bands: Mapping[str, Array] = field(default_factory=dict)
+    bands: Mapping[str, base.Array] = field(default_factory=dict)
 
     @property
-    def covariance(self) -> Array:
+    def covariance(self) -> base.Array:
         """Return (free, free) MPa^2 of the law's free coefficients."""
         return np.asarray(self.directions.T @ self.directions)
 
-    def sigma(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> Array:
+    def sigma(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> base.Array:
         """Return (n,) MPa, one standard deviation of a modulus of the law at strains (n,)."""
         rows = law.modulus_rows(name, strain)[:, list(law.form.free)]
         return np.asarray(np.sqrt(((rows @ self.directions.T) ** 2).sum(axis=1)))
 
-    def band(self, law: HypoelasticLaw, name: str, strain: ArrayLike) -> tuple[Array, Array]:
+    def band(
+        self, law: HypoelasticLaw, name: str, strain: ArrayLike
+    ) -> tuple[base.Array, base.Array]:
         """Return (n,) MPa each, lower (>= 0) and upper end of 95 %: the fit's, else by `sigma`."""
         if name in self.bands:
             strains, *ends = self.bands[name]
@@ -102,16 +94,16 @@ class CardCertainty:
 
 
 def band_at(
-    strains: Array, ends: Sequence[Array], strain: ArrayLike, modulus: ArrayLike
-) -> tuple[Array, Array]:
+    strains: base.Array, ends: Sequence[base.Array], strain: ArrayLike, modulus: ArrayLike
+) -> tuple[base.Array, base.Array]:
     """Return the ends at strains (n,) of a band known at some; a modulus (n,) is always inside."""
     lower, upper = (np.interp(np.asarray(strain, dtype=float), strains, end) for end in ends)
     return np.minimum(lower, modulus), np.maximum(upper, modulus)
 
 
 def certainty_of(
-    law: HypoelasticLaw, coefficients: Array, words: str = "",
-    bands: Mapping[str, Array] | None = None,
+    law: HypoelasticLaw, coefficients: base.Array, words: str = "",
+    bands: Mapping[str, base.Array] | None = None,
 ) -> CardCertainty:  # fmt: skip
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
@@ -120,7 +112,7 @@ def certainty_of(
             law.modulus_rows(name, strain, ratio)[:, list(law.form.free)]
             / law.modulus(name, strain, ratio)[:, None]
             for name, strain in strains_of(law).items()
-            for ratio in ratios_of(law.form, name)
+            for ratio in base.ratios_of(law.form, name)
         ]
     )
     _, sizes, turned = np.linalg.svd(relative @ spread.T, full_matrices=False)
@@ -128,11 +120,11 @@ def certainty_of(
     return CardCertainty(np.asarray(kept @ spread), words, bands or {})
 
 
-def strains_of(law: HypoelasticLaw) -> dict[str, Array]:
+def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
     """Return strains (n,) by modulus, up to the end of the range; zero alone without one."""
-    ends = {name: float(law.strain_range[c]) for name, c in COMPONENTS.items()}
+    ends = {name: float(law.strain_range[c]) for name, c in base.COMPONENTS.items()}
     return {
-        name: np.linspace(0.0, end, PLACES) if end < UNLIMITED else np.zeros(1)
+        name: np.linspace(0.0, end, PLACES) if end < base.UNLIMITED else np.zeros(1)
         for name, end in ends.items()
     }
 
@@ -142,7 +134,7 @@ def positive(law: HypoelasticLaw) -> bool:
     return all(
         (law.modulus(name, strain, ratio) > 0).all()
         for name, strain in strains_of(law).items()
-        for ratio in ratios_of(law.form, name)
+        for ratio in base.ratios_of(law.form, name)
     )
 
 
@@ -216,7 +208,7 @@ def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
 def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> None:
     """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
     law, scale = card.law, UNITS[unit]
-    named = zip(STRAIN_NAMES, law.strain_range, strict=True)
+    named = zip(base.STRAIN_NAMES, law.strain_range, strict=True)
     sure, of_form = card.certainty, law.form.to_card()
     pieces = of_form.pop("pieces", {})
     content: dict[str, Any] = {
@@ -224,7 +216,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         "source": card.source, "law": LAW, "form": law.form.name, "unit": unit,
         "beta": [float(b) / scale for b in law.beta], "nu12": law.nu12,
         "thickness_mm": card.thickness, "thickness_change": law.thickness_change,
-        "valid_strain": {name: [0.0, float(end)] for name, end in named if end < UNLIMITED},
+        "valid_strain": {name: [0.0, float(end)] for name, end in named if end < base.UNLIMITED},
         **of_form
     }  # fmt: skip
     if card.state or law.memory is not None:
@@ -292,9 +284,9 @@ Thickness = Annotated[float, PlainValidator(_thickness), WithJsonSchema({"type":
 class ValidStrain(Section):
     """[0, end] of each log strain; a direction left out has no end."""
 
-    warp: End = UNLIMITED
-    fill: End = UNLIMITED
-    shear: End = UNLIMITED
+    warp: End = base.UNLIMITED
+    fill: End = base.UNLIMITED
+    shear: End = base.UNLIMITED
 
 
 Band = Annotated[list[Numbers], Field(min_length=3, max_length=3)]
@@ -348,12 +340,7 @@ class CardFile(Section):
 def read_card(path: Path | str) -> MaterialCard:
     """Read a card of any format; raise InputError that names the file and the field."""
     path = Path(path)
-    try:
-        content = toml_of(path)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
-        raise InputError(path, "TOML syntax", str(error)) from None
+    content = toml_of(path)
     try:
         return _card(content)
     except InputError as error:
@@ -372,7 +359,7 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
         largest = max(file.beta, key=abs)
         raise InputError(None, "beta", f"{largest:g} {file.unit} is too large a coefficient")
     # What the form says is of all strains, whatever part of them the card holds for.
-    form = form_named(name, settings, [UNLIMITED] * 3)
+    form = base.form_named(name, settings, [base.UNLIMITED] * 3)
     if len(mpa) != form.size:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
     ends = np.array([file.valid_strain.warp, file.valid_strain.fill, file.valid_strain.shear])
@@ -401,7 +388,7 @@ def _certainty(file: CardFile, law: HypoelasticLaw) -> CardCertainty | None:
     return CardCertainty(directions, file.certainty.of, _bands(file))
 
 
-def _bands(file: CardFile) -> dict[str, Array]:
+def _bands(file: CardFile) -> dict[str, base.Array]:
     """Return strain and ends in MPa by modulus; InputError where they make no band."""
     assert file.certainty is not None
     if file.certainty.band is None:
@@ -436,7 +423,7 @@ def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
         raise InputError(None, "law", f"expected {LAW!r}, got {text!r}")
     if not isinstance(name, str):
         raise InputError(None, "form", f"expected the name of a form, got {name!r}")
-    own = form_settings(name)
-    if not own and name not in form_names():
-        form_named(name, {}, [UNLIMITED] * 3)  # says what there is
+    own = base.form_settings(name)
+    if not own and name not in base.form_names():
+        base.form_named(name, {}, [base.UNLIMITED] * 3)  # says what there is
     return name, {key: content[key] for key in own if key in content}

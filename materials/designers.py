@@ -1,16 +1,12 @@
 """Linear orthotropic constants per width, in the forms that programs ask for.
 
-Inverse form, strains (change of length over length) of loads per width n (kN/m = N/mm):
+Inverse form, strains of loads per width n (kN/m), nu_w the warp's contraction by the fill (nu_xy),
+nu_f the other (nu12), reciprocal where nu_w / E_f = nu_f / E_w:
 
     eps_w = n_w / E_w - nu_w n_f / E_f,    eps_f = n_f / E_f - nu_f n_w / E_w.
 
-nu_w is how much the warp contracts when the fill is pulled (nu_xy beside E_x, x the warp), nu_f how
-much the fill does when the warp is pulled (nu12 of the law); reciprocal: nu_w / E_f = nu_f / E_w.
-Direct form:  n_w = A_w eps_w + A_wf eps_f,  n_f = A_fw eps_w + A_f eps_f.
-
-Strains and loads of a path are replaced by their regression lines over the larger load. Constants
-have the least sum of squares, at points evenly spread along these lines, of strains (inverse) or of
-loads (direct). Two yarns of five ratios are ten paths; the eight without the unloaded are usual.
+Direct: n_w = A_w eps_w + A_wf eps_f, n_f = A_fw eps_w + A_f eps_f. Paths are replaced by their
+regression lines over the larger load; constants have the least squares of strains or loads.
 """
 
 import math
@@ -270,10 +266,9 @@ SHEARS = 61
 
 @dataclass(frozen=True, eq=False)
 class LawConstants:
-    """A law as designers' constants; others : of the other options.
+    """A law as designers' constants, and those of `others`; shear : least, largest G, kN/m.
 
     lost, largest : by ratio, RMS difference from the law's strains, and its largest strain, %.
-    shear : (least, largest) G per width over the shear strains, kN/m.
     """
 
     evaluation: Evaluation

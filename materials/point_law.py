@@ -1,15 +1,13 @@
 """The law at one integration point, compiled: kinematics, stress update, tangent.
 
-Everything here works on scalars and short arrays and is called from compiled loops, both by the
-vectorised law (`law.py`) and by the membrane solver, so that there is one implementation.
-
-The in-plane deformation is given by the Cauchy-Green components C11, C22, C12 in the material
-(warp, fill) frame, through  m = (C11 + C22)/2,  q = (C11 - C22)/2,  c = C12.  Strain vectors are
-(eps1, eps2, gamma12) with the engineering shear; Green-Lagrange strain E = ((C11-1)/2,
+Called from compiled loops, by the vectorised law (`law.py`) and the membrane alike. In-plane
+Cauchy-Green components C11, C22, C12 in the (warp, fill) frame enter through m = (C11 + C22)/2, q =
+(C11 - C22)/2, c = C12. Strains are (eps1, eps2, gamma12); Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
 
-`pieces` (3, P, 5) is a law's three moduli (`pieces.py`); `coupling` (3,), or (15,) of a law that
-remembers its history, its other constants (`memory.py`).
+`pieces` (3, P, 5) are as `pieces_of` writes them. An increment takes a modulus' MEAN, (F(x) -
+F(x_old))/(x - x_old), F its integral: a bar is exact in any number of increments, and
+d(stress)/d(strain) is the modulus at the END.
 """
 
 import math

@@ -1,12 +1,9 @@
 """Compute uniaxial, trellis and biaxial responses of the law, and tables of its moduli.
 
-Uniaxial: pulled along one yarn, free to contract across it. Trellis: both yarns keep their length
-while the angle between them changes, as in a picture frame. Biaxial: a homogeneous patch, without
-shear, at loads per width before the test, as a cruciform's machine counts them:
+Uniaxial: free to contract across. Trellis: yarns keep their length while the angle changes.
+Biaxial: a patch without shear, loads per width before the test, an increment a load:
 
-    n1 = t0 (J2)^p sigma1 / lambda1,    n2 = t0 (J2)^p sigma2 / lambda2,
-
-J2 = lambda1 lambda2 the area ratio, p the law's `area_power`, one increment of the law a load.
+    n1 = t0 (J2)^p sigma1 / lambda1,    n2 = t0 (J2)^p sigma2 / lambda2,   J2 = lambda1 lambda2
 """
 
 import math
@@ -101,10 +98,9 @@ def uniaxial_curve(
 def trellis_curve(
     law: HypoelasticLaw, angle: ArrayLike, measure: Measure
 ) -> tuple[Array, Array, Array]:
-    """Return shear strain (n,), shear stress (n,) and stress along the yarns (n, 2), MPa.
+    """Return shear strain, shear stress (n,) and stress along the yarns (n, 2), MPa.
 
-    The last, which curves that do not couple leave out, is 2nd Piola-Kirchhoff stress whatever the
-    measure. angle : (n,) changes of the angle between the yarns, radians.
+    The last is 2nd Piola-Kirchhoff stress whatever the measure. angle : (n,) rising, radians.
     """
     ends = np.asarray(angle, dtype=float)
     fine = _refined(ends)
@@ -153,11 +149,9 @@ TOLERANCE = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class BiaxialResponse:
-    """A patch at one load after the other.
+    """A patch at one load after the other, `reached` of them; beyond NaN; stable: takes work.
 
-    strain : (n, 2) logarithmic. stress : (n, 2) MPa, Cauchy. slope : (n, 2, parameters) of the
-    strain. reached : loads with an equilibrium; rows beyond are NaN. stable : every small stretch
-    takes work.
+    strain : (n, 2) log. stress : (n, 2) MPa, Cauchy. slope : (n, 2, parameters) of the strain.
     """
 
     strain: Array

@@ -1,16 +1,13 @@
 """Wrinkled and slack states at one integration point, compiled: the strain of the fabric.
 
-A wrinkle takes up strain across itself without stress. At a point with total strain h the fabric
-itself is strained by h + w, the wrinkle strain w = size n n' (n its normal), or any contraction
-where it is slack, such that the Cauchy stress s obeys
+The fabric is strained by h + w, total strain and wrinkle strain w = size n n' (n its normal), or
+any contraction where slack, such that the Cauchy stress s obeys
 
-    s >= 0 (no principal compression),  w >= 0,  s : w = 0,
+    s >= 0 (no principal compression),  w >= 0,  s : w = 0
 
-which for a linear law is the projection of the trial stress on the tensile ones in the norm of the
-compliance (Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)). The law
-is integrated along the strain of the fabric, h + w. A share of the stiffness at zero strain is left
-to the wrinkle strain, so that wrinkled and slack parts keep a tangent. The search is Newton's
-iteration on size and angle of the wrinkle strain.
+(Roddeman et al., J. Appl. Mech. 54 (1987) 884; Del Piero, Meccanica 24 (1989)). A share of the
+stiffness at zero strain is left to w, so that wrinkled and slack parts keep a tangent. Newton's
+iteration searches size and angle of w.
 """
 
 import math

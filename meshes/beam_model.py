@@ -1,16 +1,13 @@
 """An inflated tube in bending as a beam: the wall per width, cords, and loads as they are.
 
-Beside the membrane of `cylinder_model`: for walls that are known as stiffness per width (N/mm) and
-for braids, whose yarns lock bilinear quads. Sections stay plane and round. Strain counts from the
-inflated tube, whose radius and braid angle are given, and a section carries
+For walls known as stiffness per width (N/mm) and braids, whose yarns lock bilinear quads. Sections
+stay plane and round; strain counts from the inflated tube. A section carries
 
     N = integral of n(strain) r d angle + sum of cords - p pi r^2,   V = (G pi r + p pi r^2) gamma,
 
-n N/mm along the tube, strain = axial - curvature * height. The pressure's part of the shear is that
-of Fichter (NASA TN D-3393). A braid pulls along the tube: its yarns turn as it is stretched, at
-constant length, cos(angle) with the length of the tube and sin(angle) with its radius. So the
-section's thrust less the pull of the braid is p pi r^2 (1 - 2 cot^2 angle), and its derivative
-stiffens the wall by 3 p r cot^2 angle.
+strain = axial - curvature * height; the pressure's part of the shear is Fichter's (NASA TN D-3393).
+A braid's yarns turn at constant length, so the thrust less its pull is p pi r^2 (1 - 2 cot^2
+angle), whose derivative stiffens the wall by 3 p r cot^2 angle.
 """
 
 import math
@@ -98,8 +95,7 @@ class PlainWall:
 class BraidedWall:
     """Two families of yarns at plus and minus `angle` (degrees from the axis), and a bladder.
 
-    yarn, across, yarn_shear : N/mm of each family, along and across its yarns and in shear.
-    bladder, bladder_shear : N/mm of the isotropic bladder. It carries compression as well.
+    yarn, across, yarn_shear, bladder, bladder_shear : N/mm; it carries compression as well.
     """
 
     angle: float
@@ -248,10 +244,9 @@ class TubeSection:
 class BeamModel:
     """A tube on two rollers, bent by two equal dead loads (one where they are 0 mm apart).
 
-    span, load_spacing, load_width : mm; of straps along the tube. roller_below : mm from the axis
-    to the rollers, on brackets that turn with the ends. weight : N/mm of tube. friction : N, added
-    to the load of every deflection. deflections : mm of the axis at mid-span, from the inflated
-    tube under its weight. size : mm of an element. mesh : the surface of a quarter, to be drawn.
+    span, load_spacing, load_width (of straps), size (of an element) : mm. roller_below : mm from
+    the axis to the rollers. weight : N/mm. friction : N, added to the load. deflections : mm at
+    mid-span, from the inflated tube under its weight. mesh : the surface of a quarter, to be drawn.
     """
 
     section: TubeSection

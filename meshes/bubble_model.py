@@ -50,15 +50,11 @@ PRESSURE_OFFSET = "pressure_offset"
 class BubbleModel:
     """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
-    mesh : mm; warp is x unless the mesh says it, z the surface in the reference picture, from which
-    displacements are counted. pressures : MPa, increasing: the frames. increments : MPa, containing
-    every pressure: steps of the law, which hardly matter (benchmarks/bench_law.py increments);
-    `unloaded` : both may fall, and each increment is a frame.
-    supports : degrees of freedom held at zero, by node set; those of the rim where it moves. modes
-    : (nodes,) each, by name: shapes by which the surface can be raised, mm per mm. slack : how much
-    longer the stress-free sheet is along x (warp) and y (fill), as a share. rim_motion :
-    (increments, rim nodes, 3) mm from the reference picture at the end of every increment; None for
-    a rim that stays.
+    mesh : mm; warp is x, fill is y, z the reference surface. pressures : MPa: the frames.
+    increments : MPa, containing every pressure: steps of the law. supports : degrees of freedom
+    held at zero, by node set. modes : (nodes,) each: shapes by which the surface can be raised.
+    slack : how much longer the stress-free sheet is along x and y. rim_motion : (increments, rim
+    nodes, 3) mm, or None.
     """
 
     mesh: Mesh
@@ -145,8 +141,7 @@ class BubbleModel:
         return np.eye(3)[0] if self.mesh.warp is None else np.asarray(self.mesh.warp[0])
 
     def sheet_slope(self, name: str) -> tuple[Array, Array, Array]:
-        """Return derivatives of the reference surface and of `stress_free` (nodes, 3), and of
-        `yarn` (3,), by a parameter."""
+        """Return derivatives (nodes, 3) of reference surface and `stress_free` by one."""
         surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
         yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
         if name in self.modes:

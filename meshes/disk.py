@@ -1,9 +1,7 @@
 """Quadrilateral meshes of the flat circular or elliptic specimen, whole or one quarter of it.
 
-The quarter of the unit disk has three structured blocks (an o-grid), by transfinite interpolation:
-a core with its far corner K pulled towards the rim, and two ring blocks. Three quads meet in K, so
-the best is 120 degrees there: scaled Jacobian 0.866. The core's sides are arcs that leave the axes
-at right angles and turn just so far; every element of every count then has 0.866 or more.
+The quarter has three structured blocks (an o-grid): a core with its far corner K pulled towards the
+rim, and two ring blocks, 120 degrees each in K: scaled Jacobian 0.866 or more everywhere.
 """
 
 import math
@@ -107,11 +105,10 @@ def disk_mesh(
     radius: float, elements: int, symmetry: Literal["full", "quarter"] = "full",
     generator: Literal["blocks", "gmsh"] = "blocks"
 ) -> Mesh:  # fmt: skip
-    """Mesh a disk of `radius` mm in the xy plane around the origin.
+    """Mesh a disk of `radius` mm in the xy plane around the origin, or its quarter x, y >= 0.
 
-    elements : quads wanted on the FULL disk, 8 or more (the thesis: 800); the gap to the number
-    made is at most 16 below 200 and 7 % above. symmetry : the whole, or the quarter x, y >= 0. Node
-    sets: `rim`, `apex`; on a quarter also `symmetry_x` (x = 0, where u_x = 0) and `symmetry_y`.
+    elements : wanted on the FULL disk, 8 or more; the number made is within 16 below 200 and 7 %
+    above. Node sets: `rim`, `apex`; on a quarter also `symmetry_x` (u_x = 0), `symmetry_y`.
     """
     _check(radius, elements, symmetry, generator)
     if generator == "gmsh":

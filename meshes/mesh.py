@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A surface of four-node quadrilaterals.
+    """A surface of four-node quadrilaterals, counter-clockwise from where pressure inflates to.
 
-    points : (n, 3) mm. quads : (m, 4), counter-clockwise seen from the side that pressure inflates
-    to. node_sets, element_sets : numbers by name, sorted. warp : (m, 3) unit direction of the warp
-    yarn in each quad (x where it is None); the fill yarn is a quarter turn from it,
-    counter-clockwise.
+    points : (n, 3) mm. quads : (m, 4). node_sets, element_sets : numbers by name, sorted. warp :
+    (m, 3) unit direction (x where None); the fill is a quarter turn counter-clockwise.
     """
 
     points: NDArray[np.float64]
@@ -188,10 +186,8 @@ def volume_and_gradient(
 ) -> tuple[float, Array]:
     """Return the volume (mm^3) and its derivative (n, 3) mm^2, exact for bilinear quads.
 
-    V = 1/3 * integral of x . n: a plane of symmetry through the origin adds nothing, so that a
-    quarter needs no lids as long as its open edges stay in their planes. weight : (3,) adding to
-    one: V = sum_k weight_k * integral of (x_k - origin_k) n_k; 0 where the surface is open in
-    direction k at both ends. origin : (3,) mm, in the planes of symmetry.
+    V = sum_k weight_k * integral of (x_k - origin_k) n_k, weight (3,) adding to one, 1/3 each
+    unless given: 0 where the surface is open along k. origin : (3,) mm, in planes of symmetry.
     """
     gradient = np.zeros(points.shape)
     points = np.ascontiguousarray(points, dtype=float)
@@ -319,9 +315,8 @@ LEAST_SHARE = 0.5
 class Facet:
     """The way in which a camera's correlation sees a place.
 
-    size : mm, side of the square facet. order : of its shape function, 1 (the mean, and a slope) or
-    2. window : points along a side of the square over which displacements are smoothed. step : mm
-    apart.
+    size : mm, side of the facet. order : of its shape function, 1 or 2. window : points along a
+    side of the square of smoothing. step : mm apart.
     """
 
     size: float

@@ -20,10 +20,9 @@ def strip_mesh(
 ) -> Mesh:  # fmt: skip
     """Mesh a rectangle in the xy plane, the middle of the width at x = 0, y from 0 to length.
 
-    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed (half: x >= 0);
-    even across on a whole strip. gauge_length : mm between two nodes on the middle line, at equal
-    distance from both ends, which the rows between them meet exactly. Node sets: `bottom`, `top`,
-    `gauge` (the lower first), `free_edges`; on a half also `symmetry_x` (where u_x = 0).
+    width, length : mm, of the WHOLE strip. across, along : quads of what is meshed; even across on
+    a whole strip. gauge_length : mm between two nodes on the middle line. Node sets: `bottom`,
+    `top`, `gauge` (the lower first), `free_edges`; on a half also `symmetry_x` (where u_x = 0).
     """
     gauge = length if gauge_length is None else gauge_length
     for name, value in (("width", width), ("length", length), ("gauge_length", gauge)):
@@ -64,16 +63,12 @@ def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
     rows = int(inside[np.argmin(np.abs(inside / along - gauge / length))])
     outside = (along - rows) // 2
     ends = 0.5 * (length - gauge), 0.5 * (length + gauge)
-    return (
-        np.concatenate(
-            [
-                np.linspace(0.0, ends[0], outside + 1),
-                np.linspace(ends[0], ends[1], rows + 1)[1:-1],
-                np.linspace(ends[1], length, outside + 1),
-            ]
-        ),
-        outside,
+    before, after = (
+        np.linspace(0.0, ends[0], outside + 1),
+        np.linspace(ends[1], length, outside + 1),
     )
+    between = np.linspace(*ends, rows + 1)[1:-1]
+    return np.concatenate([before, between, after]), outside
 
 
 def yarn_direction(angle: float) -> Array:
@@ -94,14 +89,11 @@ WIDTH, GRIP_DISTANCE, INCREMENTS = 25.0, 75.0, 100
 
 @dataclass(frozen=True, eq=False)
 class UniaxialModel(OfThickness):
-    """A strip in its plane whose lower end is pulled down until the gauge has a given length.
+    """A strip in the xy plane whose lower end is pulled down until the gauge is so much longer.
 
-    mesh : mm, in the xy plane, pulled along y; node sets `gauge` (two nodes), `bottom` and those in
-    `supports` (held at zero; every node stays in the plane). warp : (3,) direction of the warp
-    yarn. elongations : mm of the gauge, positive, increasing unless it is `unloaded` between two:
-    the increments of the law, every one reported.
-    pulled : the node set that moves along -y. load_factor : of the reaction: 2 for one half of the
-    width.
+    mesh : node sets `gauge` (two nodes), `bottom` and those in `supports` (held at zero). warp :
+    (3,). elongations : mm of the gauge, positive, increasing unless `unloaded`: the law's
+    increments. pulled : the set that moves along -y. load_factor : of the reaction, 2 for a half.
     """
 
     mesh: Mesh
@@ -220,11 +212,7 @@ class PatchModel(OfThickness):
     def mesh(self) -> Mesh:
         points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
-        return Mesh(
-            points,
-            np.array([[0, 1, 2, 3]]),
-            {name: np.array(nodes) for name, nodes in sets.items()},
-        )
+        return Mesh(points, np.array([[0, 1, 2, 3]]), {n: np.array(i) for n, i in sets.items()})
 
     def displacements(self, elongation: ArrayLike) -> Array:
         """Return (n, 4, 3) mm of the corners at elongations (n, 2)."""

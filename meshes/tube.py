@@ -1,9 +1,7 @@
 """The cylinder of the bending test: a tube with a seam, closed by flat caps.
 
-Axes: z along the cylinder, y up (the collar pushes along -y), x sideways; the origin is the middle
-of the axis. Angles go from the bottom (y < 0), where the seam lies on the supports (thesis section
-6.2), by the side x > 0 to the top. The planes of symmetry of three-point bending are x = 0, the
-vertical one through the axis, and z = 0, mid-span.
+z runs along the cylinder, y up (the collar pushes along -y), the origin is the middle of the axis.
+Angles go from the bottom, where the seam lies (thesis section 6.2), by x > 0 to the top.
 """
 
 import math
@@ -159,16 +157,13 @@ def cylinder_mesh(
 ) -> Mesh:  # fmt: skip
     """Mesh the middle surface of a cylinder with flat caps.
 
-    The nodes of the tube lie a little further out than the radius, so that cross-sections, caps and
-    volume, of polygons, are those of the circle. length, diameter, size (of an element), seam_width
-    (centred at the bottom) : mm, before inflation. symmetry : the quarter x, z >= 0, or the whole.
-    refinements : along the half z >= 0. cap_warp : axis of the caps' warp. around : sides around
-    the tube, in sizes: a multiple of eight quads, at most 5 % longer where the seam lets them.
-
-    Normals point out; `warp` is z on the tube. Element sets: `body`, `seam`, `caps`. Node sets: the
-    nodes of each, `ends` (where tube and caps meet), `mid_span` (z = 0), `top_line`, `bottom_line`,
-    `side_line`, `cap_centres`, by the name of each refinement its row, and NAME_bottom, the lowest
-    of it; on a quarter also `symmetry_x` (x = 0, where u_x = 0) and `symmetry_z`.
+    Nodes of the tube lie further out than the radius, so that polygons have the area of the circle.
+    length, diameter, size, seam_width (at the bottom) : mm. symmetry : the quarter x, z >= 0, or
+    the whole. refinements : along z >= 0. around : sides around the tube, a multiple of eight
+    quads. Normals point out; `warp` is z on the tube, `cap_warp` on caps. Element sets: `body`,
+    `seam`, `caps`. Node sets: the nodes of each, `ends`, `mid_span` (z = 0), `top_line`,
+    `bottom_line`, `side_line`, `cap_centres`, each refinement's row, and NAME_bottom; on a quarter
+    `symmetry_x`, `symmetry_z`.
     """
     _check(length, diameter, size, seam_width, symmetry, cap_warp, around)
     radius = 0.5 * diameter

@@ -215,15 +215,11 @@ def read_content(path: Path) -> dict[str, Any]:
     """Read a project file as it is; InputError."""
     try:
         return toml_of(path)
-    except FileNotFoundError:
+    except InputError as error:
+        if not isinstance(error.__context__, FileNotFoundError):
+            raise
         problem = "no such file; `bubblefit init DIR` writes an example to start from"
         raise InputError(path, "", problem) from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(path, "", "is not a text file in UTF-8") from None
-    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
-        raise InputError(path, "TOML syntax", str(error)) from None
 
 
 def _with_defaults(content: Mapping[str, Any]) -> dict[str, Any]:

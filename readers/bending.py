@@ -60,12 +60,11 @@ def read_bending_curves(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> tuple[BendingCurve, ...]:
-    """Read the repetitions in one file, in its order; one where no column tells them apart.
+    """Read the repetitions in one file, each up to its largest deflection.
 
-    Of each repetition the readings up to the largest deflection are kept: the rest is unloading.
-    repetition : name of the column of repetitions. preload : N beside the readings: collar and
-    strap. zero : of the deflection: "none", as read; "first", the first reading is zero; "line",
-    the straight line through the first four readings goes through the origin.
+    repetition : name of the column that tells them apart. preload : N beside the readings. zero :
+    of the deflection: "none", as read; "first", the first reading is zero; "line", the straight
+    line through the first four readings goes through the origin.
     """
     path = Path(path)
     named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}

@@ -14,26 +14,9 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from . import machine_tables, tables
 from .frames import FrameSource
-from .machine_tables import (
-    MachineTable,
-    TableOptions,
-    choice_of,
-    column_of,
-    measured,
-    read_machine_table,
-    source_of,
-)
 from .registry import read_file
-from .tables import (
-    DIRECTION_ALIASES,
-    LENGTH_UNITS,
-    LOAD_UNITS,
-    STRAIN_UNITS,
-    WIDTH_LOAD_UNITS,
-    distance_to_strip,
-    is_between_grips,
-)
 
 Array = NDArray[np.float64]
 #: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
@@ -48,10 +31,8 @@ DIRECTIONS = ("warp", "fill", "bias")
 class LoadCurve:
     """Load (n,) N of the whole strip over elongation (n,) mm of one specimen or series.
 
-    specimen : its name in the file, else the series', else the file's. time : (n,) only where asked
-    for. frame : (n,) number of the frame from 0, of a strain gauge. notes : choices that were made.
-    between_grips : the column of elongation where it is the machine's travel. cut : number of rows
-    that were left out after the largest load.
+    time : (n,) where asked for. frame : (n,) numbers from 0, of a strain gauge. between_grips : the
+    column where it is the machine's travel. cut : rows left out after the largest load.
     """
 
     direction: str
@@ -77,10 +58,10 @@ class LoadCurve:
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
     """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`."""
     plain = re.sub(r"[\W_]+", "", name.casefold())
-    if plain not in DIRECTION_ALIASES:
-        known = ", ".join(DIRECTION_ALIASES)
+    if plain not in tables.DIRECTION_ALIASES:
+        known = ", ".join(tables.DIRECTION_ALIASES)
         raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {known}")
-    return DIRECTION_ALIASES[plain]
+    return tables.DIRECTION_ALIASES[plain]
 
 
 def read_load_curves(
@@ -99,12 +80,10 @@ def read_load_curves(
 ) -> tuple[LoadCurve, ...]:
     """Read the curves of one export: one a direction and specimen, in the order of the file.
 
-    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time`, with or
-    without unit; time is read only when named. load_unit, length_unit : where the file names none.
-    width : mm of the strip, for loads per width. gauge_length : mm, by direction, for files
-    that hold an engineering strain. direction : of a file without such a column; else the
-    rows to keep. decimal : needed where 1,234 may be a thousand or little more than one. sheet : of
-    a workbook.
+    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time` (only if
+    named). load_unit, length_unit : where the file names none. width : mm, for loads per width.
+    gauge_length : mm, by direction, for engineering strains. direction : of a file without such a
+    column; else the rows to keep. decimal : where 1,234 is in doubt. sheet : of a workbook.
     """
     path, named = Path(path), dict(columns or {})
     unknown = [name for name in named if name not in QUANTITIES]
@@ -114,40 +93,42 @@ def read_load_curves(
     if decimal not in (None, ".", ","):
         raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
     wanted = None if direction is None else direction_named(direction)
-    options = TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
-    found = read_machine_table(path, options, format)
-    column = {quantity: column_of(found, quantity, named) for quantity in QUANTITIES}
+    options = machine_tables.TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
+    found = machine_tables.read_machine_table(path, options, format)
+    column = {quantity: machine_tables.column_of(found, quantity, named) for quantity in QUANTITIES}
     said = column["elongation"]
-    elongation = measured(found, said, "length", LENGTH_UNITS | STRAIN_UNITS, length_unit)
-    units, own = dict(LOAD_UNITS), found.units[column["load"]]
-    if own in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
+    elongation = machine_tables.measured(
+        found, said, "length", tables.LENGTH_UNITS | tables.STRAIN_UNITS, length_unit
+    )
+    units, own = dict(tables.LOAD_UNITS), found.units[column["load"]]
+    if own in tables.WIDTH_LOAD_UNITS or load_unit in tables.WIDTH_LOAD_UNITS:
         if width is None:
             problem = f"{own or load_unit} is a load per width; say the strip's width"
             raise InputError(path, f"line {found.header}, column {column['load']!r}", problem)
-        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
-    load = measured(found, column["load"], "load", units, load_unit)
-    notes = found.notes + choice_of(found, "elongation", named)
+        units |= {name: scale * width for name, scale in tables.WIDTH_LOAD_UNITS.items()}
+    load = machine_tables.measured(found, column["load"], "load", units, load_unit)
+    notes = found.notes + machine_tables.choice_of(found, "elongation", named)
     if notes != found.notes and not np.ptp(elongation):
         problem = "does not move: name another column of elongation with columns"
         raise InputError(path, f"line {found.header}, column {said!r}", problem)
-    grips = said if is_between_grips(said, "elongation" in named) else ""
+    grips = said if tables.is_between_grips(said, "elongation" in named) else ""
     asked = {"elongation": length_unit, "load": load_unit}
     time = found.table.numbers(column["time"]) if column["time"] else None
     labels = _labels(found, column, wanted)
-    if (found.units[said] or length_unit) in STRAIN_UNITS:
+    if (found.units[said] or length_unit) in tables.STRAIN_UNITS:
         gauges = gauge_length or {}
         lacks = [d for d, _ in labels if d not in gauges and wanted in (None, d)]
         if lacks:
             problem = f"is a strain, no elongation: say the {lacks[0]} strip's gauge_length"
             raise InputError(path, f"line {found.header}, column {said!r}", problem)
         elongation = elongation * np.array([gauges.get(d, np.nan) for d, _ in labels])
-        doubtful = "; its name does not say of what" if distance_to_strip(said) else ""
+        doubtful = "; its name does not say of what" if tables.distance_to_strip(said) else ""
         words = f"{path.name}: the elongation is the strain of column {said!r} times gauge_length"
         notes = (*notes, words + doubtful)
     places: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
         places.setdefault(label, []).append(row)
-    source = source_of(found, column, asked, format, notes)
+    source = machine_tables.source_of(found, column, asked, format, notes)
     curves = []
     for key, rows in places.items():
         if wanted in (None, key[0]):
@@ -179,7 +160,7 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
 
 
 def _labels(
-    found: MachineTable, column: Mapping[str, str], wanted: str | None
+    found: machine_tables.MachineTable, column: Mapping[str, str], wanted: str | None
 ) -> Sequence[tuple[str, str]]:
     """Return direction and specimen of each row."""
     table = found.table

@@ -21,11 +21,9 @@ QUANTITIES = ("x", "y", "dx", "dy", "dz")
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Displacements measured (or computed) at one pressure (MPa).
+    """Displacements measured (or computed) at one pressure (MPa); sigma : as `Frame.sigma`.
 
-    points : (n, 2) mm in the reference state; x is warp, y is fill. displacement : (n, 3) mm. z :
-    (n,) mm, height in the reference state; None where unknown. sigma : (n,) as `Frame.sigma`.
-    dropped : counts of rows left out, by reason.
+    points : (n, 2) mm, x is warp, y fill, in the reference state; z : (n,) height there, or None.
     """
 
     pressure: float
@@ -122,9 +120,7 @@ LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfac
 class DisplacementSurface:
     """Three polynomials F(x, y), one a direction of displacement, at one pressure (MPa).
 
-    coefficients : (3, (degree + 1)^2) mm, of x / scale and y / scale in the order of Eq. 4.4: x^d
-    y^d first, powers of x falling fastest. scale : mm, the largest coordinate fitted. r_squared :
-    (3,) as in Table 4.1.
+    coefficients : (3, (degree + 1)^2) mm, of x / scale and y / scale, ordered as in Eq. 4.4.
     """
 
     pressure: float
@@ -226,10 +222,9 @@ MEDIAN = 0.6744897501960817
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """The sphere through the points (n, 3) mm of one frame.
+    """The sphere through points (n, 3) mm; errors as if those of the points were independent.
 
-    centre : (3,) mm. centre_error, radius_error : standard errors, as if the errors of the points
-    were independent. deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
+    deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
     """
 
     centre: Array

@@ -18,7 +18,6 @@ from ..errors import InputError, Note, NoteKind
 from .registry import read_file
 from .tables import LONGEST, called, split_unit
 
-#: Kinds of notes that are made here.
 ORDER = NoteKind("order of frames")
 
 Array = NDArray[np.float64]
@@ -42,11 +41,9 @@ class FrameSource:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """A surface in one frame.
+    """A surface in one frame: points, displacement (m, 3) mm, NaN where correlation was lost.
 
-    points, displacement : (m, 3) mm, in the reference state; NaN where correlation was lost.
-    dropped : counts of rows left out, by reason. sigma : (m,) the correlation's measure of error.
-    ids : (m,) numbers of the points. number : that of the frame in a file of several.
+    sigma : (m,) measure of error. ids : (m,) of the points. number : in a file of several.
     """
 
     points: Array
@@ -70,12 +67,11 @@ class Frame:
 class FrameOptions:
     """Options of a reader of frames.
 
-    quantities : of `QUANTITIES`, those that the file must hold. columns : the file's own names of
-    some. flag_column, valid_column : rows where the first is not zero, or the second is, are left
-    out. length_scale : mm per unit of columns without a unit. coordinates, camera_axes : state of
-    the places, and whether y points down and z away; None where the format tells. planar : z and dz
-    may be missing, and are then zero. reference : a file of the places of the undeformed sheet,
-    where the others hold nothing but places.
+    quantities : of `QUANTITIES`, those needed. columns : the file's own names. flag_column,
+    valid_column : rows where the first is not zero, or the second is, are left out. length_scale :
+    mm per unit where none is named. coordinates, camera_axes : state of the places, y down and z
+    away; None where the format tells. planar : z, dz may lack. reference : a file of the places at
+    rest.
     """
 
     quantities: tuple[str, ...] = QUANTITIES
@@ -271,12 +267,10 @@ def _best(headings: Sequence[Heading], where: list[int], key: str, upper: bool) 
 
 @dataclass(frozen=True, eq=False)
 class FrameRows:
-    """One frame as its file has it.
+    """One frame as its file has it; ids, number : as those of `Frame`.
 
-    values : (rows,) by quantity, also "x deformed" and so on; NaN where correlation was lost.
-    valid, sigma : (rows,) flags, and measure of error, below zero where correlation was lost.
-    ids, number : as those of `Frame`. camera_axes : y points down and z away from the camera.
-    dropped : counts of rows left out.
+    values : (rows,) by quantity, also "x deformed"; NaN where correlation was lost. valid, sigma :
+    (rows,), sigma below zero where lost. camera_axes : y points down and z away from the camera.
     """
 
     values: Mapping[str, Array]

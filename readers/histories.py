@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import tables
 from .machine_tables import (
     MachineTable,
     TableOptions,
@@ -21,15 +22,6 @@ from .machine_tables import (
     column_of,
     measured,
     read_machine_table,
-)
-from .tables import (
-    LENGTH_UNITS,
-    LOAD_UNITS,
-    STRAIN_UNITS,
-    distance_to_strip,
-    is_between_grips,
-    means,
-    strain_columns,
 )
 
 Array = NDArray[np.float64]
@@ -75,11 +67,11 @@ def read_history(
         raise InputError(None, "length", f"expected a length above 0 mm, got {length:g}")
     along = {**named, **({"elongation": named["strain"]} if "strain" in named else {})}
     found = read_machine_table(path, TableOptions(along, decimal=decimal, sheet=sheet), format)
-    load = measured(found, column_of(found, "load", named), "load", LOAD_UNITS, load_unit)
+    load = measured(found, column_of(found, "load", named), "load", tables.LOAD_UNITS, load_unit)
     names, notes = [str(name) for name in found.table.cells.columns], found.notes
     # A strain that is computed from the travel is the travel's.
-    strains = [] if "elongation" in named else strain_columns(names, found.units, named)
-    strains = [n for n in strains if "strain" in named or not is_between_grips(n, False)]
+    strains = [] if "elongation" in named else tables.strain_columns(names, found.units, named)
+    strains = [n for n in strains if "strain" in named or not tables.is_between_grips(n, False)]
     grips = False
     if strains:
         column = strains[0]
@@ -88,22 +80,22 @@ def read_history(
         notes += (f"{path.name}: the strain is column {column!r}{others}{more}",)
     else:
         column = column_of(found, "elongation", along)
-        if found.units[column] in STRAIN_UNITS:
-            strain = measured(found, column, "strain", STRAIN_UNITS, strain_unit)
+        if found.units[column] in tables.STRAIN_UNITS:
+            strain = measured(found, column, "strain", tables.STRAIN_UNITS, strain_unit)
         else:
             at = f"line {found.header}, column {column!r}"
             if length is None:
                 problem = "is an elongation: say the length in mm that it is of, length"
                 raise InputError(path, at, problem)
-            strain = measured(found, column, "length", LENGTH_UNITS, length_unit) / length
-        grips = is_between_grips(column, "elongation" in named)
+            strain = measured(found, column, "length", tables.LENGTH_UNITS, length_unit) / length
+        grips = tables.is_between_grips(column, "elongation" in named)
     machine = [
         n for n in names
-        if n and n != column and means(n, "elongation") and distance_to_strip(n)
-        and found.units[n] in LENGTH_UNITS
+        if n and n != column and tables.means(n, "elongation") and tables.distance_to_strip(n)
+        and found.units[n] in tables.LENGTH_UNITS
     ]  # fmt: skip
     moved = named.get("travel") or (machine[0] if machine else "")
-    travel = measured(found, moved, "length", LENGTH_UNITS, length_unit) if moved else None
+    travel = measured(found, moved, "length", tables.LENGTH_UNITS, length_unit) if moved else None
     if len(load) < 2 or not np.ptp(strain) > 0:
         raise InputError(path, f"column {column!r}", "the strain does not change: nothing to read")
     where: Literal["extensometer", "grips"] = "grips" if grips else "extensometer"
@@ -112,7 +104,7 @@ def read_history(
 
 def _strain(found: MachineTable, column: str, unit: str | None) -> tuple[Array, str]:
     if found.units[column] or unit:
-        return measured(found, column, "strain", STRAIN_UNITS, unit), ""
+        return measured(found, column, "strain", tables.STRAIN_UNITS, unit), ""
     strain = found.table.numbers(column)
     if np.ptp(strain) > PLAIN:
         problem = f"changes by {np.ptp(strain):.3g} and names no unit; say strain_unit, % or mm/mm"

@@ -12,18 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from . import tables
 from .frames import FrameSource
 from .registry import format_of, read_file
-from .tables import (
-    LOAD_UNITS,
-    STRAIN_UNITS,
-    TIME_UNITS,
-    TextTable,
-    columns_of,
-    distance_to_strip,
-    nearest_to_strip,
-    scale_of,
-)
 
 Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
@@ -44,7 +35,7 @@ class TableOptions:
 class MachineTable:
     """A table as the file has it: units by column, line of the names, notes of choices made."""
 
-    table: TextTable
+    table: tables.TextTable
     units: Mapping[str, str]
     header: int
     notes: tuple[str, ...] = ()
@@ -66,10 +57,10 @@ def column_of(
     may_lack = quantity not in (*named, *needed)
     if quantity == "time" and may_lack:
         return ""
-    which = columns_of(names, quantity, named)
+    which = tables.columns_of(names, quantity, named)
     if quantity == "elongation" and quantity not in named:
-        which = nearest_to_strip(names, which)
-        lengths = [i for i in which if found.units[names[i]] not in STRAIN_UNITS]
+        which = tables.nearest_to_strip(names, which)
+        lengths = [i for i in which if found.units[names[i]] not in tables.STRAIN_UNITS]
         which = lengths or which
     if len(which) == 1 or (not which and may_lack):
         return names[which[0]] if which else ""
@@ -87,12 +78,12 @@ def column_of(
 def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> tuple[str, ...]:
     """Return a note where `column_of` chose one of several columns, else nothing."""
     names = [str(name) for name in found.table.cells.columns]
-    which = [] if quantity in named else columns_of(names, quantity, named)
+    which = [] if quantity in named else tables.columns_of(names, quantity, named)
     if len(which) < 2:
         return ()
     chosen = column_of(found, quantity, named)
     others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
-    why = "" if distance_to_strip(chosen) else ", measured on the strip"
+    why = "" if tables.distance_to_strip(chosen) else ", measured on the strip"
     return (
         f"{found.table.path.name}: the {quantity} is column {chosen!r}{why}, not {others};"
         f" columns = {{ {quantity} = ... }} names another",
@@ -121,7 +112,7 @@ def measured(
     if not unit and asked is None:
         problem = f"the file does not name the unit; say {kind}_unit, one of {known}"
         raise InputError(path, at, problem)
-    scale = scale_of(unit or asked or "", units)
+    scale = tables.scale_of(unit or asked or "", units)
     if scale is None:
         problem = f"unit {unit[:20]!r} is not one of {known}; convert the column"
         raise InputError(path, at, problem)
@@ -158,7 +149,9 @@ def read_machine_loads(
     path, named = Path(path), dict(columns or {})
     needed = ("load", "time") if timed else ("load",)
     found = read_machine_table(path, TableOptions(named, needed, comment, decimal), format)
-    load = measured(found, column_of(found, "load", named, needed), "load", LOAD_UNITS, load_unit)
+    load = measured(
+        found, column_of(found, "load", named, needed), "load", tables.LOAD_UNITS, load_unit
+    )
     return MachineLoads(load, _times(found, named, needed) if timed else None, path)
 
 
@@ -178,20 +171,22 @@ def read_times(
 def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
     """Return the column of times in s; where no unit is named, they are seconds."""
     name = column_of(found, "time", named, needed)
-    at_the_end = re.search(rf"[_\s]({'|'.join(TIME_UNITS)})$", name)
+    at_the_end = re.search(rf"[_\s]({'|'.join(tables.TIME_UNITS)})$", name)
     unit = found.units[name] or (at_the_end[1] if at_the_end else "s")
-    if unit not in TIME_UNITS:
+    if unit not in tables.TIME_UNITS:
         at = f"line {found.header}, column {name!r}"
-        problem = f"unit {unit[:20]!r} is not one of {', '.join(TIME_UNITS)}; convert the column"
+        problem = (
+            f"unit {unit[:20]!r} is not one of {', '.join(tables.TIME_UNITS)}; convert the column"
+        )
         raise InputError(found.table.path, at, problem)
     stamps = found.table.stamps(name)
-    return found.table.numbers(name) * TIME_UNITS[unit] if stamps is None else stamps
+    return found.table.numbers(name) * tables.TIME_UNITS[unit] if stamps is None else stamps
 
 
 def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
     """Return the column of times in s that never falls, None where the table has none."""
     names = [str(name) for name in found.table.cells.columns]
-    for i in columns_of(names, "time", named):
+    for i in tables.columns_of(names, "time", named):
         values = _times(found, {"time": names[i]}, ("time",))
         if (np.diff(values) >= 0).all():
             return values
@@ -202,8 +197,7 @@ def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
 class Channel:
     """A column of readings: the value is scale * reading + offset, in `unit`.
 
-    column : found by meaning unless given. unit : the file's own unless given; needed with a scale.
-    scale : of a sensor, such as 200 mm per volt; None: the readings are no volts.
+    column : found by meaning unless given. scale : such as 200 mm per volt; None: no volts.
     """
 
     column: str | None = None
@@ -221,7 +215,7 @@ def channel_values(
 ) -> Array:
     """Return a column (rows,), converted by the table `units`."""
     path, at = found.table.path, f"line {found.header}, column {column!r}"
-    if units is TIME_UNITS and (stamps := found.table.stamps(column)) is not None:
+    if units is tables.TIME_UNITS and (stamps := found.table.stamps(column)) is not None:
         return stamps
     return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
 
@@ -230,7 +224,7 @@ def in_unit(
     readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
 ) -> Array:
     """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units."""
-    known, said = ", ".join(units), scale_of(own, units) if own else None
+    known, said = ", ".join(units), tables.scale_of(own, units) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
     if factor != 1.0 and said is not None:
@@ -239,7 +233,7 @@ def in_unit(
     if not unit:
         what = "after scaling" if raw else "of the readings"
         raise InputError(path, at, f"say the unit {what}, one of {known}")
-    scale = scale_of(unit, units)
+    scale = tables.scale_of(unit, units)
     if scale is None:
         advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
         raise InputError(path, at, f"unit {unit[:20]!r} is not one of {known}; {advice}")

@@ -1,12 +1,9 @@
 """Variables of MATLAB's files, version 5 and 7.3, and members of HDF5 files, read with suspicion.
 
-A numeric or logical array becomes an array, text a str, a cell array a list, a struct array a list
-of dicts; both lists run along the first index first. Objects of MATLAB's classes become None.
-
-Version 5 is parsed here, after MathWorks' "MAT-File Format", and not by scipy.io: on a damaged or
-hostile file scipy 1.17 crashes the process (an unknown type of numbers, deep nesting) or runs for
-minutes (counts of 2^31 cells); tests/readers/test_hostile_frames.py holds these files. HDF5 needs
-h5py, an extra (`pip install "bubblefit[hdf5]"`); nothing outside the file is read.
+Arrays, text, cell arrays as lists, struct arrays as lists of dicts, by the first index first;
+objects become None. Version 5 is parsed here, after MathWorks' "MAT-File Format": scipy.io 1.17
+crashes or hangs on hostile files (tests/readers/test_hostile_frames.py). HDF5 needs h5py, an extra
+(`pip install "bubblefit[hdf5]"`); nothing outside the file is read.
 """
 
 from __future__ import annotations
@@ -23,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import content_of, ends
+from ..files import content_of, ends, reading
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Within which a file of HDF5 must be read once.
@@ -57,11 +54,8 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
 
 def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
     """Read the variables of these names, those that there are."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(520)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    with reading(path), path.open("rb") as file:
+        head = file.read(520)
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
     if head[512:520] == SIGNATURE:

@@ -1,10 +1,8 @@
 """Pressures of a camera's frames: in the names of files, in files, by a log with its own clock.
 
-At the right offset of the clocks, heights of the frames and pressures are rising functions of each
-other; at a wrong one they are not, wherever the pressure was held, released, or raised faster or
-slower. Both functions are found by isotonic regression, with the sheet at rest at the least
-pressure of the log: where the pressure was raised in equal steps, a step later would else do as
-well.
+At the right offset of the clocks, heights and pressures are rising functions of each other; at a
+wrong one not, wherever the pressure was held, released or raised unevenly. Both functions are found
+by isotonic regression, the sheet at rest at the least pressure of the log.
 
 Outline: the log, heights, offset of the clocks, choice of frames, numbers in names and in files.
 """
@@ -22,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import ends
+from . import tables
 from .frames import Frame, heading_of
 from .machine_tables import (
     AS_FOUND,
@@ -31,16 +30,6 @@ from .machine_tables import (
     column_of,
     in_unit,
     read_machine_table,
-)
-from .tables import (
-    HOLES,
-    MOST_NAMES,
-    NUMBER,
-    PRESSURE_UNITS,
-    TIME_UNITS,
-    is_number,
-    read_lines,
-    split_unit,
 )
 from .text_frames import SEPARATORS, TOP, Lines, cells_of
 
@@ -77,11 +66,11 @@ def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> Pressur
     asked = TableOptions(named, ("time", "pressure"), options.comment, options.decimal)
     found = read_machine_table(path, asked, options.format)
     columns = {key: column_of(found, key, named, asked.quantities) for key in channels}
-    pressure = channel_values(found, columns["pressure"], options.pressure, PRESSURE_UNITS)
+    pressure = channel_values(found, columns["pressure"], options.pressure, tables.PRESSURE_UNITS)
     column, clock = columns["time"], options.time
     if not found.units[column] and clock.unit is None:
         clock = replace(clock, unit="s")
-    time = channel_values(found, column, clock, TIME_UNITS)
+    time = channel_values(found, column, clock, tables.TIME_UNITS)
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         at = f"line {found.table.lines[back[0] + 1]}, column {column!r}"
@@ -214,11 +203,10 @@ WORST_MISFIT, MOST_DOUBT = 0.05, 0.015
 
 @dataclass(frozen=True, eq=False)
 class ClockOffset:
-    """The log's clock less that of the frames.
+    """The log's clock less that of the frames, s; lower, upper : of those that may be right.
 
-    offset : s; lower, upper : of offsets that may be right. misfit : share of the variance that no
-    rising function explains; None where given. pressure, doubt : (frames,) MPa, NaN beyond the log;
-    half its range over all offsets that may be right. times, heights : (frames,) s and mm.
+    misfit : share of variance unexplained, None where given. pressure, doubt (half its range) :
+    (frames,) MPa, NaN beyond the log. times, heights : (frames,) s and mm.
     """
 
     offset: float
@@ -263,11 +251,9 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
         )
         raise InputError(None, "offset", problem)
     able = misfits <= AS_GOOD * max(misfits[best], FLOOR)
-    first = last = best
-    while first and able[first - 1]:
-        first -= 1
-    while last + 1 < len(able) and able[last + 1]:
-        last += 1
+    unable = np.flatnonzero(~able)
+    first = unable[unable < best].max(initial=-1) + 1
+    last = unable[unable > best].min(initial=len(able)) - 1
     offset = float(offsets[first] + offsets[last]) / 2
     may_be = offsets[able]
     some = np.append(may_be[:: max(1, len(may_be) // 200)], may_be[-1])
@@ -312,8 +298,7 @@ def choose_frames(
 ) -> FrameChoice:  # fmt: skip
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
-    pressures : (frames,) MPa, NaN where unknown. asked : MPa, rising. tolerance : MPa; 2 % of the
-    largest asked one unless given. in_time : leave out the release.
+    asked, tolerance (2 % of the largest asked unless given) : MPa. in_time : without the release.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)
@@ -394,8 +379,7 @@ def number_in_name(
 ) -> float:  # fmt: skip
     """Return the number in a file's name, times what its unit is in `units`.
 
-    pattern : with one group; None takes the one number before a unit (`step_012_35.5kPa.csv`).
-    unit : of the number of the pattern; none is 1. field : the pattern's name in errors.
+    pattern : of one group; None: the number before a unit (`step_012_35.5kPa.csv`).
     """
     if pattern is not None:
         hard = len(_REPEATS.findall(pattern)) > 1
@@ -429,7 +413,7 @@ def _float(cell: str) -> float:
 
 
 #: A pressure in a file's name, which is no number of a picture.
-_PRESSURE = re.compile(rf"{_UNSIGNED}[ _]?({'|'.join(PRESSURE_UNITS)})(?![^\W\d_])")
+_PRESSURE = re.compile(rf"{_UNSIGNED}[ _]?({'|'.join(tables.PRESSURE_UNITS)})(?![^\W\d_])")
 #: So many missing numbers are named.
 FEW_NUMBERS = 5
 
@@ -481,7 +465,9 @@ VOLTS, LONGEST = ("V", "mV"), 1000
 def values_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> Array:
     """Return what `channel.column` names: a column, or a line above the numbers."""
     name = channel.column or ""
-    lines = read_lines(path, "", any_encoding=True)  # with comments: a value may stand in one
+    lines = tables.read_lines(
+        path, "", any_encoding=True
+    )  # with comments: a value may stand in one
     found = _in_column(path, lines, name) or _above(path, lines, name, (*units, *VOLTS))
     if found is None:
         says = f"neither a column {name!r} nor a line above the numbers that says {name!r}"
@@ -496,11 +482,13 @@ def _in_column(path: Path, lines: Lines, name: str) -> tuple[list[float], str, s
             if name not in text:
                 continue
             names = [cell.lstrip("# ") for cell in cells_of(text, separator) or []]
-            where = [i for i, cell in enumerate(names) if name in (cell, split_unit(cell)[0])]
+            where = [
+                i for i, cell in enumerate(names) if name in (cell, tables.split_unit(cell)[0])
+            ]
             below = [cells_of(text, separator) or [] for _, text in lines[index + 1 : index + 3]]
-            header = 2 <= len(names) <= MOST_NAMES and not any(map(is_number, names))
+            header = 2 <= len(names) <= tables.MOST_NAMES and not any(map(tables.is_number, names))
             if not header or not any(
-                len(row) >= len(names) - 1 and 2 * sum(map(is_number, row)) >= len(names)
+                len(row) >= len(names) - 1 and 2 * sum(map(tables.is_number, row)) >= len(names)
                 for row in below
             ):
                 continue
@@ -518,18 +506,18 @@ def _constants(
     path: Path, lines: Lines, separator: str | None, name: str, column: int, frame: int | None
 ) -> tuple[list[float], str, str]:
     """Return a column's value in each frame (`frame`: column of its number), its unit and place."""
-    unit, head = split_unit(name)[1], lines[0][0]
+    unit, head = tables.split_unit(name)[1], lines[0][0]
     found: dict[float, tuple[float, int]] = {}
     for number, text in lines[1:]:
         row = cells_of(text, separator) or []
         cell, at = row[column] if column < len(row) else "", f"line {number}, column {name!r}"
         key = "0" if frame is None or frame >= len(row) else row[frame]
-        first = found.get(_float(key)) if is_number(key) else None
-        if not is_number(cell):
+        first = found.get(_float(key)) if tables.is_number(key) else None
+        if not tables.is_number(cell):
             # The row of units stands right below the names.
             if not found and number <= head + 2 and cell:
                 unit = cell.strip("()[]<>{} ")
-            elif cell.casefold() not in HOLES:
+            elif cell.casefold() not in tables.HOLES:
                 raise InputError(path, at, f"expected a number, found {cell[:40]!r}")
         elif first is None:
             found[_float(key)] = _float(cell), number
@@ -548,7 +536,7 @@ def _above(
     known = "|".join(sorted(units, key=len, reverse=True))
     says = re.compile(
         rf"(?<!\w){re.escape(name)}(?:_({known}))?(?!\w)[ _]*(?:[(\[<]([^)\]>]*)[)\]>])?"
-        rf"[\s:=;,]*({NUMBER})(?:[\s;,]*({known})(?!\w))?"
+        rf"[\s:=;,]*({tables.NUMBER})(?:[\s;,]*({known})(?!\w))?"
     )
     every = [(found, line) for line, text in lines[:TOP] if (found := says.search(text[:LONGEST]))]
     if not every:
@@ -558,5 +546,5 @@ def _above(
         first, second = every[0][1], every[1][1]
         raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
     found, line = every[0]
-    own = found[1] or found[2] or found[4] or split_unit(name)[1]
+    own = found[1] or found[2] or found[4] or tables.split_unit(name)[1]
     return [values.pop()], own.strip(), f"line {line}"

@@ -13,33 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .frames import (
-    BELOW,
-    FLAGGED,
-    LENGTHS,
-    PIXELS,
-    PLACES,
-    QUANTITIES,
-    Frame,
-    FrameOptions,
-    FrameRows,
-    Heading,
-    columns_of,
-    frame_of,
-    heading_of,
-)
-from .tables import (
-    HOLES,
-    MOST_NAMES,
-    TextTable,
-    check_one,
-    check_row,
-    check_width,
-    decimal_mark,
-    has_statistic,
-    is_number,
-    read_lines,
-)
+from . import frames, tables
 
 Array = NDArray[np.float64]
 #: Line number from 1 and text.
@@ -55,7 +29,7 @@ class TextLayout:
     """Layout of a file; separator None: blanks; header: line of names; below: rows left out."""
 
     separator: str | None
-    headings: Sequence[Heading]
+    headings: Sequence[frames.Heading]
     columns: Mapping[str, Sequence[int]]
     header: int
     body: Lines
@@ -83,11 +57,14 @@ def find_layout(
     decimal: str | None = None, upper: bool = False,
 ) -> TextLayout:  # fmt: skip
     """Find the layout of a file, by its own names of some quantities; names may be a comment."""
-    lines = read_lines(path, comment, any_encoding=True)
+    lines = tables.read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
     if found is None and comment:
         # The names may be a comment, as numpy.savetxt writes them.
-        above = [(n, t.lstrip(comment).strip()) for n, t in read_lines(path, "", any_encoding=True)]
+        above = [
+            (n, t.lstrip(comment).strip())
+            for n, t in tables.read_lines(path, "", any_encoding=True)
+        ]
         first = lines[0][0] if lines else 0
         heads = [one for one in above if one[0] < first][-2:]
         found = _best_header(heads + lines, quantities, named, upper)
@@ -100,31 +77,33 @@ def find_layout(
     below = (cells_of(body[0][1], separator) if body else None) or []
     plain = [cell.strip("()[]<>{} ") for cell in below]
     # A row of units: some are lengths, none a number.
-    if {*LENGTHS, *PIXELS} & {cell.casefold() for cell in plain} and not any(map(is_number, plain)):
+    if {*frames.LENGTHS, *frames.PIXELS} & {cell.casefold() for cell in plain} and not any(
+        map(tables.is_number, plain)
+    ):
         units, body = plain + units, body[1:]
-    headings = [heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
-    columns = columns_of(headings, named, upper)
+    headings = [frames.heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
+    columns = frames.columns_of(headings, named, upper)
     total = len(body)
     while len(body) > 1 and _is_summary(body[-1][1], body[0][1], separator):
         body = body[:-1]
     if not body:
         problem = "expected a header line and rows of numbers, found only a header line"
         raise InputError(path, f"line {header}", problem)
-    check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
+    tables.check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
     wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
     sample = [(number, cells_of(text, separator) or []) for number, text in body[:SAMPLE]]
     cells = [(number, names[i], row[i]) for number, row in sample for i in wanted if i < len(row)]
-    mark = decimal or decimal_mark(path, cells)
+    mark = decimal or tables.decimal_mark(path, cells)
     return TextLayout(separator, headings, columns, header, body, mark, total - len(body))
 
 
 def _is_summary(text: str, first: str, separator: str | None) -> bool:
     """Return whether a row has a label, "Mean", or begins with a word, unlike the `first`."""
     row, before = (cells_of(one, separator) or [""] for one in (text, first))
-    if has_statistic(row) and not has_statistic(before):
+    if tables.has_statistic(row) and not tables.has_statistic(before):
         return True
-    known = row[0].casefold() in {*HOLES, *WORDS}
-    return row[0][:1].isalpha() and not known and is_number(before[0])
+    known = row[0].casefold() in {*tables.HOLES, *WORDS}
+    return row[0][:1].isalpha() and not known and tables.is_number(before[0])
 
 
 def _best_header(
@@ -135,9 +114,9 @@ def _best_header(
     for separator in SEPARATORS:
         for index, (_, text) in enumerate(lines[:TOP]):
             names = cells_of(text, separator)
-            if names is None or not 2 <= len(names) <= MOST_NAMES or _is_numbers(names):
+            if names is None or not 2 <= len(names) <= tables.MOST_NAMES or _is_numbers(names):
                 continue
-            columns = columns_of([heading_of(name) for name in names], named, upper)
+            columns = frames.columns_of([frames.heading_of(name) for name in names], named, upper)
             known = {key.split()[0] for key, where in columns.items() if where}
             hits = len(known & {*quantities})
             rows = [cells_of(text, separator) for _, text in lines[index + 1 : index + 3]]
@@ -152,7 +131,7 @@ def _best_header(
 
 def _is_numbers(row: Sequence[str]) -> bool:
     """Return whether half of the cells or more are numbers."""
-    return 2 * sum(is_number(cell) for cell in row) >= max(len(row), 1)
+    return 2 * sum(tables.is_number(cell) for cell in row) >= max(len(row), 1)
 
 
 def _nothing_found(lines: Lines) -> str:
@@ -170,7 +149,7 @@ Flag = tuple[int, Sequence[int] | None]
 
 
 def flag_columns(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], options: FrameOptions,
+    path: Path, layout: TextLayout, columns: Mapping[str, int], options: frames.FrameOptions,
     status: tuple[str, Sequence[int]] | None,
 ) -> list[Flag]:  # fmt: skip
     """Return the flags that are named, else those of `status` and the headings."""
@@ -209,21 +188,23 @@ def _one(
 
 
 def _named(path: Path, names: Sequence[str], name: str) -> int:
-    check_one(path, names, name)
+    tables.check_one(path, names, name)
     return names.index(name)
 
 
 def quantity_columns(
-    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
+    path: Path, layout: TextLayout, named: Mapping[str, str], options: frames.FrameOptions
 ) -> dict[str, int]:
     """Return the one column of each quantity and flag; `named` gives the file's own names."""
     # Numbers of frames and points help where they are there, clear, and of use.
     unclear = {key for key in ("frame", "id") if not _numbers(layout, key)}
-    unclear |= {"id"} if options.quantities != PLACES else set()
+    unclear |= {"id"} if options.quantities != frames.PLACES else set()
     found = {key: where for key, where in layout.columns.items() if key not in unclear}
     columns = {key: _one(path, layout, key, where, named) for key, where in found.items()}
-    if options.quantities == PLACES and not {*QUANTITIES} & {*columns}:
-        columns |= {q: columns.pop(f"{q} deformed") for q in PLACES if f"{q} deformed" in columns}
+    if options.quantities == frames.PLACES and not {*frames.QUANTITIES} & {*columns}:
+        columns |= {
+            q: columns.pop(f"{q} deformed") for q in frames.PLACES if f"{q} deformed" in columns
+        }
     planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
     for quantity in options.quantities:
         axis = quantity[-1]
@@ -240,7 +221,7 @@ def _numbers(layout: TextLayout, key: str) -> bool:
     """Return whether one column is of this kind, and begins with a number, no name."""
     where = layout.columns.get(key, ())
     row = cells_of(layout.body[0][1], layout.separator) or []
-    return len(where) == 1 and where[0] < len(row) and is_number(row[where[0]])
+    return len(where) == 1 and where[0] < len(row) and tables.is_number(row[where[0]])
 
 
 #: Flags in words, in small letters.
@@ -273,7 +254,9 @@ def _quick(
         if counts == {width} and any(not text.rstrip().endswith(separator) for text in texts):
             return None
     wanted = sorted({*columns.values(), *(i for i, _ in flags)})
-    holes = [word for hole in HOLES for word in {hole, hole.upper(), hole.replace("nan", "NaN")}]
+    holes = [
+        word for hole in tables.HOLES for word in {hole, hole.upper(), hole.replace("nan", "NaN")}
+    ]
     try:
         table = pd.read_csv(
             StringIO("\n".join(texts)), header=None, sep=separator or r"\s+",
@@ -312,16 +295,16 @@ def _slow(
             problem = "a quotation mark that is opened and not closed"
             raise InputError(path, f"line {number}", problem)
         # Blanks leave no empty cells: a short row has lost its place.
-        check_row(path, number, row, width, layout.separator, "the header", short=True)
+        tables.check_row(path, number, row, width, layout.separator, "the header", short=True)
         rows.append((row + [""] * width)[:width])
     lines = np.array([number for number, _ in layout.body])
     # By position: names may appear twice where they are not asked for.
     cells = pd.DataFrame(rows, dtype=str)
 
-    def table(i: int, keep: NDArray[np.bool_]) -> tuple[TextTable, str]:
+    def table(i: int, keep: NDArray[np.bool_]) -> tuple[tables.TextTable, str]:
         name = layout.headings[i].name
         one = cells[[i]][keep].set_axis([name], axis=1)
-        return TextTable(path, one, lines[keep], layout.decimal), name
+        return tables.TextTable(path, one, lines[keep], layout.decimal), name
 
     def flag_of(i: int) -> Array:
         flag = np.asarray(cells[i].str.casefold().map(WORDS), dtype=float)
@@ -339,21 +322,23 @@ LEAST_ROWS = 3
 UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
 
 
-def text_reader(format: str, **settings: Any) -> Callable[[Path, FrameOptions], Sequence[Frame]]:
+def text_reader(
+    format: str, **settings: Any
+) -> Callable[[Path, frames.FrameOptions], Sequence[frames.Frame]]:
     """Return the reader of a format that is text; settings of `read_text_rows`."""
 
-    def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    def read(path: Path, options: frames.FrameOptions) -> Sequence[frames.Frame]:
         every = read_text_rows(path, options, **settings)
-        return [frame_of(rows, options, path, format) for rows in every]
+        return [frames.frame_of(rows, options, path, format) for rows in every]
 
     return read
 
 
 def read_text_rows(
-    path: Path, options: FrameOptions, *, comment: str | None = None, upper: bool = False,
+    path: Path, options: frames.FrameOptions, *, comment: str | None = None, upper: bool = False,
     camera_axes: bool = False, names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
-) -> list[FrameRows]:  # fmt: skip
+) -> list[frames.FrameRows]:  # fmt: skip
     """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
     names : the format's names, after the user's. status : a column of states, its good values.
@@ -376,8 +361,8 @@ def read_text_rows(
     )
     named = {key: heading.name for key, heading in headings.items()}
     units = {key: heading.unit for key, heading in headings.items() if heading.unit}
-    lost = {FLAGGED: int((~good).sum()), BELOW: layout.below}
-    whole = FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
+    lost = {frames.FLAGGED: int((~good).sum()), frames.BELOW: layout.below}
+    whole = frames.FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
     if frame is None:
         return [whole]
     every = np.unique(frame)

@@ -23,7 +23,6 @@ from .membrane.kernel import reference_elements
 if TYPE_CHECKING:
     import meshio
 
-#: Kinds of notes that are made here.
 EARLY = NoteKind("stopped early", mark=4)
 SNAP = NoteKind("snap", mark=2)
 
@@ -60,21 +59,15 @@ def instability(unstable: Sequence[str] | None) -> str:
 class History:
     """Results of an analysis that ended well, frame by frame.
 
-    load (frames,) pressure in MPa, or the force on a whole strip in N, and load_slope (frames,
-    parameters) its derivatives where the solver has them; displacement (frames, nodes, 3) mm;
-    reactions by named set (frames, 3) N; strain_min, strain_max (3,) extremes of (eps1, eps2,
-    gamma12) log strain; cavity pressure (MPa) and volume (mm^3), (frames,), where there is a
-    cavity; path: displacement at every increment (increments, nodes, 3) and its derivatives
-    path_slope (..., parameters), where the solver keeps them (a start for the next run); unstable:
-    reported loads with an unstable equilibrium, in words ("132 kPa"), empty where all are stable,
-    None where the solver did not look; wrinkled: share of the reference surface that carries no
-    stress in one direction (frames,), None likewise; iterations: the solver's count of its work;
-    remarks: notes for the reader (plain words are of the kind "of the solver"); early: the solver's
-    reason for an end before the model's last frame (no equilibrium further on), "" where there is
-    none: fewer frames without it are no result; seconds of the run itself, where a cache keeps
-    them; from_cache: whether it was made earlier and nothing ran now; relaxed: the wall wrinkled as
-    a tension field; model, law: what was run, which `simulate` and `Fit.history` add and the
-    methods below need.
+    load (frames,) pressure in MPa, or force on a whole strip in N; load_slope (frames, parameters)
+    its derivatives; displacement (frames, nodes, 3) mm; reactions by named set (frames, 3) N;
+    strain_min, strain_max (3,) of (eps1, eps2, gamma12); cavity pressure (MPa) and volume (mm^3),
+    (frames,); path: displacement at every increment and its derivatives path_slope (...,
+    parameters), a start for the next run; unstable: loads with an unstable equilibrium, in words
+    ("132 kPa"), None where nobody looked; wrinkled: share of the surface without stress in one
+    direction (frames,), or None; iterations: the solver's count; early: the reason for an end
+    before the last frame: fewer frames without it are no result; seconds, from_cache: of a cache;
+    relaxed: wrinkled as a tension field; model, law: what was run, as `simulate` adds.
     """
 
     load: Array
@@ -114,8 +107,7 @@ class History:
     def strain(self, at: Places = "elements") -> Array:
         """Return log strain (eps1, eps2, gamma12) since the sheet was without stress.
 
-        (frames, elements, 3) in the middle of each element, (frames, elements, 4, 3) at its Gauss
-        points, where strain_min and strain_max are taken. InputError : other places.
+        (frames, elements, 3) in the middles, or (frames, elements, 4, 3) at the Gauss points.
         """
         return np.array([self._strained(u, at) for u in self.displacement])
 
@@ -195,11 +187,9 @@ class SolverCheck:
 class Diagnosis:
     """One solver on this machine, with the result of the published bars.
 
-    external_materials: whether it can load material libraries (None: embedded, a plug-in, or
-    unknown). stresses: end stresses of the bars (MPa) in the order of `bars.BARS`, difference: the
-    largest relative one from Marc's; None where the bars did not run. expected: somebody chose this
-    solver, so it has to work. advice: one line, what to do or what was not tried. remark: a few
-    more words.
+    external_materials: whether it loads material libraries (None: unknown). stresses, difference:
+    of `bars.BARS` (MPa), and the largest relative one from Marc's; None where they did not run.
+    expected: somebody chose it. advice: what to do, or what was not tried.
     """
 
     name: str
@@ -225,10 +215,9 @@ class Progress(Protocol):
 
 @runtime_checkable
 class Solver(Protocol):
-    """A way to run a model; picked by name in `registry`.
+    """A way to run a model, `name` in `registry`; progress : called with every increment done.
 
-    name : in project files and of --solver. external : whether it runs in a process of its own and
-    is checked before anything is run with it. progress : called with every increment that is done.
+    external : runs in a process of its own, and is checked before anything is run with it.
     """
 
     name: str

@@ -15,7 +15,16 @@ import jinja2
 import jinja2.meta
 
 from ..errors import InputError
-from ..files import LARGEST_WRITTEN, ROOT, TEMPLATES, checksum, content_of, environment, is_file
+from ..files import (
+    LARGEST_WRITTEN,
+    ROOT,
+    TEMPLATES,
+    checksum,
+    content_of,
+    environment,
+    is_file,
+    reading,
+)
 
 #: Names of another file in a deck: a line INCLUDE (Marc), a value of a keyword's line (CalculiX).
 _INCLUDE = re.compile(r"^\s*include\b\s*(?P<file>.*)", re.IGNORECASE)
@@ -117,10 +126,8 @@ def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | 
     if wanted not in files:
         return None
     path = files[wanted]
-    try:
+    with reading(path):
         text = content_of(path, LARGEST_WRITTEN).decode("utf-8").replace("\r\n", "\n")
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     # The next block begins on a line of its own.
     return text if text.endswith("\n") else text + "\n", str(path), None
 
@@ -155,10 +162,8 @@ def templates_mark(folder: Path | None) -> str:
 
 def program_mark(path: Path) -> str:
     """Return the SHA-256 of a program's content, of a script's own text; InputError if unread."""
-    try:
+    with reading(path):
         about = path.stat()
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
     return _program_mark(path, about.st_mtime_ns, about.st_size, about.st_ino)
 
 
@@ -186,11 +191,11 @@ def code_mark(module: str) -> str:
 
 def _included(template: Path) -> list[Path]:
     """Return the files that a template names in full; its mistakes are left to the run."""
+    with reading(template):
+        content = template.read_bytes()
     try:
-        tree = environment(jinja2.BaseLoader()).parse(template.read_bytes().decode("utf-8"))
+        tree = environment(jinja2.BaseLoader()).parse(content.decode("utf-8"))
     except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
-    except OSError as error:
-        raise InputError(template, "", f"cannot be read: {error.strerror}") from None
     found = jinja2.meta.find_referenced_templates(tree)
     return [Path(name) for name in found if name is not None]

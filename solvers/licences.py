@@ -25,15 +25,7 @@ from filelock import lock_descriptor
 
 from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
 from ..materials.law import HypoelasticLaw
-from .base import (
-    BandedSolver,
-    DifferentiatingSolver,
-    History,
-    Solver,
-    WrappedBand,
-    WrappedSolver,
-    announce,
-)  # fmt: skip
+from . import base
 from .process import CONNECT_S, check_wanted, dask, kept_open
 from .scratch import remove
 from .settings import SCHEDULER, LicenceSettings, licence_settings
@@ -50,14 +42,14 @@ SOON_S, LATER_S, LOOK_S = 0.02, 1.0, 1.0
 _clients: dict[tuple[str, int], Any] = {}
 
 
-def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
+def licensed(solver: base.Solver, name: str, given: Mapping[str, Any]) -> base.Solver:
     """Return the solver with a licence for every run (itself if none matters); name : of these."""
     plain = {key: value for key, value in given.items() if key != SCHEDULER}
     settings = licence_settings(name, plain)
     if not solver.external or (settings.licences is None and settings.wait <= 0):
         return solver
     # The wrapper has the further methods of the solver within, and no others.
-    protocols = ((_Slopes, DifferentiatingSolver), (WrappedBand, BandedSolver))
+    protocols = ((_Slopes, base.DifferentiatingSolver), (base.WrappedBand, base.BandedSolver))
     more: list[type] = [part for part, protocol in protocols if isinstance(solver, protocol)]
     # Not by a call: where there is no program that is an error, of the run.
     if inspect.getattr_static(solver, "programs", None) is not None:
@@ -65,15 +57,15 @@ def licensed(solver: Solver, name: str, given: Mapping[str, Any]) -> Solver:
     # A cache of runs needs the module of the solver's code.
     own = {"__module__": type(solver).__module__}
     kind: Any = type("LicensedSolver", (LicensedSolver, *more), own)
-    made: Solver = kind(solver, settings, given.get(SCHEDULER))
+    made: base.Solver = kind(solver, settings, given.get(SCHEDULER))
     return made
 
 
-class LicensedSolver(WrappedSolver):
+class LicensedSolver(base.WrappedSolver):
     """A solver that runs only with a licence; scheduler : the address of Dask that counts too."""
 
     def __init__(
-        self, solver: Solver, settings: LicenceSettings, scheduler: str | None = None
+        self, solver: base.Solver, settings: LicenceSettings, scheduler: str | None = None
     ) -> None:
         super().__init__(solver)
         self.licences, self.scheduler = settings, scheduler
@@ -81,7 +73,7 @@ class LicensedSolver(WrappedSolver):
     def run(
         self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None, **more: Any,
-    ) -> History:  # fmt: skip
+    ) -> base.History:  # fmt: skip
         """Run the model with a licence; raises as the solver, and as `held`."""
         return self._with_one(lambda: self.solver.run(model, law, scratch, timeout, **more))
 
@@ -124,7 +116,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
         nonlocal said
         check_wanted()
         if not said:
-            announce(f"waiting for a licence of {name}", me)
+            base.announce(f"waiting for a licence of {name}", me)
         said = True
 
     folder = settings.licence_folder
@@ -137,7 +129,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
                 stack.enter_context(leased(name, settings.licences, scheduler, waiting))
         finally:
             if said:
-                announce("", me)
+                base.announce("", me)
         stack.enter_context(kept_open(file))
         yield
 
@@ -165,7 +157,9 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
         if scratch is not None:
             remove(scratch)  # only that of the last try is kept
         seconds = min(pause * random.uniform(0.5, 1.5), left)  # noqa: S311 (no secret)
-        announce(f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most")
+        base.announce(
+            f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
+        )
         time.sleep(seconds)
         pause, tries = min(GROWTH * pause, MOST * settings.licence_retry), tries + 1
 

@@ -26,16 +26,7 @@ import numpy as np
 from ..errors import BubblefitError, Note, NoteKind, OutputError, as_note
 from ..files import __version__, cache_folder, write_text
 from ..materials.law import HypoelasticLaw
-from .base import (
-    BandedSolver,
-    DifferentiatingSolver,
-    History,
-    ProgramSolver,
-    Solver,
-    WrappedBand,
-    WrappedSolver,
-    announce,
-)  # fmt: skip
+from . import base
 from .decks import code_mark, program_mark
 
 log = logging.getLogger(__name__)
@@ -124,7 +115,7 @@ class RunCache:
         write_text(self.folder / LIMIT_FILE, f"{limit}\n")
         self.prune(limit)
 
-    def read(self, key: str) -> History | None:
+    def read(self, key: str) -> base.History | None:
         """Return the run under this key, or None; drop a damaged one with an announcement."""
         path = self._file(key)
         try:
@@ -133,7 +124,7 @@ class RunCache:
             return None
         except (Damaged, OSError) as error:
             why = error.strerror if isinstance(error, OSError) else str(error)
-            announce(f"{path} is dropped from the cache of runs and run again: {why}")
+            base.announce(f"{path} is dropped from the cache of runs and run again: {why}")
             with suppress(OSError):
                 path.unlink()
             return None
@@ -141,7 +132,7 @@ class RunCache:
             os.utime(path)
         return history
 
-    def write(self, key: str, history: History, seconds: float) -> None:
+    def write(self, key: str, history: base.History, seconds: float) -> None:
         """Keep a run that took so many seconds; warn once where that cannot be."""
         try:
             content = to_bytes(history, key, seconds)
@@ -244,12 +235,12 @@ class Damaged(ValueError):
     """Bytes that are not those that were written."""
 
 
-def to_bytes(history: History, key: str, seconds: float) -> bytes:
+def to_bytes(history: base.History, key: str, seconds: float) -> bytes:
     """Return history, key and seconds behind a checksum; ValueError, TypeError: not to be kept."""
-    if type(history) is not History:
+    if type(history) is not base.History:
         raise TypeError(f"{type(history).__name__} is not a History")
     arrays: dict[str, Any] = {}
-    for name in (field.name for field in fields(History)):
+    for name in (field.name for field in fields(base.History)):
         value = getattr(history, name)
         if name in WORDS or name in NOT_WRITTEN or value is None:
             continue
@@ -270,7 +261,7 @@ def to_bytes(history: History, key: str, seconds: float) -> bytes:
     return TITLE + hashlib.sha256(whole).digest() + whole
 
 
-def from_bytes(content: bytes, key: str) -> History:
+def from_bytes(content: bytes, key: str) -> base.History:
     """Return the history that `to_bytes` wrote under this key; Damaged : says which."""
     start = len(TITLE) + hashlib.sha256().digest_size
     if not content.startswith(TITLE):
@@ -291,7 +282,7 @@ def from_bytes(content: bytes, key: str) -> History:
             for name in list(there)
             if name.startswith("reactions of ")
         }
-        return History(
+        return base.History(
             **there, reactions=reactions, iterations=int(words["iterations"]),
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
@@ -314,16 +305,16 @@ def _numbers(value: Any, name: str) -> Any:
 # A solver that looks into a cache before it runs
 
 
-def with_cache(solver: Solver, cache: RunCache, options: Mapping[str, Any]) -> Solver:
+def with_cache(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
     """Return the solver with a cache before it; as it is if embedded, differentiating or `keep`."""
-    embedded = not solver.external or isinstance(solver, DifferentiatingSolver)
+    embedded = not solver.external or isinstance(solver, base.DifferentiatingSolver)
     if embedded or getattr(solver, "keep", False):
         return solver
-    kind = BandedOnce if isinstance(solver, BandedSolver) else Once
+    kind = BandedOnce if isinstance(solver, base.BandedSolver) else Once
     return kind(solver, cache, options)
 
 
-class Once(WrappedSolver):
+class Once(base.WrappedSolver):
     """A solver that looks into a cache first; runs that fail are not kept, nor their cause."""
 
     def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
@@ -333,7 +324,7 @@ class Once(WrappedSolver):
     def run(
         self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:  # fmt: skip
+    ) -> base.History:  # fmt: skip
         """Return the run from the cache (`History.from_cache`); else run and keep it."""
         key = self.key(model, law)
         history = None if key is None else self.cache.read(key)
@@ -342,8 +333,8 @@ class Once(WrappedSolver):
         given = {"scratch": scratch, "timeout": timeout}
         said = {name: value for name, value in given.items() if value is not None}
         begun = time.perf_counter()
-        ended: History = self.solver.run(model, law, **said)
-        if key is not None and isinstance(ended, History):
+        ended: base.History = self.solver.run(model, law, **said)
+        if key is not None and isinstance(ended, base.History):
             seconds = time.perf_counter() - begun
             self.cache.write(key, ended, seconds)
             ended = replace(ended, seconds=seconds)
@@ -352,7 +343,7 @@ class Once(WrappedSolver):
     def key(self, model: Any, law: HypoelasticLaw) -> str | None:
         """Return the digest of all that the result depends on; None where that is not known."""
         try:
-            files = self.solver.programs if isinstance(self.solver, ProgramSolver) else ()
+            files = self.solver.programs if isinstance(self.solver, base.ProgramSolver) else ()
             program = [program_mark(path) for path in files]
             code = code_mark(type(self.solver).__module__)
             own = (self.name, self.solver.identity, dict(self.options), program, code)
@@ -362,5 +353,5 @@ class Once(WrappedSolver):
             return None
 
 
-class BandedOnce(WrappedBand, Once):
+class BandedOnce(base.WrappedBand, Once):
     """A solver with bands that looks into a cache before it runs."""

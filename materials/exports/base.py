@@ -27,7 +27,6 @@ from ..responses import (
     uniaxial_curve,
 )
 
-#: Kinds of notes that are made here.
 LOSES = NoteKind("loses")
 CONFIRM = NoteKind("to confirm")
 
@@ -277,9 +276,8 @@ BIAXIAL, INCREMENTS = 0.05, 50
 class FabricCurves:
     """Strain and stress (MPa), (n, 2), of warp, fill and shear (odd, from zero) in one measure.
 
-    Left out: yarns, the largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone;
-    softer, the share of the stress missing along warp and fill when both have the log strain
-    biaxial.
+    yarns : largest 2nd Piola-Kirchhoff stress (MPa) along a yarn in shear alone. softer : share of
+    the stress missing along warp and fill where both have the log strain biaxial.
     """
 
     warp: Array

@@ -10,18 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import InputError
+from .. import designers
 from ..card import MaterialCard
-from ..designers import (
-    RATIOS,
-    STEPS,
-    Evaluation,
-    LawConstants,
-    Options,
-    constants_of_law,
-    row_of,
-    shares,
-    spread_of,
-)
 from ..forms.base import UNLIMITED
 from ..responses import biaxial_response, largest_load
 from .base import Export, Format, Says, heading, option
@@ -75,7 +65,7 @@ class Linear:
     """A card as constants, with the loads (kN/m) and the shear strain they are of."""
 
     card: MaterialCard
-    found: LawConstants
+    found: designers.LawConstants
     lowest: float
     highest: float
     shear: float
@@ -91,7 +81,7 @@ class Linear:
             )
         spread = ", ".join(
             f"{NAMES[name]} {low:.4g} to {high:.4g}"
-            for name, (low, high) in spread_of(evaluations(self)).items()
+            for name, (low, high) in designers.spread_of(evaluations(self)).items()
         )
         lost = ", ".join(f"{name} {rms:.3g} of {found.largest[name]:.3g} %"
                          for name, rms in found.lost.items())  # fmt: skip
@@ -126,8 +116,8 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
     if shear is None:
         end = float(law.strain_range[2])
         shear = end if SHEARED <= end < UNLIMITED else SHEAR
-    chosen = Options(options.paths == "10", True, options.minimise)
-    found = constants_of_law(law, thickness, options.lowest, highest, shear, chosen)
+    chosen = designers.Options(options.paths == "10", True, options.minimise)
+    found = designers.constants_of_law(law, thickness, options.lowest, highest, shear, chosen)
     c = found.constants
     if not c.nu_warp * c.nu_fill < 1:
         problem = (
@@ -138,7 +128,7 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
     return Linear(card, found, options.lowest, highest, shear)
 
 
-def evaluations(linear: Linear) -> list[Evaluation]:
+def evaluations(linear: Linear) -> list[designers.Evaluation]:
     return [linear.found.evaluation, *linear.found.others]
 
 
@@ -147,7 +137,9 @@ def _end_of_range(card: MaterialCard) -> float:
     if not (ends < UNLIMITED).all():
         problem = "the card does not say how far its strains hold (valid_strain): give --highest"
         raise InputError(None, "--highest", problem)
-    return largest_load(card.law, card.thickness, [shares(ratio) for ratio in RATIOS], ends)
+    return largest_load(
+        card.law, card.thickness, [designers.shares(ratio) for ratio in designers.RATIOS], ends
+    )
 
 
 WHICH_NU = (
@@ -176,7 +168,7 @@ def _sheet(
     if None in loads:
         loses += ("prestress: a card has none (--prestress-warp, --prestress-fill)",)
     else:
-        path = np.linspace(0.0, 1.0, STEPS + 1)[1:, None] * np.array(loads, dtype=float)
+        path = np.linspace(0.0, 1.0, designers.STEPS + 1)[1:, None] * np.array(loads, dtype=float)
         found = biaxial_response(card.law, path, card.thickness)
         if found.reached < len(path):
             problem = "the law does not carry it: choose a lower prestress"
@@ -244,7 +236,7 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
         row = {
             "chosen": "yes" if number == 0 else "",
             "G_kN_per_m": linear.found.constants.shear,
-            **row_of(one),
+            **designers.row_of(one),
         }
         rows.append(",".join(_text(row[name]) for name in COLUMNS))
     meaning = (

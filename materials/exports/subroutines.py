@@ -51,10 +51,9 @@ def hypela2_source(
     laws: Mapping[int, HypoelasticLaw], head: str = "! MSC Marc user subroutine HYPELA2",
     own_state: bool = True, symmetric: bool = True
 ) -> str:  # fmt: skip
-    """Return Fortran source, good as fixed and as free form; laws by MATUS(1), one for all numbers.
+    """Return Fortran source, fixed and free form; laws by MATUS(1), one for all numbers.
 
-    own_state : strain and stress at the start from state variables, else from Marc's e and s.
-    symmetric : hand over the symmetric part of the tangent, as Marc's default solver needs.
+    own_state : start from state variables, else Marc's. symmetric : part of the tangent only.
     """
     written: list[dict[str, Any]] = [
         {

@@ -1,16 +1,12 @@
 """Solution files of DICe: lines of `***`, a row of names, SIGMA and STATUS_FLAG.
 
     *** Digital Image Correlation Engine (DICe), Copyright 2014 Sandia Corporation
-    SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y,SIGMA,STATUS_FLAG,
-        MODEL_COORDINATES_X,MODEL_COORDINATES_Y,MODEL_COORDINATES_Z,
-        MODEL_DISPLACEMENT_X,MODEL_DISPLACEMENT_Y,MODEL_DISPLACEMENT_Z
+SUBSET_ID,COORDINATE_X,...,SIGMA,STATUS_FLAG,MODEL_COORDINATES_X,...,MODEL_DISPLACEMENT_X,...
 
-Source: DICe's own source (DICe_Schema.cpp writes these lines; DICe.h numbers the states, of which
-those that failed are left out; sigma is -1 where correlation failed) and public scripts that add
-MODEL_DISPLACEMENT to MODEL_COORDINATES for the deformed state. COORDINATE_X is in pixels and only
-read where it is named. The header says that y points down; that z of the model points away from
-the camera could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the unit of the
-calibration, mm unless `length_unit` says otherwise.
+Source: DICe's own (DICe_Schema.cpp; DICe.h numbers the states, of which those that failed are left
+out; sigma is -1 where correlation failed) and public scripts that add MODEL_DISPLACEMENT to
+MODEL_COORDINATES. COORDINATE_X is in pixels; y points down; that z points away from the camera
+could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the calibration's unit.
 """
 
 from __future__ import annotations

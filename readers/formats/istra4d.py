@@ -1,10 +1,7 @@
-"""HDF5 exports of Dantec Dynamics Istra4D: a frame a file, places and displacements on a grid.
+"""HDF5 exports of Dantec Istra4D: coordinates/coordinate_x, mask, displacements/displacement_x.
 
-    coordinates/coordinate_x, _y, _z, mask; displacements/displacement_x, _y, _z
-
-Source: the public reader istra2py of the planar export (these names; its plots take the coordinates
-of a later step for the deformed state; mask is 0 and coordinates are zero where correlation was
-lost). The third components are named alike by inference. The unit is not in the file: mm unless
+Source: the public reader istra2py of the planar export (coordinates of the deformed state; mask is
+0 where correlation was lost). The third components are named alike by inference. Unit: mm unless
 `length_unit` says otherwise.
 """
 

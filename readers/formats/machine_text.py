@@ -18,34 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from .. import tables
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
-from ..tables import (
-    DIRECTION_ALIASES,
-    HOLES,
-    LENGTH_UNITS,
-    LOAD_UNITS,
-    MOST_NAMES,
-    OTHER_NAMES,
-    TIME_UNITS,
-    TextTable,
-    check_row,
-    check_width,
-    columns_of,
-    decimal_mark,
-    has_statistic,
-    is_number,
-    is_stamp,
-    nearest_to_strip,
-    plain_unit,
-    read_lines,
-    split_unit,
-)
 
 #: Line number from 1 and cells.
 Rows = list[tuple[int, list[str]]]
 SEPARATORS = ("\t", ";", ",")
-UNITS = {*LENGTH_UNITS, *LOAD_UNITS, *TIME_UNITS, *OTHER_NAMES}
+UNITS = {*tables.LENGTH_UNITS, *tables.LOAD_UNITS, *tables.TIME_UNITS, *tables.OTHER_NAMES}
 #: Rows between the names and the first numbers: units, and sometimes channels or types.
 BETWEEN = 2
 _LETTERS = re.compile(r"[^\W\d_]")
@@ -80,9 +60,9 @@ def _names_all(
     names: list[str], named: Mapping[str, str], quantities: Sequence[str]
 ) -> list[list[int]]:
     """Return the columns of each quantity; none where one has no column of its own."""
-    if len(names) > MOST_NAMES:
+    if len(names) > tables.MOST_NAMES:
         return []
-    columns = [columns_of(names, quantity, named) for quantity in quantities]
+    columns = [tables.columns_of(names, quantity, named) for quantity in quantities]
     # A sentence that speaks of load and extension is one cell, and no header.
     several = all(columns) and len(set().union(*columns)) >= len(quantities)
     return columns if several else []
@@ -126,8 +106,8 @@ def find_blocks(
     blocks: dict[tuple[str, ...], list[Block]] = {}
     for head, end in pairwise(heads):
         line, names = rows[head]
-        needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
-        units, body = {name: split_unit(name)[1] for name in names}, head + 1
+        needed = [i for quantity in quantities for i in tables.columns_of(names, quantity, named)]
+        units, body = {name: tables.split_unit(name)[1] for name in names}, head + 1
         below = rows[body][1] if body < end else []
         letters = any(_LETTERS.search(below[i]) for i in needed if i < len(below))
         if letters and not any(_is_number(below, i) for i in needed):
@@ -155,7 +135,7 @@ def find_blocks(
 
 
 def _units_in(row: list[str]) -> list[str]:
-    return [plain_unit(cell.strip("()[]<>{} ")) for cell in row]
+    return [tables.plain_unit(cell.strip("()[]<>{} ")) for cell in row]
 
 
 def _is_number(row: list[str], column: int) -> bool:
@@ -176,11 +156,11 @@ def _count_of_readings(rows: Rows) -> int:
 
 def _is_summary(row: list[str], first: list[str]) -> bool:
     """Return whether a row has a word where the `first` row of numbers has one of them."""
-    if has_statistic(row) and not has_statistic(first):
+    if tables.has_statistic(row) and not tables.has_statistic(first):
         return True
     at = next(i for i, cell in enumerate(row) if cell)
     cell = row[at]
-    word = _LETTERS.search(cell) and not is_reading(cell) and cell.casefold() not in HOLES
+    word = _LETTERS.search(cell) and not is_reading(cell) and cell.casefold() not in tables.HOLES
     # One letter and nothing else is a slip of a reading.
     word = word and (len(cell) > 1 or any(row[at + 1 :]))
     return bool(word) and at < len(first) and (is_reading(first[at]) or not first[at])
@@ -188,7 +168,7 @@ def _is_summary(row: list[str], first: list[str]) -> bool:
 
 def is_reading(cell: str) -> bool:
     """Return whether a cell holds a number or a time of a wall clock."""
-    return is_number(cell) or is_stamp(cell)
+    return tables.is_number(cell) or tables.is_stamp(cell)
 
 
 def nothing_found(
@@ -200,7 +180,7 @@ def nothing_found(
     for index, ((number, text), (_, below)) in enumerate(pairwise(lines)):
         for separator in SEPARATORS:
             names, row = cells_of(text, separator), cells_of(below, separator)
-            if sum(map(is_number, row)) >= 2:
+            if sum(map(tables.is_number, row)) >= 2:
                 higher = cells_of(lines[index - 1][1], separator) if index else []
                 # Names stand above their units.
                 if len(higher) == len(names) and any(c in UNITS for c in _units_in(names)):
@@ -213,7 +193,7 @@ def nothing_found(
 def read(path: Path, options: TableOptions) -> MachineTable:
     """Read the first table with all quantities asked for; InputError: none, or in doubt."""
     named, quantities = options.columns, options.quantities
-    lines = read_lines(path, options.comment, any_encoding=True)
+    lines = tables.read_lines(path, options.comment, any_encoding=True)
     found: list[tuple[int, Rows, int, str]] = []
     for separator in (*SEPARATORS, " "):
         if found and separator == " ":
@@ -245,8 +225,8 @@ def table_of(
     for number, row in rest:
         blanks = separator == " "
         own = None if blanks else separator
-        check_row(path, number, row, width, own, f"line {header}", short=blanks)
-    check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
+        tables.check_row(path, number, row, width, own, f"line {header}", short=blanks)
+    tables.check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
     rest = [(number, (row + [""] * width)[:width]) for number, row in rest]
     above = dict(rows).get(max((n for n, _ in rows if n < header), default=0), [])
     names, rest, notes = _stacked(path, several[0], names, rest, above, options)
@@ -270,10 +250,10 @@ def table_of(
         if gone
     )
     cells = pd.DataFrame([row for _, row in rest], columns=names)
-    needed = [i for quantity in quantities for i in columns_of(names, quantity, named)]
+    needed = [i for quantity in quantities for i in tables.columns_of(names, quantity, named)]
     numbers = [(n, names[i], row[i]) for n, row in rest for i in needed if i < len(row)]
-    decimal = options.decimal or decimal_mark(path, numbers)
-    table = TextTable(path, cells, np.array([number for number, _ in rest]), decimal)
+    decimal = options.decimal or tables.decimal_mark(path, numbers)
+    table = tables.TextTable(path, cells, np.array([number for number, _ in rest]), decimal)
     others = [str(one.line) for several in blocks.values() for one in several]
     note = (
         f"{path.name}: the table with its names in line {header}, which has most rows, is read; not"
@@ -286,17 +266,19 @@ def _without_holes(rows: Rows, names: list[str], options: TableOptions) -> tuple
     """Return rows without those of lost readings, and the lines of these; all if most are."""
     needed: list[int] = []
     for quantity in options.quantities:
-        which = columns_of(names, quantity, options.columns)
+        which = tables.columns_of(names, quantity, options.columns)
         near = quantity == "elongation" and quantity not in options.columns
-        needed += nearest_to_strip(names, which) if near else which
-    lost = [n for n, row in rows if any(row[i] and row[i].casefold() in HOLES for i in needed)]
+        needed += tables.nearest_to_strip(names, which) if near else which
+    lost = [
+        n for n, row in rows if any(row[i] and row[i].casefold() in tables.HOLES for i in needed)
+    ]
     gone = {*lost} if 2 * len(lost) <= len(rows) else set()
     return [one for one in rows if one[0] not in gone], sorted(gone)
 
 
 def _plain(name: str) -> str:
     """Return a name without its unit and numbers: that of the same column of another specimen."""
-    return re.sub(r"[\W\d_]+", " ", split_unit(name)[0].casefold()).strip()
+    return re.sub(r"[\W\d_]+", " ", tables.split_unit(name)[0].casefold()).strip()
 
 
 def _stacked(
@@ -304,7 +286,7 @@ def _stacked(
     options: TableOptions,
 ) -> tuple[list[str], Rows, tuple[str, ...]]:  # fmt: skip
     """Return names, rows, note of specimens side by side as if below each other; above : titles."""
-    loads = columns_of(names, "load", options.columns)
+    loads = tables.columns_of(names, "load", options.columns)
     apart = {b - a for a, b in pairwise(loads)}
     if "elongation" not in options.quantities or len(apart) != 1:
         return names, rows, ()
@@ -314,7 +296,7 @@ def _stacked(
         groups = [range(first + k * wide, first + (k + 1) * wide) for k in range(count)]
         own = padded[first : first + wide]
         alike = len({tuple(_plain(padded[i]) for i in group) for group in groups}) == 1
-        if alike and all(columns_of(own, q, options.columns) for q in options.quantities):
+        if alike and all(tables.columns_of(own, q, options.columns) for q in options.quantities):
             break
     else:
         return names, rows, ()
@@ -332,7 +314,7 @@ def _stacked(
         for number, row in rows
         if any(own := [*row, *[""] * wide][group.start : group.stop])
     ]
-    ways = {re.sub(r"[\W_]+", "", one.casefold()) for one in labels} <= {*DIRECTION_ALIASES}
+    ways = {re.sub(r"[\W_]+", "", one.casefold()) for one in labels} <= {*tables.DIRECTION_ALIASES}
     what = "direction" if ways else "specimen"
     block.units.update({"": "", what: ""})
     note = f"{path.name}: {count} {what}s side by side are read: {', '.join(labels)}"

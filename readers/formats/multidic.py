@@ -1,9 +1,8 @@
 """MAT-files of MultiDIC and DuoDIC, which make stereo correlation of Ncorr's planar one.
 
-Source: a public script that fills their `DIC3DPPresults` from other exports: for each frame a cell
-of Points3D (n, 3), Disp.DispVec (n, 3) and corrComb. That Points3D are the places in the frame (so
-that the reference is these less the displacement) is MultiDIC's own use of them; the unit is that
-of the calibration, mm unless `length_unit` says otherwise.
+Source: a public script that fills their `DIC3DPPresults`: for each frame a cell of Points3D (n, 3),
+places in the frame as MultiDIC uses them, Disp.DispVec (n, 3) and corrComb, in the calibration's
+unit, mm unless `length_unit` says otherwise.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """MAT-files of Ncorr, a planar correlation: displacements u, v on a grid of pixels.
 
-Source: the public reader of Ncorr's results in MultiDIC (`data_dic_save.displacements(i)` with
-plot_u_ref_formatted, plot_v_ref_formatted and plot_corrcoef_dic, which are zero outside the region
-of interest; grid points are `dispinfo.spacing` + 1 pixels apart) and scripts that read the HDF5 of
-version 7.3. `dispinfo.pixtounits` is one pixel in `dispinfo.units`, in which the formatted
-displacements are; rows count downwards. There is no dz: a bubble needs stereo correlation
-(`multidic`, which builds it from Ncorr), a strain gauge does not.
+Source: MultiDIC's public reader of Ncorr (`data_dic_save.displacements(i)`: plot_u_ref_formatted,
+plot_v_ref_formatted, plot_corrcoef_dic, zero outside the region of interest; grid points are
+`dispinfo.spacing` + 1 pixels apart, `dispinfo.pixtounits` is a pixel in `dispinfo.units`) and
+scripts on version 7.3. Rows count downwards. There is no dz: a bubble needs `multidic`.
 """
 
 from __future__ import annotations

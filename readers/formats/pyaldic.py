@@ -22,6 +22,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ...errors import InputError
+from ...files import reading
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
 from ..mat_files import is_mat, read_variables, variable_names
 from ..registry import Format, register_format
@@ -88,11 +89,8 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read all frames of a file."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(128)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from None
+    with reading(path), path.open("rb") as file:
+        head = file.read(128)
     if not head.startswith(SIGNATURE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
         every = read_text_rows(path, deformed, camera_axes=True)

@@ -1,13 +1,10 @@
 """Tecplot's text files (.dat), as LaVision DaVis and others export them: a frame a zone.
 
     VARIABLES = "x[mm]" "y[mm]" "z[mm]" "Vx[mm]" "Vy[mm]" "Vz[mm]" "isValid"
-    ZONE T="Frame 0" I=2, J=1, K=1, F=POINT
 
-Source: a public reader of DaVis' snapshots with such a header (`DATAPACKING = POINT`), and the
-format guide of Tecplot: variables in quotation marks or not, numbers in any number of lines, POINT
-(a row a point) or BLOCK (a variable after the other). That DaVis calls the components of a
-displacement Vx, Vy, Vz is inferred from its velocities: they are displacements where their unit is
-a length. Other zones than those of ordered or scattered points (finite elements) are refused.
+Source: a public reader of DaVis' snapshots (`DATAPACKING = POINT`) and Tecplot's format guide:
+POINT (a row a point) or BLOCK (a variable after the other). Vx, Vy, Vz are inferred to be
+displacements where their unit is a length. Finite elements' zones are refused.
 """
 
 from __future__ import annotations

@@ -34,7 +34,6 @@ from .frd import FrdFile
 from .library import MATERIAL, STATE_VARIABLES, constants
 from .sheets import NEAR, whole_times
 
-#: Kinds of notes that are made here.
 GAS = NoteKind("gas")
 
 Array = NDArray[np.float64]

@@ -21,7 +21,6 @@ from ...meshes.mesh import Mesh
 from ..decks import render
 from .library import MATERIAL, STATE_VARIABLES
 
-#: Kinds of notes that are made here.
 TILT = NoteKind("tilted sheet")
 
 Element = Literal["S4", "S8R"]
@@ -133,8 +132,7 @@ class Run(Protocol):
 
 @dataclass(frozen=True)
 class Setup:
-    """The settings of decks: element "S8R" or "S4", the user's templates, shells of a mesh of
-    quads."""
+    """Settings of decks: element "S8R" or "S4", the user's templates, shells of a mesh."""
 
     element: str
     templates: Path | None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import suppress
@@ -119,10 +120,8 @@ def _places(named: Path | str | None) -> Iterator[tuple[Path, str]]:
 def _program(path: Path | str, field: str) -> Path:
     """Return the path of a program that somebody named; a bare name is looked up on the PATH."""
     given = Path(os.path.expanduser(path))
-    if os.sep not in str(path):
-        for folder in os.environ.get("PATH", "").split(os.pathsep):
-            if folder and _runs(Path(folder) / given):
-                return Path(folder) / given
+    if os.sep not in str(path) and (found := shutil.which(given)):
+        return Path(found)
     if not given.is_file():
         raise InputError(given, field, "there is no such file; name the ccx to run")
     if not _runs(given):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import reading
 
 Array = NDArray[np.float64]
 SHORT, LONG, FLOAT, DOUBLE = range(4)
@@ -59,10 +60,8 @@ class FrdFile:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        try:
+        with reading(self.path):
             self._data = self.path.read_bytes()
-        except OSError as error:
-            raise InputError(self.path, "", f"cannot be read: {error.strerror}") from None
         self._at = self._held = 0
         self.mesh = self._header()
         self._first = self._at

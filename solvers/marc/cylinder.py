@@ -19,7 +19,6 @@ from .deck import Run, deck_text, fabric_context, fixed, node_sets, supports, ti
 from .settings import MarcSettings
 from .sheets import NO_FORCES, REACTION, by_time, displacements, pressure_context, whole_times
 
-#: Kinds of notes that are made here.
 UNCONFIRMED = NoteKind("unconfirmed")
 UNBALANCED = NoteKind("unbalanced forces")
 

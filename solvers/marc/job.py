@@ -268,9 +268,8 @@ def run_job(
     folder. LicenceDenied: it never began. InputError: a Marc that is not there.
     """
     find_marc(settings)
-    seconds, subroutine = (
-        timeout or settings.timeout, None if job.subroutine is None else SUBROUTINE,
-    )  # fmt: skip
+    seconds = timeout or settings.timeout
+    subroutine = None if job.subroutine is None else SUBROUTINE
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
         sources = {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine}
         try:

@@ -118,14 +118,7 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
 
 def site_settings(path: Path) -> dict[str, Any]:
     """Return the keys of a site's file, its paths absolute; InputError: no file, not TOML."""
-    try:
-        content = toml_of(path)
-    except OSError as error:
-        raise InputError(path, VARIABLE, f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise InputError(path, VARIABLE, "is not a text file in UTF-8") from None
-    except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
-        raise InputError(path, "TOML syntax", str(error)) from None
+    content = toml_of(path, VARIABLE)
     try:
         settings = MarcSettings.model_validate(content)
     except ValidationError as error:

@@ -29,7 +29,6 @@ from .deck import (
 from .settings import MarcSettings
 from .t19 import T19File
 
-#: Kinds of notes that are made here.
 NO_REACTIONS = NoteKind("no reactions")
 
 Array = NDArray[np.float64]

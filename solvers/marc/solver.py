@@ -25,7 +25,6 @@ from .deck import Reader, Run
 from .job import Job, find_marc, run_job
 from .settings import VARIABLE, MarcSettings, marc_settings
 
-#: Kinds of notes that are made here.
 REPEATED = NoteKind("repeated increments")
 
 #: Settings that change what the deck or the subroutine says, or what Marc makes of them.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import reading
 
 Array = NDArray[np.float64]
 WIDTH, PER_LINE = 13, 6
@@ -28,10 +29,8 @@ class Records:
 
     def __init__(self, path: Path) -> None:
         self.path, self.at = path, 0
-        try:
+        with reading(path):
             self._lines = path.read_bytes().split(b"\n")
-        except OSError as error:
-            raise InputError(path, "", f"cannot be read: {error.strerror}") from None
 
     def __len__(self) -> int:
         return len(self._lines)
