@@ -17,25 +17,7 @@ from ...files import render
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED, Array
 from ..responses import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
-from .base import (
-    COMPRESSION,
-    DENSITY,
-    FROM_TOP,
-    TOTAL,
-    CurveOptions,
-    Export,
-    FabricCurves,
-    Format,
-    Says,
-    TableOptions,
-    density_remarks,
-    fabric_curves,
-    heading,
-    option,
-    range_remarks,
-    title_of,
-    unloading_curves,
-)
+from . import base
 from .designers import SHEARED
 
 #: Crimp that does not count, and the share of its modulus with which a yarn is pushed.
@@ -69,9 +51,9 @@ class Yarn:
 
 
 @dataclass(frozen=True)
-class Law58Options(CurveOptions):
+class Law58Options(base.CurveOptions):
     points: int = field(
-        default=POINTS, metadata=TableOptions.__dataclass_fields__["points"].metadata
+        default=POINTS, metadata=base.TableOptions.__dataclass_fields__["points"].metadata
     )
 
 
@@ -87,7 +69,7 @@ def yarn_of(strain: Array, stress: Array) -> Yarn:
     return Yarn(modulus, softening, rms, stiffens)
 
 
-def law58(card: MaterialCard, options: Law58Options) -> Export:
+def law58(card: MaterialCard, options: Law58Options) -> base.Export:
     """Write the material block from nominal curves of strips and trellis shear."""
     law = card.law
     ends = [float(end) if end < UNLIMITED else options.reach for end in law.strain_range]
@@ -107,8 +89,8 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     # The same slope on both sides of the locking angle; so GT is above G0.
     gt = g0 * (1 + math.tan(lock) ** 2)
     shear_off = float(np.sqrt(np.mean((tau - g0 * tangent) ** 2)) / tau.max())
-    curves: FabricCurves = fabric_curves(card, options, "nominal")
-    unload = unloading_curves(card, options, "nominal")
+    curves: base.FabricCurves = base.fabric_curves(card, options, "nominal")
+    unload = base.unloading_curves(card, options, "nominal")
     functions = {}
     if unload:
         tension = {name: getattr(curves, name)[1:] for name in ("warp", "fill")}
@@ -126,7 +108,7 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
         f"shear by the angle between the yarns as G0 tan(a), off by {100 * shear_off:.2g} %, "
         f"to {math.degrees(lock):.3g} degrees and with the same slope beyond",
     )
-    says = Says(
+    says = base.Says(
         carries=(FUNCTIONS, UNLOADS) if unload else parameters,
         loses=(
             f"nu12 = {law.nu12:g}: the crimps S1, S2 that would couple warp and fill are {CRIMP:g};"
@@ -134,9 +116,9 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
             *(() if sheared else [unknown]),
             *([stiff] if straight and not unload else ()),
             f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
-            FROM_TOP if unload else TOTAL,
-            *density_remarks(options.density),
-            *range_remarks(card, options.reach),
+            base.FROM_TOP if unload else base.TOTAL,
+            *base.density_remarks(options.density),
+            *base.range_remarks(card, options.reach),
         ),
         confirm=(
             "the measure of strain of LAW58 (the change of length over the length is taken), with "
@@ -147,9 +129,9 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
     )
     text = render(
         "radioss/law58.rad.j2",
-        head=heading(card, "Radioss /MAT/LAW58", says, "#"),
-        title=title_of(card, 100),
-        density=DENSITY if options.density is None else options.density,
+        head=base.heading(card, "Radioss /MAT/LAW58", says, "#"),
+        title=base.title_of(card, 100),
+        density=base.DENSITY if options.density is None else options.density,
         warp=warp,
         fill=fill,
         flex=FLEX,
@@ -160,10 +142,10 @@ def law58(card: MaterialCard, options: Law58Options) -> Export:
         functions=functions,
         f20=lambda value: f"{value:20.12E}",
     )
-    return Export({".rad": text}, says)
+    return base.Export({".rad": text}, says)
 
 
-LAW58 = Format("radioss-law58", law58, Law58Options, unloads=True)
+LAW58 = base.Format("radioss-law58", law58, Law58Options, unloads=True)
 MATERIAL = 1
 CURVES = {"warp": 101, "fill": 102, "shear": 103}
 UNLOADING = {"warp unloading": 104, "fill unloading": 105, "shear unloading": 106}
@@ -181,13 +163,13 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class Mat34Options(CurveOptions):
+class Mat34Options(base.CurveOptions):
     """The options of curves, and their measure: public sources disagree."""
 
-    measure: Measure = option(  # noqa: RUF009
+    measure: Measure = base.option(  # noqa: RUF009
         MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
     )
-    compression: Literal["law", "none"] = option(
+    compression: Literal["law", "none"] = base.option(
         "law", "What a pushed yarn carries: as the law (CSE = 0), or none (CSE = 1) [law].", str,
         choices=("law", "none"),
     )  # fmt: skip
@@ -195,25 +177,25 @@ class Mat34Options(CurveOptions):
 
 #: By the choice of what a pushed yarn carries.
 PUSHED = {
-    "law": f"compression: CSE = 0, and one point of LCA and LCB at {100 * COMPRESSION:g} % of log "
-    "strain pushes a yarn as the card's law does: the fabric folds by its mesh only (--compression "
-    "none is the other choice)",
+    "law": f"compression: CSE = 0, and one point of LCA and LCB at {100 * base.COMPRESSION:g} % of "
+    "log strain pushes a yarn as the card's law does: the fabric folds by its mesh only "
+    "(--compression none is the other choice)",
     "none": "no compression: CSE = 1, and LCA and LCB begin at zero, so that the fabric goes "
     "slack, and elements may collapse to a line",
 }
 
 
-def mat34(card: MaterialCard, options: Mat34Options) -> Export:
+def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
     """Write *MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
     measure, slack = options.measure, options.compression == "none"
-    curves, law = fabric_curves(card, options, measure), card.law
+    curves, law = base.fabric_curves(card, options, measure), card.law
     strips = {"warp": curves.warp[slack:], "fill": curves.fill[slack:]}
     unload = {f"{n} unloading": from_zero(rows) for n, rows in
-              unloading_curves(card, options, measure).items()}  # fmt: skip
+              base.unloading_curves(card, options, measure).items()}  # fmt: skip
     if unload:
         unload["shear unloading"] = _odd(unload["shear unloading"])
     lost = ("the stiffness of the law in compression",) if slack else ()
-    says = Says(
+    says = base.Says(
         carries=(
             f"curves LCA (warp), LCB (fill), LCAB (shear): {NAMES[measure]}; of strips free to "
             "contract, and of shear with yarns held at their length",
@@ -228,9 +210,9 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
             f"{curves.yarns:.3g} MPa in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
-            FROM_TOP if unload else TOTAL,
-            *density_remarks(options.density),
-            *range_remarks(card, options.reach),
+            base.FROM_TOP if unload else base.TOTAL,
+            *base.density_remarks(options.density),
+            *base.range_remarks(card, options.reach),
         ),
         confirm=(
             "the measure of the curves: public sources disagree (the manual names "
@@ -243,14 +225,14 @@ def mat34(card: MaterialCard, options: Mat34Options) -> Export:
     )
     e1, e2 = float(law.E1(0.0)), float(law.E2(0.0))
     text = render(
-        "ls-dyna/mat34.k.j2", head=heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
-        title=title_of(card, 80), material=MATERIAL,
-        density=DENSITY if options.density is None else options.density, ea=e1, eb=e2,
+        "ls-dyna/mat34.k.j2", head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
+        title=base.title_of(card, 80), material=MATERIAL,
+        density=base.DENSITY if options.density is None else options.density, ea=e1, eb=e2,
         gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1,
         ids={**CURVES, **dict.fromkeys(UNLOADING, 0), **(UNLOADING if unload else {})},
         curves={**strips, "shear": _odd(curves.shear), **unload}, cse=float(slack), f10=_f10
     )  # fmt: skip
-    return Export({".k": text}, says)
+    return base.Export({".k": text}, says)
 
 
 def _odd(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -265,18 +247,18 @@ def _f10(value: float) -> str:
     return f"{value:10.3E}"
 
 
-MAT34 = Format("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
+MAT34 = base.Format("ls-dyna-mat34", mat34, Mat34Options, unloads=True)
 
 
-def fabric(card: MaterialCard, options: CurveOptions) -> Export:
+def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
     """Write *MATERIAL with *FABRIC and three *UNIAXIAL tests, and how to orient it."""
-    curves = fabric_curves(card, options, "nominal")
+    curves = base.fabric_curves(card, options, "nominal")
     # A curve is shifted to where unloading begins: its own strain begins at the set.
     unload = {
         name: from_zero(rows)[1:] - [rows[0, 0], 0.0]
-        for name, rows in unloading_curves(card, options, "nominal").items()
+        for name, rows in base.unloading_curves(card, options, "nominal").items()
     }
-    says = Says(
+    says = base.Says(
         carries=(
             "nominal stress by nominal strain of strips along warp and fill, free to contract, "
             "and shear stress by change of angle"
@@ -288,9 +270,9 @@ def fabric(card: MaterialCard, options: CurveOptions) -> Export:
             + curves.uncoupled,
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
             f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
-            FROM_TOP if unload else TOTAL,
-            *density_remarks(options.density),
-            *range_remarks(card, options.reach),
+            base.FROM_TOP if unload else base.TOTAL,
+            *base.density_remarks(options.density),
+            *base.range_remarks(card, options.reach),
         ),
         confirm=(
             "the order stress, strain of the data lines, and the sign and measure of the shear "
@@ -306,12 +288,13 @@ def fabric(card: MaterialCard, options: CurveOptions) -> Export:
         ),
     )
     text = render(
-        "abaqus/fabric.inp.j2", head=heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
-        name=material_name(card), density=DENSITY if options.density is None else options.density,
+        "abaqus/fabric.inp.j2", head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
+        name=material_name(card),
+        density=base.DENSITY if options.density is None else options.density,
         tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())], shear=curves.shear.tolist(),
         unload={name: rows.tolist() for name, rows in unload.items()}
     )  # fmt: skip
-    return Export({".inp": text}, says)
+    return base.Export({".inp": text}, says)
 
 
 def material_name(card: MaterialCard) -> str:
@@ -321,4 +304,4 @@ def material_name(card: MaterialCard) -> str:
     return kept if kept[:1].isalpha() else "FABRIC"
 
 
-FABRIC = Format("abaqus-fabric", fabric, CurveOptions, unloads=True)
+FABRIC = base.Format("abaqus-fabric", fabric, base.CurveOptions, unloads=True)

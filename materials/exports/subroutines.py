@@ -11,18 +11,7 @@ from ...files import render
 from ..card import MaterialCard
 from ..law import HypoelasticLaw
 from ..responses import JUMP, ModulusTable, bar, modulus_tables
-from .base import (
-    Export,
-    Format,
-    NoOptions,
-    Says,
-    TableOptions,
-    double,
-    heading,
-    law_constants,
-    logical,
-    range_remarks,
-)
+from . import base
 from .curves import material_name
 
 #: STATE VARS, temperature included: strain, stress, and the transverse shears of thick shells.
@@ -31,7 +20,7 @@ STATE_VARIABLES = {"membrane": 7, "thick shell": 9}
 LEAST = 1e-3
 #: The check of a licence holder: engineering strain of one element, in equal increments.
 ELONGATION, INCREMENTS, SHEAR = 0.1, 100, 0.01
-SAYS = Says(
+SAYS = base.Says(
     carries=(
         "the whole law: tangent moduli of log strain in any form, nu12, the range in which moduli "
         "hold",
@@ -41,10 +30,10 @@ SAYS = Says(
 )
 
 
-def hypela2(card: MaterialCard, options: NoOptions) -> Export:
+def hypela2(card: MaterialCard, options: base.NoOptions) -> base.Export:
     """Write the subroutine for one card, whatever the number of its material in Marc."""
-    head = heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
-    return Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
+    head = base.heading(card, "MSC Marc user subroutine HYPELA2", SAYS, "!")
+    return base.Export({".f": hypela2_source({1: card.law}, head)}, SAYS)
 
 
 def hypela2_source(
@@ -58,7 +47,7 @@ def hypela2_source(
     written: list[dict[str, Any]] = [
         {
             "id": number,
-            "constants": law_constants(law),
+            "constants": base.law_constants(law),
             "across": max(float(law.G12(0.0)), LEAST),
             "power": law.area_power,
         }
@@ -68,7 +57,7 @@ def hypela2_source(
         "marc/hypela2.f.j2", head=head, laws=written, bar=_check(next(iter(laws.values()))),
         power=next(iter(laws.values())).area_power, states=STATE_VARIABLES,
         size=max(len(law["constants"]) for law in written), own_state=own_state,
-        symmetric=symmetric, double=double, fortran=logical
+        symmetric=symmetric, double=base.double, fortran=base.logical
     )  # fmt: skip
 
 
@@ -88,14 +77,14 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-HYPELA2 = Format("marc-hypela2", hypela2)
+HYPELA2 = base.Format("marc-hypela2", hypela2)
 #: Table numbers in the deck, by modulus.
 NUMBERS = {"E1": 11, "E2": 12, "G12": 13}
 #: The modulus is held as far as this from the ends of its table, whether or not Marc extrapolates.
 GUARD = 1.0
 
 
-def nlelast(card: MaterialCard, options: TableOptions) -> Export:
+def nlelast(card: MaterialCard, options: base.TableOptions) -> base.Export:
     """Write TABLE and NLELAST blocks of an extended-format deck."""
     tables = modulus_tables(card.law, options.points, options.reach)
     largest = max(table.error for table in tables.values())
@@ -107,13 +96,13 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
         loses.append(f"the jumps of the moduli are {JUMP:g} of strain wide")
     if card.law.area_power == 0:
         loses.append("the card's incompressible thickness: NLELAST has no such choice")
-    says = Says(
+    says = base.Says(
         carries=(
             "tangent moduli of log strain, nu12, moduli held outside their range",
             "stress is Cauchy stress under LARGE STRAIN; published Marc results of this law "
             "agree with the integral of E over log strain",
         ),
-        loses=(*loses, *range_remarks(card, options.reach)),
+        loses=(*loses, *base.range_remarks(card, options.reach)),
         confirm=(
             "the data blocks of NLELAST and the variable type 73 of its tables: no public deck "
             "shows them (bubblefit docs marc-deck)",
@@ -122,7 +111,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
     )
     text = render(
         "marc/nlelast_card.dat.j2",
-        head=heading(card, "MSC Marc NLELAST, extended format", says, "$"),
+        head=base.heading(card, "MSC Marc NLELAST, extended format", says, "$"),
         tables=[
             {"name": name.lower(), "number": NUMBERS[name], "rows": _rows(tables[name])}
             for name in NUMBERS
@@ -131,7 +120,7 @@ def nlelast(card: MaterialCard, options: TableOptions) -> Export:
         name=_name(card),
         real=lambda value: f"{value:20.13E}",
     )
-    return Export({".dat": text}, says)
+    return base.Export({".dat": text}, says)
 
 
 def _rows(table: ModulusTable) -> list[tuple[float, float]]:
@@ -146,15 +135,15 @@ def _name(card: MaterialCard) -> str:
     return kept.strip("_")[:24] or "fabric"
 
 
-NLELAST = Format("marc", nlelast, TableOptions)
+NLELAST = base.Format("marc", nlelast, base.TableOptions)
 #: Section Poisson's ratio: how Abaqus changes the thickness (0: not at all; 0.5: incompressible).
 SECTION_POISSON = {"constant": 0.0, "incompressible": 0.5}
 
 
-def umat(card: MaterialCard, options: NoOptions) -> Export:
+def umat(card: MaterialCard, options: base.NoOptions) -> base.Export:
     """Write the subroutine (the same for all cards) and the *USER MATERIAL with its constants."""
     poisson = SECTION_POISSON[card.law.thickness_change]
-    says = Says(
+    says = base.Says(
         carries=(
             "the whole law: tangent moduli of log strain in any form, nu12, the range in which "
             "moduli hold; the exact, unsymmetric tangent",
@@ -169,16 +158,19 @@ def umat(card: MaterialCard, options: NoOptions) -> Export:
         ),
     )
     context = {
-        "name": material_name(card), "constants": list(law_constants(card.law)), "poisson": poisson,
-        "thickness": card.thickness, "exact": repr
+        "name": material_name(card), "constants": list(base.law_constants(card.law)),
+        "poisson": poisson, "thickness": card.thickness, "exact": repr
     }  # fmt: skip
     source = render(
-        "abaqus/umat.f.j2", head=heading(card, "Abaqus/Standard user subroutine UMAT", says, "!")
+        "abaqus/umat.f.j2",
+        head=base.heading(card, "Abaqus/Standard user subroutine UMAT", says, "!"),
     )
     material = render(
-        "abaqus/umat.inp.j2", head=heading(card, "Abaqus/Standard material", says, "**"), **context
+        "abaqus/umat.inp.j2",
+        head=base.heading(card, "Abaqus/Standard material", says, "**"),
+        **context,
     )
-    return Export({".f": source, ".inp": material}, says)
+    return base.Export({".f": source, ".inp": material}, says)
 
 
-UMAT = Format("abaqus-umat", umat)
+UMAT = base.Format("abaqus-umat", umat)

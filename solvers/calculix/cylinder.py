@@ -290,20 +290,6 @@ def volumes(model: CylinderModel, displacements: Array) -> Array:
     return model.copies * np.array(inside)
 
 
-def inflation_history(
-    path: Path, model: CylinderModel, solids: SolidMesh, iterations: int
-) -> History:
-    """Return the middle surface and whole volume at every pressure; else SolverFailure."""
-    displacement, _ = whole_times(path, len(model.inflation), len(solids.points))
-    middle = np.ascontiguousarray(solids.middle(displacement))
-    pressure = np.array(model.inflation)
-    return History(
-        pressure, middle, *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
-        cavity_pressure=pressure, cavity_volume=volumes(model, middle), iterations=iterations,
-        path=middle,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True, eq=False)
 class BentCylinder:
     """The inflated state, then every converged increment of bending; forces on the whole, N.

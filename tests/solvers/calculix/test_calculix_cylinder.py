@@ -11,6 +11,7 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import Gas, RigidSupports, inflated_cylinder
 from bubblefit.meshes.mesh import enclosed_volume
+from bubblefit.solvers.base import History, extremes, log_strain
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (
     ABOVE,
@@ -23,12 +24,13 @@ from bubblefit.solvers.calculix.cylinder import (
     compliance,
     cylinder_decks,
     gas_pressure,
-    inflation_history,
     solid_mesh,
+    volumes,
 )
 from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.calculix.library import law_files, material_library
+from bubblefit.solvers.calculix.sheets import whole_times
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve
@@ -71,17 +73,26 @@ def closed_form(pressure):
     return fsolve(unbalance, [0.01, 0.05], xtol=1e-12)
 
 
+def inflation_history(path, model, solids):
+    displacement, _ = whole_times(path, len(model.inflation), len(solids.points))
+    middle, pressure = solids.middle(displacement), np.array(model.inflation)
+    return History(
+        pressure, middle, *extremes(log_strain(model.mesh, middle, model.mesh.warp)),
+        cavity_volume=volumes(model, middle),
+    )  # fmt: skip
+
+
 def run(ccx, model, folder):
     solids = solid_mesh(model)
     for name, text in (cylinder_decks(model, LINEAR, solids) | law_files(LINEAR)).items():
         (folder / name).write_text(text)
     with pytest.raises(SolverFailure, match="no usable results"):
-        inflation_history(folder / "job.frd", model, solids, 0)
+        inflation_history(folder / "job.frd", model, solids)
     libraries = {"LD_LIBRARY_PATH": str(material_library().parent), "OMP_NUM_THREADS": "1"}
     done = subprocess.run([str(ccx.path), "-i", "job"], cwd=folder, env=os.environ | libraries,
                           capture_output=True, text=True)  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:]
-    return inflation_history(folder / "job.frd", model, solids, 0)
+    return inflation_history(folder / "job.frd", model, solids)
 
 
 def test_the_middle_of_the_tube_has_the_closed_form(ccx, tmp_path):
