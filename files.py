@@ -186,10 +186,7 @@ def output_errors(path: Path | str) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: Path | str) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that takes its place when the block ends well.
-
-    The parent folder is made. OutputError : the folder cannot be written or the disk is full.
-    """
+    """Yield a path that takes the place of `path` when the block ends well; OutputError."""
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     with output_errors(path):
@@ -343,10 +340,7 @@ def _distribution(entry: EntryPoint) -> str:
 
 
 def cache_folder() -> Path:
-    """Return $BUBBLEFIT_CACHE, else the user's cache folder of this system; it may not exist yet.
-
-    On Linux that is bubblefit/ in $XDG_CACHE_HOME or ~/.cache.
-    """
+    """Return $BUBBLEFIT_CACHE, else the user's cache folder of this system; it may not be there."""
     from platformdirs import user_cache_path
 
     named = os.environ.get("BUBBLEFIT_CACHE")

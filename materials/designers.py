@@ -101,10 +101,7 @@ UNLOADED = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LinearPath:
-    """The straight lines of one ratio: changes of load (2,) kN/m and strain (2,) to its end.
-
-    residual : (2,) RMS of the measured strains about their lines.
-    """
+    """A ratio's lines: load (2,) kN/m and strain (2,) to the end, RMS residual (2,) of strain."""
 
     ratio: str
     load: Array

@@ -169,10 +169,7 @@ class BiaxialResponse:
 def biaxial_response(
     law: HypoelasticLaw, loads: ArrayLike, thickness: float, parameters: Sequence[str] = ()
 ) -> BiaxialResponse:
-    """Return the strains of a patch, unloaded at first, at loads (n, 2) N/mm.
-
-    parameters : of the derivatives: "beta_i" (per MPa), "nu12" and "thickness" (per mm).
-    """
+    """Return a patch's strains at loads (n, 2) N/mm; parameters : "beta_i", "nu12", "thickness"."""
     asked = np.ascontiguousarray(np.atleast_2d(np.asarray(loads, dtype=float)))
     rows, by_coupling = law_slopes(law, parameters, thickness)
     strain, stress = np.full((2, len(asked), 2), np.nan)

@@ -34,10 +34,7 @@ def least_principal(a: float, b: float, c: float) -> float:
 
 @compiled()
 def _normal(angle: float, n: Array, m: Array) -> None:
-    """Write strain n n' of a wrinkle (engineering shear), and m, half of its slope by the angle.
-
-    n . s is the stress across the wrinkle, m . s the shear along it.
-    """
+    """Write strain n n' of a wrinkle, which takes the stress across it, and m, that along it."""
     c, s = math.cos(angle), math.sin(angle)
     n[0], n[1], n[2] = c * c, s * s, 2.0 * c * s
     m[0], m[1], m[2] = -c * s, c * s, c * c - s * s

@@ -31,10 +31,7 @@ DRAWN = 0.15
 
 
 class TubeWall(Protocol):
-    """The wall of a tube of given pressure (MPa) and radius (mm) when inflated.
-
-    moduli : N/mm along, around and in shear, and Poisson's ratio, of a card in its place.
-    """
+    """A tube's wall, inflated; moduli : N/mm along, around, in shear, and Poisson's ratio."""
 
     @property
     def shear(self) -> float: ...
@@ -169,10 +166,7 @@ def _positive(wall: object, names: Sequence[str]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class TubeSection:
-    """A section of an inflated tube: radius (mm), gauge pressure (MPa), wall and cords.
-
-    Cords of a braid without initial force hold its thrust in equal shares.
-    """
+    """A section of an inflated tube: radius (mm), gauge pressure (MPa), wall and cords."""
 
     radius: float
     pressure: float

@@ -1,8 +1,4 @@
-"""Quadrilateral meshes of the flat circular or elliptic specimen, whole or one quarter of it.
-
-The quarter has three structured blocks (an o-grid): a core with its far corner K pulled towards the
-rim, and two ring blocks, 120 degrees each in K: scaled Jacobian 0.866 or more everywhere.
-"""
+"""Quadrilateral meshes of the flat specimen, whole or a quarter: core and two ring blocks."""
 
 import math
 from dataclasses import dataclass, replace

@@ -34,10 +34,7 @@ def angles(n: int, seam: float) -> Array:
 
 
 def of_equal_area(angle: Array, radius: float) -> float:
-    """Return how far (mm) from the axis nodes at these angles enclose the area of the circle.
-
-    An inscribed polygon of 16 sides has 2.6 % too little area, gas and force on a cross-section.
-    """
+    """Return how far (mm) nodes at these angles are out to enclose the area of the circle."""
     return radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))
 
 

@@ -222,10 +222,7 @@ MEDIAN = 0.6744897501960817
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """The sphere through points (n, 3) mm; errors as if those of the points were independent.
-
-    deviation : (n,) mm beyond the sphere. kept : (n,) whether it was used.
-    """
+    """The sphere through points (n, 3) mm, deviation (n,) mm beyond it, kept (n,) where used."""
 
     centre: Array
     radius: float

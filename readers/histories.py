@@ -1,7 +1,4 @@
-"""Load over strain of a specimen through all its cycles, and the branches of the history.
-
-A turn counts by its share of the rise or fall before it: noise and overshoot are no cycles.
-"""
+"""Load over strain of a specimen through all its cycles, and the branches of the history."""
 
 from __future__ import annotations
 

@@ -195,10 +195,7 @@ def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
 
 @dataclass(frozen=True)
 class Channel:
-    """A column of readings: the value is scale * reading + offset, in `unit`.
-
-    column : found by meaning unless given. scale : such as 200 mm per volt; None: no volts.
-    """
+    """A column of readings (None: by meaning): scale (per volt, or None) * reading + offset."""
 
     column: str | None = None
     unit: str | None = None

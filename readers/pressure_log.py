@@ -377,10 +377,7 @@ def number_in_name(
     path: Path, units: Mapping[str, float], pattern: str | None = None, unit: str | None = None,
     field: str = "",
 ) -> float:  # fmt: skip
-    """Return the number in a file's name, times what its unit is in `units`.
-
-    pattern : of one group; None: the number before a unit (`step_012_35.5kPa.csv`).
-    """
+    """Return the number in a file's name (by `pattern`, else before a unit) by its unit."""
     if pattern is not None:
         hard = len(_REPEATS.findall(pattern)) > 1
         if hard and not ends(partial(_searched, pattern, path), SEARCH_SECONDS):

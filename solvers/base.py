@@ -160,11 +160,7 @@ class History:
 
 @dataclass(frozen=True)
 class BandEnd:
-    """One of the two walls between which a solver's answer to a model lies.
-
-    name : in tables and figures. meaning : what the wall does. options : of the solver that takes
-    this wall, beside its own. predicted : whether it is the prediction or only the other end.
-    """
+    """A wall of the band of answers: its name, what it does, the options that take it."""
 
     name: str
     meaning: str

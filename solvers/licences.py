@@ -102,10 +102,7 @@ class _Program:
 
 @contextmanager
 def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> Iterator[None]:
-    """Hold a licence of the program `name`, of the machine, then of the cluster: no deadlock.
-
-    InputError : nothing can be counted there. BubblefitError : the scheduler does not answer.
-    """
+    """Hold a licence, of the machine, then of the cluster; InputError, BubblefitError: no count."""
     if settings.licences is None:
         yield
         return

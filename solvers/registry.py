@@ -190,10 +190,7 @@ def usable_solver(
     name: str, options: Mapping[str, Any] | None = None, path: Path | None = None,
     key: str = "fit.solver", cache: RunCache | None = None,
 ) -> Solver:  # fmt: skip
-    """Return a new solver that is installed and carries the law; else SolverFailure, InputError.
-
-    path, key : the project that names it, and where. cache : as of `solver_named`.
-    """
+    """Return a solver that is installed and carries the law; path, key : where it is named."""
     try:
         solver = solver_named(name, cache, **(options or {}))
     except InputError as error:

@@ -29,10 +29,7 @@ SCHEDULER = "licence_scheduler"
 
 @dataclass(frozen=True)
 class Override:
-    """An option of the command line for a setting, its `name` and help; solvers share one.
-
-    values : possible ones. path : a file or folder. look : its help in `doctor`, of a program.
-    """
+    """A command-line option of a setting; path : a file or folder; look : its help in `doctor`."""
 
     name: str
     what: str

@@ -1,7 +1,4 @@
-"""Export linear constants per width: Oasys GSA (its theory, "Fabric Material"), Dlubal RFEM.
-
-RFEM takes force over area: the stiffness per width over a thickness (Dlubal, FAQ 004396).
-"""
+"""Export linear constants per width: Oasys GSA ("Fabric Material"), Dlubal RFEM (FAQ 004396)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

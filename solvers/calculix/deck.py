@@ -1,7 +1,4 @@
-"""Write what the decks of all models share: shells, material, control of Newton's method.
-
-CalculiX counts displacements from the sheet without stress, the model from its reference.
-"""
+"""Write what the decks of all models share: shells, material, control of Newton's method."""
 
 from __future__ import annotations
 

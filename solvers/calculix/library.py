@@ -32,10 +32,7 @@ def law_number(law: HypoelasticLaw) -> int:
 
 
 def law_text(law: HypoelasticLaw) -> str:
-    """Return the file: title and number; counts of pieces of E1, E2, G12; a line a piece.
-
-    A piece is the strain up to which it holds and four coefficients (MPa, highest power first).
-    """
+    """Return the file: title, number, counts of pieces; a line a piece: its end, coefficients."""
     return f"{TITLE} {law_number(law)}\n{_numbers(law)}"
 
 

@@ -1,7 +1,4 @@
-"""Marc's formatted post file (.t19), read to its last mark; layout: docs/reference/marc-deck.md.
-
-A file that does not hold what its blocks announce, or stops before its end, is refused.
-"""
+"""Marc's formatted post file (.t19), read to its last mark; layout: docs/reference/marc-deck.md."""
 
 from __future__ import annotations
 
