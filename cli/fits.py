@@ -161,11 +161,8 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
     from ..reports.fit_page import sigma_words, verdict_words
 
-    lines = [
-        f"{verdict.name}: {verdict.words}"
-        for verdict in fit.verdicts
-        if verdict.shared or verdict.prior is None
-    ]
+    shown = [one for one in fit.verdicts if one.shared or one.prior is None]
+    lines = [f"{one.name}: {one.words}" for one in shown]
     for source, sigmas in fit.result.get("pinned", {}).items():
         parts = ", ".join(
             f"{name} {sigma_words(s['median'])} (at worst {sigma_words(s['largest'])})"

@@ -228,14 +228,11 @@ def beside(one: Named, other: Named) -> Report:
     for title in titles:
         parts = [[p for s in r.sections if s.title == title for p in s.parts] for r in reports]
         sections.append(Section(title, list(_merged(names, *parts))))
-    summary = " ".join(f"{n}: {r.summary}" for n, r in zip(names, reports, strict=True))
-    warnings = [f"{n}: {w}" for n, r in zip(names, reports, strict=True) for w in r.warnings]
+    both = list(zip(names, reports, strict=True))
+    summary = " ".join(f"{name}: {report.summary}" for name, report in both)
+    warnings = [f"{name}: {words}" for name, report in both for words in report.warnings]
     about, facts = (
-        [
-            (f"{name}: {label}", value)
-            for name, report in zip(names, reports, strict=True)
-            for label, value in getattr(report, pairs)
-        ]
+        [(f"{name}: {label}", value) for name, r in both for label, value in getattr(r, pairs)]
         for pairs in ("about", "facts")
     )
     title = f"{names[0]} beside {names[1]}"
@@ -252,10 +249,8 @@ def _with_folder(report: Report, name: str) -> Report:
         inside = Path(part.file).is_absolute() or ".." in Path(part.file).parts
         return replace(part, file="" if inside else f"{name}/{part.file}")
 
-    return replace(
-        report,
-        sections=[replace(s, parts=[moved(p) for p in s.parts]) for s in report.sections],
-    )
+    sections = [replace(s, parts=[moved(p) for p in s.parts]) for s in report.sections]
+    return replace(report, sections=sections)
 
 
 def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]) -> Iterator[Part]:
@@ -270,11 +265,9 @@ def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]
         if isinstance(part, Table) and isinstance(twin, Table):
             pairs = zip_longest(part.rows, twin.rows)
             rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
-            note = (
-                part.note
-                if part.note == twin.note
-                else f"{names[0]}: {part.note} {names[1]}: {twin.note}"
-            )
+            note = part.note
+            if twin.note != note:
+                note = f"{names[0]}: {part.note} {names[1]}: {twin.note}"
             text = (1, *(k + 1 for k in part.text))
             yield Table(part.title, ["of", *part.header], rows, note, text)
         elif isinstance(part, Charts) and isinstance(twin, Charts):

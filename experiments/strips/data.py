@@ -291,9 +291,8 @@ def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Do
     columns = list(dict.fromkeys(c.between_grips for c in strip.curves if c.between_grips))
     if not columns:
         return
-    strain = any(
-        c.source and c.source.units.get("elongation") in STRAIN_UNITS for c in strip.curves
-    )
+    units = [c.source.units.get("elongation") for c in strip.curves if c.source]
+    strain = any(unit in STRAIN_UNITS for unit in units)
     share, modulus = strip.gauge_length / distance, ALONG.get(direction, "G12")
     what = f"{modulus} comes out too low by the slip in the grips and the machine's own give"
     if share < 0.95 and not strain:
