@@ -200,7 +200,6 @@ def _option(found: re.Match[str]) -> str:
 
 
 def _gauge_lines(result: Mapping[str, Any]) -> list[str]:
-    """Return the lines for the terminal."""
     end, length = result["longest"], f"{result['gauge_length_mm']:.5g}"
     lines = [
         f"gauge length {length} mm; {result['frames']} frames, lost in {len(result['lost'])}",

@@ -24,13 +24,11 @@ CLOSE = 2.2
 @dataclass(frozen=True, eq=False)
 class BendLine:
     """The curve of one card.
-
     name : of the card. rank : of its colour, the same in every figure. deflection, load, pressure,
     volume : (frames,) mm, N, MPa, mm^3. knee, limit : where they are, mm and N. rms : N, against
     what was measured. other : deflection (mm) and load (N) of the other end of a band that begins
     at the curve. off : (frames,) N, how far the load may be off to either side by what the card
-    leaves open.
-    """
+    leaves open."""
 
     name: str
     rank: int
@@ -58,9 +56,7 @@ class BendReadings:
 @dataclass(frozen=True, eq=False)
 class BendPanel:
     """One case: a curve a card, readings, and names of a band and of what curves may be off by.
-
-    along : the name of the deflection.
-    """
+    along : the name of the deflection."""
 
     title: str
     lines: Sequence[BendLine] = ()
@@ -73,9 +69,7 @@ class BendPanel:
 @dataclass(frozen=True)
 class BeamBodies:
     """Rigid bodies when bent, mm; supports : (z, y) of the axes; collar_height : y of its axis.
-
-    collars : z of each collar, or strap.
-    """
+    collars : z of each collar, or strap."""
 
     supports: tuple[tuple[float, float], ...]
     support_radius: float
@@ -188,12 +182,10 @@ def beam_charts(
     section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies, title: str = "",
 ) -> Charts:  # fmt: skip
     """Return a whole beam true to scale, coloured by its strain along the axis.
-
     bent : (n, 3) mm, positions; z along the axis, y up. quads : (m, 4). strain : (m,) log strain
     along the axis when bent. outline : (k, 2) mm, the inflated beam from the side as a closed line
     (z, y). section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
-    bodies : supports and collar when bent.
-    """
+    bodies : supports and collar when bent."""
     now, before = np.asarray(bent, dtype=float), np.asarray(outline, dtype=float)
     cells, values = np.asarray(quads, dtype=int), np.asarray(strain, dtype=float)
     # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
@@ -203,7 +195,15 @@ def beam_charts(
     seen = np.flatnonzero(now[cells, 0].mean(axis=1) >= 0)
     seen = seen[np.argsort(now[cells[seen], 0].mean(axis=1))]
     body = faces("", now[cells[seen]][:, :, [2, 1]], values[seen])
-    side = [body, line("inflated", *before.T, colour=7, dashes=1), *_supports(bodies)]
+    series = [
+        line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
+    ]
+    half, r = 0.5 * bodies.collar_length, bodies.collar_radius
+    for z in bodies.collars:
+        for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
+            x = [z - half, z + half, z + half, z - half, z - half]
+            series.append(line(bodies.name, x, [y, y, y + WALL, y + WALL, y], colour=0))
+    side = [body, line("inflated", *before.T, colour=7, dashes=1), *series]
     ring, middle = bodies.collar_radius + WALL, bodies.collar_height
     feet = [y - bodies.support_radius for _, y in bodies.supports]
     low = min(float(now[:, 1].min()), middle - ring, *feet)
@@ -225,19 +225,6 @@ def beam_charts(
 def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
     return x + radius * np.cos(turn), y + radius * np.sin(turn)
-
-
-def _supports(bodies: BeamBodies) -> list[Series]:
-    """Return supports and collar from the side."""
-    series = [
-        line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
-    ]
-    half, r = 0.5 * bodies.collar_length, bodies.collar_radius
-    for z in bodies.collars:
-        for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
-            x = [z - half, z + half, z + half, z - half, z - half]
-            series.append(line(bodies.name, x, [y, y, y + WALL, y + WALL, y], colour=0))
-    return series
 
 
 def _cut(section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies) -> Chart:

@@ -230,7 +230,6 @@ def _again(worker: _Worker, what: str, waiting: deque[int], died: Counter[int]) 
 
 
 def _work(prepare: Any, listener: connection.Connection, parent: int) -> None:
-    """Do tasks until there are no more, in a worker process."""
     # Ctrl-C reaches the whole group; the parent decides and terminates us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

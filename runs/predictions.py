@@ -343,7 +343,6 @@ def _pairs(
 def _around(
     project: Project, pairs: Sequence[PredictedRun], samples: int | None
 ) -> list[tuple[int, PredictedRun]]:
-    """Return runs with other laws, each with the number of its prediction."""
     others = []
     for number, pair in enumerate(pairs):
         if not pair.predicted:

@@ -122,12 +122,11 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
     listed = {name: getattr(section, name) for name in ("lower", "upper")}
     of_moduli = any(v is not None for v in ranges.values())
     of_entries = any(v is not None for v in listed.values())
-    if of_moduli and of_entries:
-        expected = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
-        raise InputError(project.path, "law.bounds", expected)
-    if not of_moduli and not of_entries:
+    if of_moduli == of_entries:
         expected = "give [least, largest] of E1, E2 and G12, or 'lower' and 'upper' coefficients"
-        raise InputError(project.path, "law.bounds", expected)
+        if of_moduli:
+            expected = "expected either 'lower' and 'upper' or E1, E2, G12, got some of both"
+        raise InputError(path, "law.bounds", expected)
     for name, value in (ranges if of_moduli else listed).items():
         if value is None:
             raise InputError(project.path, f"law.bounds.{name}", "this key is missing; add it")
@@ -432,7 +431,6 @@ def _prepared(project: Project, tests: Sequence[FittableTest], saw: Saw) -> FitS
 
 
 def _starts(setup: FitSetup) -> Starts:
-    """Return where starts begin."""
     project, fit = setup.project, setup.project.fit
     if fit.earlier is not None and fit.starts_from != "proposed":
         said = 'means something with starts_from = "proposed" only'

@@ -272,7 +272,6 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
 
 
 def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
-    """Return the results as lines for the terminal."""
     lines = []
     for name, card in cards.items():
         parts = []
