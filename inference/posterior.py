@@ -36,13 +36,9 @@ ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 
 
 def truncated_draws(
-    mean: Array,
-    covariance: Array,
-    inequalities: tuple[Array, Array],
-    allowed: Array,
-    count: int,
+    mean: Array, covariance: Array, inequalities: tuple[Array, Array], allowed: Array, count: int,
     random: np.random.Generator,
-) -> Array:
+) -> Array:  # fmt: skip
     """Return `count` draws (count, n) of a normal distribution, given inequalities A y >= c.
     mean : (n,), which may lie outside. allowed : (n,) a point that keeps them, up to rounding."""
     a, c = inequalities

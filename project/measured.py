@@ -120,11 +120,8 @@ class Registered:
 
 
 def register(
-    bubble: Bubble | Numbers,
-    displacements: Numbers = None,
-    pressures: Numbers = None,
-    **keys: Any,
-) -> Registered:
+    bubble: Bubble | Numbers, displacements: Numbers = None, pressures: Numbers = None, **keys: Any,
+) -> Registered:  # fmt: skip
     """Register a bubble, or arrays as `Bubble` takes them, in the camera's coordinates.
 
     Steps are found unless the bubble's registration gives them. InputError for a step that cannot

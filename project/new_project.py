@@ -28,13 +28,9 @@ def writable_kinds() -> list[str]:
 
 
 def write_project(
-    path: Path,
-    tests: Mapping[str, int],
-    name: str = "My fabric",
-    thickness: float = 0.8,
-    form: str = "cubic",
-    **said: Any,
-) -> None:
+    path: Path, tests: Mapping[str, int], name: str = "My fabric", thickness: float = 0.8,
+    form: str = "cubic", **said: Any,
+) -> None:  # fmt: skip
     """Write a project file that can be read.
 
     tests : how many of each kind. name, thickness : of the fabric, mm. said : `USUAL` values that

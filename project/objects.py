@@ -236,18 +236,12 @@ class Bubble(Definition):
     of_kind = "bubble"
 
     def __init__(
-        self,
-        points: Numbers | Table,
-        displacements: Numbers = None,
-        pressures: Numbers = None,
-        *,
-        radius: float | str | None = None,
-        ellipse: Mapping[str, float] | None = None,
+        self, points: Numbers | Table, displacements: Numbers = None, pressures: Numbers = None, *,
+        radius: float | str | None = None, ellipse: Mapping[str, float] | None = None,
         sheet: Sheet | Mapping[str, Any] | None = None,
-        registration: Registration | Mapping[str, Any] | None = None,
-        name: str = "bubble",
+        registration: Registration | Mapping[str, Any] | None = None, name: str = "bubble",
         **keys: Any,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Make the test from arrays; x is warp, y is fill, z is up, and NaN a lost point.
 
         points : (m, 3), or (frames, m, 3), or an array a frame, mm, without load. displacements :
@@ -296,14 +290,9 @@ class Strips(Definition):
     of_kind = "strips"
 
     def __init__(
-        self,
-        curves: Mapping[str, Any] | Table,
-        *,
-        width: float | None = None,
-        gauge: float | Mapping[str, float] | None = None,
-        name: str = "strips",
-        **keys: Any,
-    ) -> None:
+        self, curves: Mapping[str, Any] | Table, *, width: float | None = None,
+        gauge: float | Mapping[str, float] | None = None, name: str = "strips", **keys: Any,
+    ) -> None:  # fmt: skip
         """Make the test from load curves.
 
         curves : by direction (warp, fill, bias) a list of specimens, each (elongation mm, load N)
@@ -320,12 +309,9 @@ class Strips(Definition):
 
     @classmethod
     def read(
-        cls,
-        files: Files | Mapping[str, Files],
-        *,
-        gauge: float | Mapping[str, float] | None = None,
-        **keys: Any,
-    ) -> Self:
+        cls, files: Files | Mapping[str, Files], *,
+        gauge: float | Mapping[str, float] | None = None, **keys: Any,
+    ) -> Self:  # fmt: skip
         """Return the test of files of load curves, or of files by direction; keys : as above."""
         listed, here = _listed(files), set(files if isinstance(files, Mapping) else keys)
         here &= {*DIRECTIONS}
@@ -383,14 +369,9 @@ class Cylinder(Definition):
     of_kind = "cylinder"
 
     def __init__(
-        self,
-        diameter: float,
-        pressure: float,
-        *,
-        curves: Sequence[Any] = (),
-        name: str = "cylinder",
-        **keys: Any,
-    ) -> None:
+        self, diameter: float, pressure: float, *, curves: Sequence[Any] = (),
+        name: str = "cylinder", **keys: Any,
+    ) -> None:  # fmt: skip
         """Make the test; diameter in mm, pressure in MPa.
 
         curves : one a measured repetition, (deflection mm, load N), (n, 2) or a DataFrame. keys :
@@ -541,10 +522,8 @@ def _columns(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, l
 
 
 def _gauges(
-    gauge: float | Mapping[str, float] | None,
-    keys: Mapping[str, Any],
-    here: Iterable[str],
-) -> dict[str, Any]:
+    gauge: float | Mapping[str, float] | None, keys: Mapping[str, Any], here: Iterable[str],
+) -> dict[str, Any]:  # fmt: skip
     """Return the tables of directions with the length of their gauge, where it is given."""
     if gauge is None:
         return {}

@@ -224,17 +224,11 @@ class Project:
 
     @classmethod
     def of(
-        cls,
-        tests: Definition | OwnTest | Sequence[Definition | OwnTest],
-        law: Law | None = None,
-        *,
-        fabric: Fabric,
-        cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]] = (),
+        cls, tests: Definition | OwnTest | Sequence[Definition | OwnTest], law: Law | None = None,
+        *, fabric: Fabric, cards: Mapping[str, MaterialCard] | Sequence[Mapping[str, Any]] = (),
         solver_options: Mapping[str, Mapping[str, Any]] | None = None,
-        folder: Path | str | None = None,
-        need_data: bool = True,
-        **fit: Any,
-    ) -> Project:
+        folder: Path | str | None = None, need_data: bool = True, **fit: Any,
+    ) -> Project:  # fmt: skip
         """Put a project together from objects, in mm, N and MPa.
 
         cards : by name, or what each [[card]] says. solver_options : by name of a solver. folder :
@@ -480,13 +474,9 @@ def read_project(
 
 
 def _project(
-    content: Mapping[str, Any],
-    path: Path,
-    text: str,
-    data: Folders | None,
-    need_data: bool,
+    content: Mapping[str, Any], path: Path, text: str, data: Folders | None, need_data: bool,
     made: Sequence[Definition] = (),
-) -> Project:
+) -> Project:  # fmt: skip
     """Return the project of a file's content, or of objects: one way for both."""
     file = validated(content, path)
     said, units = file.fabric, file.units
@@ -550,13 +540,9 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
 
 
 def _written(
-    file: ProjectFile,
-    path: Path,
-    text: str,
-    tests: Mapping[str, Test],
-    data: Folders | None,
+    file: ProjectFile, path: Path, text: str, tests: Mapping[str, Test], data: Folders | None,
     made: Sequence[Definition],
-) -> Written:
+) -> Written:  # fmt: skip
     sections, whole = {}, {}
     objects: dict[str, Definition] = {}
     for name, kind in kinds().items():

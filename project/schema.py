@@ -370,11 +370,9 @@ def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:
         form = form_named(section.form or FORM, section.model_extra or {}, ends)
         law = HypoelasticLaw(
             place.scales.modulus * np.array(section.beta),
-            NU12 if section.nu12 is None else section.nu12,
-            np.array(ends),
-            section.thickness_change or place.fabric.thickness_change,
-            form,
-        )
+            NU12 if section.nu12 is None else section.nu12, np.array(ends),
+            section.thickness_change or place.fabric.thickness_change, form,
+        )  # fmt: skip
     except InputError as error:
         raise InputError(place.path, f"{at}.{error.field}", error.problem) from None
     return MaterialCard(law, thickness, section.name)

@@ -146,11 +146,9 @@ Records = Iterator[Event | None]
 
 
 def every_start(
-    setup: FitSetup,
-    done: Sequence[StartRecord],
-    ran: Callable[[Event | None], None],
+    setup: FitSetup, done: Sequence[StartRecord], ran: Callable[[Event | None], None],
     told: Callable[[StartRecord | Stage], None],
-) -> list[StartRecord]:
+) -> list[StartRecord]:  # fmt: skip
     """Return how every start of a fit ended, by number.
 
     Coarse to fine, all starts run on quads of twice the edge, as most analyses only come near an
@@ -257,27 +255,15 @@ Progress = Callable[[FitEvent | None], None]
 @checked
 def fit(
     project: Project | Definition | OwnTest | Sequence[Definition | OwnTest],
-    tests: str | Sequence[str] | Law | None = None,
-    *,
-    law: Law | None = None,
-    fabric: Fabric | None = None,
-    weights: Mapping[str, float] | None = None,
-    solver_options: Mapping[str, Mapping[str, Any]] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    starts_from: str | None = None,
-    earlier: Path | str | None = None,
-    method: str | None = None,
-    jobs: int | None = None,
-    scheduler: str | None = None,
-    trust: Sequence[str] = (),
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Progress | bool | None = None,
-    command_line: Sequence[str] | None = None,
-    **settings: Any,
-) -> Fit:
+    tests: str | Sequence[str] | Law | None = None, *, law: Law | None = None,
+    fabric: Fabric | None = None, weights: Mapping[str, float] | None = None,
+    solver_options: Mapping[str, Mapping[str, Any]] | None = None, starts: int | None = None,
+    seed: int | None = None, starts_from: str | None = None, earlier: Path | str | None = None,
+    method: str | None = None, jobs: int | None = None, scheduler: str | None = None,
+    trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
+    overwrite: bool = False, progress: Progress | bool | None = None,
+    command_line: Sequence[str] | None = None, **settings: Any,
+) -> Fit:  # fmt: skip
     """Fit the law of a project to its tests, from random feasible starts.
 
     project : one that was read; or tests as objects (`OwnTest` among them), and then the law
@@ -386,28 +372,17 @@ def _records(
 
 
 def stored_fit(
-    project: Project,
-    tests: Sequence[str],
-    place: Path | None,
-    *,
-    resume: bool,
-    overwrite: bool,
-    progress: Callable[[Any], None],
-    command_line: Sequence[str] | None,
-) -> Fit:
+    project: Project, tests: Sequence[str], place: Path | None, *, resume: bool, overwrite: bool,
+    progress: Callable[[Any], None], command_line: Sequence[str] | None,
+) -> Fit:  # fmt: skip
     """Fit one of a series and write its page into the folder `place`, if any.
 
     resume : continue what the folder holds, if anything. Raises the errors of `fit`.
     """
     found = fit(
-        project,
-        tests,
-        out=place,
-        resume=resume and place is not None and Store(place).used,
-        overwrite=overwrite,
-        progress=progress,
-        command_line=command_line,
-    )
+        project, tests, out=place, resume=resume and place is not None and Store(place).used,
+        overwrite=overwrite, progress=progress, command_line=command_line,
+    )  # fmt: skip
     if place is not None:
         found.report(place)
     return found
@@ -570,11 +545,9 @@ def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]])
         for name in names
     }
     return {
-        "version": __version__,
-        "solver": solver_facts(setup.project.fit.solver, solver.identity),
-        **_of_project(setup.project, names),
-        "files": files,
-    }
+        "version": __version__, "solver": solver_facts(setup.project.fit.solver, solver.identity),
+        **_of_project(setup.project, names), "files": files,
+    }  # fmt: skip
 
 
 def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
