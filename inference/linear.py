@@ -87,9 +87,8 @@ class Linear:
 
     def spread_over_curvature(self, row: Array) -> float:
         """Return the variance of row @ unknowns over that of weighted squares of noise one (or
-        NaN).
-        So much too fast these grow along it for a likelihood ratio (J. T. Kent, Robust properties
-        of likelihood ratio tests, Biometrika 69, 1982)."""
+        NaN). So much too fast these grow along it for a likelihood ratio (J. T. Kent, Robust
+        properties of likelihood ratio tests, Biometrika 69, 1982)."""
         scaled = row * self.sizes
         along = self.sharp.T @ scaled
         curved = float(along**2 @ (1.0 / self.curvature))

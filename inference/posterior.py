@@ -112,10 +112,8 @@ def _walked(
 @compiled(fastmath=True)
 def _walk(away, begin, ways, slopes, share):  # type: ignore[no-untyped-def]
     """Walk from `away` (count, n), in place, along ways (steps, n) of unit length.
-
     begin : (m,) least less rows @ place, at most zero. slopes : (steps, m) rows @ way. share :
-    (count, steps) between 0 and 1, of the probability on each line.
-    """
+    (count, steps) between 0 and 1, of the probability on each line."""
     steps, n = ways.shape
     inverse, room = 1.0 / slopes, np.empty(len(begin))
     for d in range(len(away)):
@@ -160,9 +158,7 @@ def _below(x: float) -> float:
 @compiled()
 def _quantile(chance: float) -> float:
     """Return x with the probability `chance`, at most a half, below it.
-
-    Newton's method on its logarithm, which is concave, from a bound below the root.
-    """
+    Newton's method on its logarithm, which is concave, from a bound below the root."""
     x, wanted = -math.sqrt(max(-2.0 * math.log(2.0 * chance), 0.0)), math.log(chance)
     for _ in range(NEWTON):
         below = _below(x)
@@ -295,9 +291,8 @@ def bands_of(
     posterior: Posterior, law: HypoelasticLaw, strains: dict[str, Array]
 ) -> dict[str, Array]:
     """Return (2, n) MPa by modulus, the ends of its band at strains (n,), from draws inside the
-    bounds.
-    The law's own modulus is always inside: where the mesh error is not taken out, the band reaches
-    from there to the moduli of finer meshes."""
+    bounds. The law's own modulus is always inside: where the mesh error is not taken out, the band
+    reaches from there to the moduli of finer meshes."""
     unknowns = posterior.unknowns
     coefficients = posterior.drawn @ unknowns.to_coefficients.T
     bands = {}

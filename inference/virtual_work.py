@@ -47,11 +47,10 @@ def smoothed(
     model: Any, targets: Sequence[Any], unit: Array, base: Array, shifted: bool
 ) -> tuple[MeasuredShape, Array]:
     """Return a bubble's model with measured fields smoothed, and their roots (frames, k, k):
-    |root @ amounts| is the norm, at the measured points, of such a sum of the k fields.
-    targets : with `displacement` (n, 3) mm, and `at` from nodal values to their places. unit :
-    (nodes, 2) of the unit disk. base : (frames, nodes, 3) mm that is not smoothed, the motion of
-    the rim. shifted : less a rigid displacement. InputError : too few points, or on one side only.
-    """
+    |root @ amounts| is the norm, at the measured points, of such a sum of the k fields. targets :
+    with `displacement` (n, 3) mm, and `at` from nodal values to their places. unit : (nodes, 2) of
+    the unit disk. base : (frames, nodes, 3) mm that is not smoothed, the motion of the rim. shifted
+    : less a rigid displacement. InputError : too few points, or on one side only."""
     free = np.ones(unit.shape[0] * 3)
     free[model.fixed] = 0.0
     held = free.reshape(-1, 3)
@@ -81,7 +80,6 @@ def smoothed(
 
 class GapObjective:
     """The distance of a measured shape from equilibrium: one block of rows with independent noise.
-
     like : the objective of a fit to the same data."""
 
     unit = "mm"

@@ -41,10 +41,8 @@ TRIES = 200
 @dataclass(frozen=True, eq=False)
 class CardCertainty:
     """The uncertainty that a fit leaves in its law; words : what is in it, and of what.
-
     directions : (k, free) MPa, one standard deviation each; the least certain first. bands : (3, n)
-    by modulus, strain and ends of the fit's own band in MPa; empty where the card has none.
-    """
+    by modulus, strain and ends of the fit's own band in MPa; empty where the card has none."""
 
     directions: base.Array
     words: str = ""

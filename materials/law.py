@@ -48,13 +48,11 @@ JUMP = 1e-6
 @dataclass(frozen=True, eq=False)
 class HypoelasticLaw:
     """Tangent moduli and Poisson's ratio of a coated fabric.
-
     beta : (size,) MPa, as the form takes them. strain_range : (3,) ends (eps1, eps2, gamma12),
     beyond which, and below zero, a modulus keeps its end value. thickness_change : "constant"
     (shells that keep it) or "incompressible" (resultant sigma t0 / area ratio). pieces : (3, P, 5)
     MPa, the moduli as piecewise cubics (`forms.base.pieces_of`); made here. memory : unloading and
-    reloading (`memory.py`); None: every loading is along the same curve.
-    """
+    reloading (`memory.py`); None: every loading is along the same curve."""
 
     beta: Array
     nu12: float = 0.24
@@ -106,9 +104,7 @@ class HypoelasticLaw:
         thickness_change: ThicknessChange = "constant"
     ) -> Self:  # fmt: skip
         """Return the law of (3,) moduli (MPa) that are constant in three regions of their strain.
-
-        breaks : (3, 2) two strains for each of (eps1, eps2, gamma12).
-        """
+        breaks : (3, 2) two strains for each of (eps1, eps2, gamma12)."""
         for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
             if np.shape(values) != (3,):
                 raise InputError(None, name, f"expected 3 moduli, got {values}")
@@ -185,9 +181,8 @@ class HypoelasticLaw:
         self, state: ArrayLike, strain: ArrayLike, stress: ArrayLike
     ) -> tuple[Array, Array, Array]:
         """Return stress (n, 3), tangent (n, 3, 3) and state after an increment of any history.
-
-        state : (n, 3) strain before it, or (n, 9) as the call before it returned; strain : (n, 3).
-        """
+        state : (n, 3) strain before it, or (n, 9) as the call before it returned; strain : (n,
+        3)."""
         old, new = (
             np.pad(a, ((0, 0), (0, max(0, self.state - a.shape[1]))))[:, : self.state]
             for a in (np.atleast_2d(np.asarray(a, dtype=float)) for a in (state, strain))
@@ -200,10 +195,8 @@ class HypoelasticLaw:
         stress_old: ArrayLike | None = None
     ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
         """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), state (n, 3 or 9), corotated stress (n, 3).
-
         The state is log strain, then what a memory keeps; strain_old is that of the last call.
-        gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors.
-        """
+        gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors."""
         f = np.asarray(gradient, dtype=float)
         right = np.einsum("nki,nkj->nij", f, f)
         zero = np.zeros((len(f), 3))
@@ -218,9 +211,7 @@ def moduli_html(
     band: Callable[[str, Array], tuple[Array, Array]] | None = None, level: str = "",
 ) -> str:  # fmt: skip
     """Return a table of the moduli at rest, and halfway to and at the end of their range.
-
-    band : of a modulus by its name, at strains (n,). level : its name.
-    """
+    band : of a modulus by its name, at strains (n,). level : its name."""
     rows: list[list[object]] = []
     for name, component in COMPONENTS.items():
         end = float(law.strain_range[component])
@@ -276,10 +267,8 @@ def law_slopes(
     law: HypoelasticLaw, parameters: Sequence[str], thickness: float
 ) -> tuple[Array, Array]:
     """Return derivatives of the pieces' coefficients (3, P, 4, np) and of `law.coupling`, by np.
-
     parameters : "beta_i" (per MPa), "nu12", `memory.NAMES` and "thickness" (per mm); by any other
-    they are zero.
-    """
+    they are zero."""
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
     coupling, gains = np.zeros((len(law.coupling), len(parameters))), ratio_map(law.form)
@@ -305,12 +294,10 @@ DEFINITE = 1.02
 
 def definite_rows(form: Form, nu12: float, strain_range: Sequence[float]) -> Array:
     """Return (n, size) so that the law is positive definite in a pull where rows @ beta >= 0.
-
     That is E1 E2 > (nu12 E2)^2. What is pulled contracts, so that the modulus across is that at
     zero strain: E1(0) > nu12^2 E2(eps2) in a pull along the fill, E1(eps1) > nu12^2 E2(0) along the
     warp. Moduli of the load ratio are those of the pull, and of equal loads, where every path
-    begins.
-    """
+    begins."""
     share = DEFINITE * nu12**2
     none, most = RATIO_ENDS
 

@@ -48,12 +48,10 @@ RECALLED = 13
 @dataclass(frozen=True)
 class Memory:
     """Permanent set and stiffness below the largest strain; each of warp, fill, shear.
-
     permanent_set : share of the largest strain that is kept, 0 to below 1, where that is small;
     saturation : per unit of strain, by which the share falls: set / (1 + saturation m). unloading,
     reloading : tangent modulus where unloading begins, and where reloading ends, over the mean
-    modulus between set and largest strain; 1 <= reloading <= unloading < 2.
-    """
+    modulus between set and largest strain; 1 <= reloading <= unloading < 2."""
 
     permanent_set: Sequence[float]
     unloading: Sequence[float]
@@ -120,9 +118,7 @@ def recall(
     out: Array,
 ) -> bool:  # fmt: skip
     """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
-
-    Returns False where all of it is first loading; the derivatives are then those of F(x).
-    """
+    Returns False where all of it is first loading; the derivatives are then those of F(x)."""
     out[:] = 0.0
     out[M_NEW], out[BY_M] = largest, 0.0
     m, side = abs(largest), -1.0 if largest < 0.0 else 1.0
@@ -214,11 +210,9 @@ def remember(
     dh_old: Array, weights: Array, mean: Array, out: Array,
 ) -> None:  # fmt: skip
     """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
-
     rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
     and f are replaced by theirs after the increment. mean (np,) : of the modulus; kept on a first
-    loading. out : of `recall`.
-    """
+    loading. out : of `recall`."""
     again = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
     change, by_m = h[k] - h_old[k], out[BY_M]
     if out[ON] == 0.0:  # F is that of the largest strain before
@@ -245,10 +239,8 @@ def own_stress(
     pieces: Array, coupling: Array, k: int, strain: Array, rows: Array, by_coupling: Array
 ) -> tuple[Array, Array]:
     """Return the stress (n,) of a bar along a history of its strain (n,), and slopes (n, np).
-
     k : 0 warp, 1 fill; the bar is pulled along it and free to contract. rows, by_coupling : of
-    `law_slopes`.
-    """
+    `law_slopes`."""
     count = by_coupling.shape[1]
     stress, slopes, out = np.empty(len(strain)), np.empty((len(strain), count)), np.empty(RECALLED)
     h, h_old, by = np.zeros(9), np.zeros(9), np.zeros((9, count))

@@ -103,9 +103,7 @@ READERS: dict[str, Callable[..., pd.DataFrame]] = {
 @dataclass(frozen=True, eq=False)
 class Registered:
     """A bubble in the test's coordinates, and how these were found; `str` is a line of it.
-
-    numbers : centre, tilt, warp and their errors, in mm and degrees, as in result.json.
-    """
+    numbers : centre, tilt, warp and their errors, in mm and degrees, as in result.json."""
 
     bubble: Bubble
     registration: Registration

@@ -32,10 +32,8 @@ def write_project(
     form: str = "cubic", **said: Any,
 ) -> None:  # fmt: skip
     """Write a project file that can be read.
-
     tests : how many of each kind. name, thickness : of the fabric, mm. said : `USUAL` values that
-    are otherwise; mm and kPa. InputError: what is said makes no project. OutputError.
-    """
+    are otherwise; mm and kPa. InputError: what is said makes no project. OutputError."""
     text = project_text(tests, name, thickness, form, **said)
     with tempfile.TemporaryDirectory() as folder:  # so that a wrong one leaves no folder
         tried = Path(folder) / path.name

@@ -150,11 +150,9 @@ class Held:
 @dataclass(frozen=True, eq=False, repr=False)
 class Definition:
     """A test as its table [[kind]] of a project file says it, in mm, N and MPa.
-
     section : the keys of the table, files by full paths. files : that stand in the section by name
     and are held in memory. function : an objective of one's own, in place of a name. InputError:
-    names the key that is wrong.
-    """
+    names the key that is wrong."""
 
     kind: str
     section: Mapping[str, Any]
@@ -208,10 +206,8 @@ class Definition:
 
     def placed(self, folder: Path, beside: Path | None = None) -> dict[str, Any]:
         """Return the section with its files written below a folder; raises OutputError.
-
         The name of their folder tells data apart, so that nothing else is written over. beside :
-        the folder from which the section names it.
-        """
+        the folder from which the section names it."""
         if not self.files:
             return dict(self.section)
         texts = {name: file.text for name, file in self.files.items()}

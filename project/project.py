@@ -67,12 +67,10 @@ HEAD = "# As it was run: what the project says, with the options of the command.
 @dataclass(frozen=True, eq=False)
 class Written:
     """The words of a project file, in its own units.
-
     common : [fabric] and [units]. tests : the section of each test by its name, with the folder of
     its data, without defaults (which need not go with each other when they are said). whole : each
     with its defaults. kinds : of the tests, by name. cards : each [[card]]. made : the objects that
-    the tests are of, by name, with arrays and cards in files below `held`; none of a file.
-    """
+    the tests are of, by name, with arrays and cards in files below `held`; none of a file."""
 
     text: str
     common: Mapping[str, Any]
@@ -88,10 +86,8 @@ def section_as_run(
     said: Mapping[str, Any], name: str, folder_key: str | None, base: Path, folder: Path | None
 ) -> Settings:
     """Return a test's section with its name, and with the folder of its files in full.
-
     folder_key : dotted, None where the kind has none. base : the project's folder. folder : what
-    the command says instead of the section.
-    """
+    the command says instead of the section."""
     whole = {**plain(said), "name": name}
     if folder_key is None:
         return whole

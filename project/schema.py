@@ -75,9 +75,7 @@ class MarginSection(Section):
 
 class LawSection(Section):
     """[law]: the form of the moduli, and between what they are looked for.
-
-    Keys beyond these belong to a form (knots, breaks); it checks them.
-    """
+    Keys beyond these belong to a form (knots, breaks); it checks them."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
     __pydantic_extra__: dict[str, Any] = Field(init=False)
@@ -196,9 +194,8 @@ def _list_of(section: type[BaseModel]) -> Any:
 
 def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
     """Check a whole project file; tests have the keys of [defaults.KIND] that they do not say.
-
-    InputError: in one line, the file `path` and the dotted key. PlugInFailure: of a kind of test.
-    """
+    InputError: in one line, the file `path` and the dotted key. PlugInFailure: of a kind of
+    test."""
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
         raise InputError(path, "project.kind", OLD)
     model = project_file()
@@ -247,9 +244,7 @@ DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     """Return the schema of a whole file, as plain data.
-
-    A test may have its keys from [defaults.KIND], so that none is required here.
-    """
+    A test may have its keys from [defaults.KIND], so that none is required here."""
     schema = project_file().model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
     theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}

@@ -49,11 +49,9 @@ UNBALANCED = (
 @dataclass(frozen=True, eq=False)
 class Gap:
     """The distance of one comparison from equilibrium with the estimated law.
-
     chi : it over the noise, one where nothing but noise is left. rms : in `unit`s, of rows that err
     independently. places (n, 2) mm and field (n, 3) mm, the displacement from the measured shape to
-    equilibrium in the last frame, to first order; None where no shape was measured.
-    """
+    equilibrium in the last frame, to first order; None where no shape was measured."""
 
     name: str
     chi: float
@@ -73,9 +71,7 @@ class Gap:
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Moduli by virtual work, as `Fit` has those of a fit; unknowns beside the moduli are as said.
-
-    seconds : of processor time, without reading the data.
-    """
+    seconds : of processor time, without reading the data."""
 
     setup: FitSetup
     problem: FitProblem
@@ -182,9 +178,7 @@ def _fitted(
     setup: FitSetup, comparisons: Sequence[Comparison], levels: Mapping[str, float]
 ) -> tuple[FitProblem, Evaluation]:
     """Return the fit weighed by noise and its best, from the middle of the bounds; SolverFailure.
-
-    levels : noise by name of a comparison, instead of its data's least.
-    """
+    levels : noise by name of a comparison, instead of its data's least."""
     own, factors = setup.problem_of(comparisons), []
     for one in own.comparisons:
         objective = one.objective

@@ -75,11 +75,9 @@ def distinct(
     problem: FitProblem, records: Sequence[StartRecord], tolerance: float
 ) -> list[list[StartRecord]]:
     """Return the starts grouped by optimum, in the order of their numbers.
-
     Each is compared with the first of a group, by objective (beyond `tolerance`) and by moduli up
     to the strains that either reached: so groups do not depend on starts of higher numbers. A start
-    without an optimum is a group of its own.
-    """
+    without an optimum is a group of its own."""
     groups: list[list[StartRecord]] = []
     for record in sorted(records, key=lambda r: r.number):
         for group in groups:
@@ -150,12 +148,10 @@ def every_start(
     told: Callable[[StartRecord | Stage], None],
 ) -> list[StartRecord]:  # fmt: skip
     """Return how every start of a fit ended, by number.
-
     Coarse to fine, all starts run on quads of twice the edge, as most analyses only come near an
     optimum; one start of each distinct optimum is continued on the full mesh, the others take its
     fit. done : starts that ended before. ran : receives every record as it ends, None now and then.
-    told : receives a stage as it begins, and its earlier records.
-    """
+    told : receives a stage as it begins, and its earlier records."""
     fit, executor = setup.project.fit, executor_of(setup.project)
     full, coarse = (
         {r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
@@ -207,9 +203,7 @@ def _ended(
 
 def _continuation(setup: FitSetup, groups: Sequence[Sequence[StartRecord]]) -> Task:
     """Return the task that fits a group on the full mesh, from its first good optimum.
-
-    A start without an optimum on the coarse mesh begins where it was drawn.
-    """
+    A start without an optimum on the coarse mesh begins where it was drawn."""
     problem, seed = setup.problem(), setup.project.fit.seed
 
     def fit(number: int, tell: Callable[[Event], None]) -> StartRecord:
@@ -376,9 +370,7 @@ def stored_fit(
     progress: Callable[[Any], None], command_line: Sequence[str] | None,
 ) -> Fit:  # fmt: skip
     """Fit one of a series and write its page into the folder `place`, if any.
-
-    resume : continue what the folder holds, if anything. Raises the errors of `fit`.
-    """
+    resume : continue what the folder holds, if anything. Raises the errors of `fit`."""
     found = fit(
         project, tests, out=place, resume=resume and place is not None and Store(place).used,
         overwrite=overwrite, progress=progress, command_line=command_line,
@@ -438,9 +430,7 @@ NOTHING = "nothing doubtful"
 @dataclass(frozen=True, eq=False, repr=False)
 class Check:
     """A look at the data of tests, with their doubts.
-
-    estimate : by virtual work; None where there is none, and `not_estimated` why.
-    """
+    estimate : by virtual work; None where there is none, and `not_estimated` why."""
 
     setup: FitSetup
     judgements: tuple[Judgement, ...]

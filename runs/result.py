@@ -353,9 +353,7 @@ NEAR = 0.95
 @dataclass(frozen=True)
 class Answer:
     """One modulus at one logarithmic strain; end : it is fitted no further.
-
-    value : MPa. per_width : kN/m. sigma : relative. band : MPa, 95 %; None if not known.
-    """
+    value : MPa. per_width : kN/m. sigma : relative. band : MPa, 95 %; None if not known."""
 
     modulus: str
     strain: float
@@ -471,9 +469,8 @@ COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 
 def coefficients_of(fit: Fit) -> pd.DataFrame:
     """Return coefficients of the law in the project's unit, then the nuisance, a row each.
-
-    `COLUMNS` (sigma by noise, bounds left aside), then correlations by name. NaN where not known.
-    """
+    `COLUMNS` (sigma by noise, bounds left aside), then correlations by name. NaN where not
+    known."""
     import pandas as pd
 
     unknowns, sure, scales = fit.problem.unknowns, fit.best.certainty, fit.project.scales

@@ -399,10 +399,8 @@ def cell_blocks(
     names: Mapping[int, tuple[str, tuple[int, ...] | None]],
 ) -> list[tuple[str, NDArray[Any]]]:  # fmt: skip
     """Return meshio's blocks of elements of one type, their nodes counted from 0.
-
     numbers : (n,) of the nodes, increasing. names : meshio's name by type, and its order of nodes.
-    InputError : an unknown type or node.
-    """
+    InputError : an unknown type or node."""
     cells: list[tuple[str, list[Any]]] = []
     for kind, nodes in elements:
         if kind not in names:

@@ -128,9 +128,7 @@ def map_in_range(form: Form, strain_range: Sequence[float]) -> Array:
 
 def pieces_of(form: Form, beta: ArrayLike, strain_range: Sequence[float]) -> Array:
     """Return (3, P, 5) MPa, read-only: upper end and coefficients of each piece.
-
-    The last upper end is that of the range; a component with fewer pieces repeats its last one.
-    """
+    The last upper end is that of the range; a component with fewer pieces repeats its last one."""
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
     pieces = np.empty((*uppers.shape, 5))
     pieces[..., 0] = uppers
@@ -178,9 +176,8 @@ Maker = Callable[[str, Mapping[str, Any], Sequence[float]], Form]
 @dataclass(frozen=True)
 class Offer:
     """A form by name: its maker, its settings, what its moduli depend on.
-
-    of_card : whether it is what a card says of a form that has no name, and no choice of its own.
-    """
+    of_card : whether it is what a card says of a form that has no name, and no choice of its
+    own."""
 
     name: str
     make: Maker
@@ -222,9 +219,7 @@ def of_load_ratio(name: str) -> bool:
 
 def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:
     """Return the form of that name, as a project's `[law]` or a card says it.
-
-    settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none.
-    """
+    settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
     offer, plug_in = _offer(name)
     if offer is None:
         near = difflib.get_close_matches(name, form_names(), n=1, cutoff=0.5)
