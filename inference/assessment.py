@@ -200,10 +200,8 @@ def _limited(problem: FitProblem, best: Evaluation) -> list[Note]:
 
 def _on_bounds(names: Sequence[str], values: Array, lower: Array, upper: Array) -> list[Note]:
     low, high = (away <= ON_BOUND * (upper - lower) for away in (values - lower, upper - values))
-    return [
-        Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
-        for i in np.flatnonzero(low | high).tolist()
-    ]
+    return [Note(BOUND, f"{names[i]} lies on its {'lower' if low[i] else 'upper'} bound")
+            for i in np.flatnonzero(low | high).tolist()]  # fmt: skip
 
 
 #: Of the width of the bounds: as uncertain as a number that may be anywhere between them.
@@ -296,8 +294,5 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
 
 def notes_of_verdicts(found: tuple[Verdict, ...]) -> list[Note]:
     """Return notes on unknowns that the data do not determine."""
-    return [
-        Note(UNCERTAIN, f"{verdict.name} is {verdict.words}")
-        for verdict in found
-        if not verdict.determined and (verdict.shared or verdict.prior is None)
-    ]
+    return [Note(UNCERTAIN, f"{verdict.name} is {verdict.words}") for verdict in found
+            if not verdict.determined and (verdict.shared or verdict.prior is None)]  # fmt: skip

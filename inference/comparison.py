@@ -62,12 +62,9 @@ class NuisanceOf:
     def names(self) -> tuple[str, ...]:
         """Return all names, with the comparison's before its own ones where there are several."""
         several = len(self.comparisons) > 1
-        own = tuple(
-            f"{comparison}: {n.name}" if several else n.name
-            for comparison, nuisance in self.comparisons.items()
-            for n in nuisance
-            if not n.shared
-        )
+        own = tuple(f"{comparison}: {n.name}" if several else n.name
+                    for comparison, nuisance in self.comparisons.items() for n in nuisance
+                    if not n.shared)  # fmt: skip
         return (*(n.name for n in self.shared), *own)
 
     @property
@@ -103,11 +100,8 @@ class NuisanceOf:
 
     def of_law(self, all_values: Array) -> dict[str, float]:
         """Return the unknown numbers of the law by name, clipped to their bounds (steps round)."""
-        return {
-            n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
-            for k, n in enumerate(self.shared)
-            if n.law_parameter is not None
-        }
+        return {n.law_parameter: float(np.clip(all_values[k], n.lower, n.upper))
+                for k, n in enumerate(self.shared) if n.law_parameter is not None}  # fmt: skip
 
 
 NEAR = 0.02  # largest predicted change of displacement, relative, for a warm start
@@ -301,11 +295,8 @@ class Comparison:
         return history, self._chain(by_solver, len(free), nuisance)
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
-        return {
-            n.model_parameter: n.scale * (nuisance[n.name] - n.start)
-            for n in self.nuisance
-            if n.model_parameter is not None
-        }
+        return {n.model_parameter: n.scale * (nuisance[n.name] - n.start) for n in self.nuisance
+                if n.model_parameter is not None}  # fmt: skip
 
     def model_at(self, nuisance: Mapping[str, float]) -> Any:
         """Return the model at nuisance values by name; SolverFailure where there is none."""

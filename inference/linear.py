@@ -148,10 +148,8 @@ def posteriors_of(
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
     """Return (n,) MPa by modulus at strains (n,), of the law at unknowns y."""
     coefficients = unknowns.to_coefficients @ y[: unknowns.size]
-    rows = {
-        name: modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
-        for name, strain in strains.items()
-    }
+    rows = {name: modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
+            for name, strain in strains.items()}  # fmt: skip
     return {name: own[:, list(unknowns.free)] @ coefficients for name, own in rows.items()}
 
 
@@ -394,10 +392,8 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     curvature = weighted @ best.jacobian
     # An unknown of which the data say nothing stays where it is.
     curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
-    without, there = (
-        bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
-        for residual in (best.residual, best.residual + error)
-    )
+    without, there = (bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
+                      for residual in (best.residual, best.residual + error))  # fmt: skip
     if without is None or there is None:
         return None
     step = there - without

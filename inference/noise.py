@@ -323,11 +323,8 @@ def discrepancy(
 ) -> Discrepancy | None:  # fmt: skip
     """Return the discrepancy of blocks (n,) at places (n, 2) mm; None where values are too few.
     Doubt is taken off the smooth shapes; `unknowns` have taken as many out of the residual."""
-    usable = [
-        (block, doubt, at)
-        for block, doubt, at in zip(blocks, doubts, places, strict=True)
-        if len(block) >= LEAST_VALUES * _shapes(NEXT) and block.any()
-    ]
+    usable = [(block, doubt, at) for block, doubt, at in zip(blocks, doubts, places, strict=True)
+              if len(block) >= LEAST_VALUES * _shapes(NEXT) and block.any()]  # fmt: skip
     if not usable:
         return None
     # Power in units of each block's own, and shapes.
@@ -363,10 +360,8 @@ def smooth_shapes(places: Array) -> Array:
     low, high = places.min(axis=0), places.max(axis=0)
     unit = 2 * (places - low) / np.where(high > low, high - low, 1.0) - 1.0
     powers = [(i, total - i) for total in range(NEXT + 1) for i in range(total, -1, -1)]
-    x, y = (
-        np.stack([legval(one, np.eye(NEXT + 1)[i]) for i in range(NEXT + 1)], axis=1)
-        for one in unit.T
-    )
+    x, y = (np.stack([legval(one, np.eye(NEXT + 1)[i]) for i in range(NEXT + 1)], axis=1)
+            for one in unit.T)  # fmt: skip
     columns = np.stack([x[:, i] * y[:, j] for i, j in powers], axis=1)
     return np.asarray(np.linalg.qr(columns)[0])
 
@@ -458,11 +453,8 @@ def alike_in_all(
     whole = np.concatenate(slopes)
     _, size, axes = np.linalg.svd(whole, full_matrices=False)
     kept = axes[size > NOTHING * size[0]] if size[0] > 0 else axes[:0]
-    some = [
-        k
-        for k, own in enumerate(places)
-        if np.ptp(own) >= COVERED * (high - low) and len(own) >= len(kept) + SHAPES + 1
-    ]
+    some = [k for k, own in enumerate(places) if np.ptp(own) >= COVERED * (high - low)
+            and len(own) >= len(kept) + SHAPES + 1]  # fmt: skip
     count = min(SHAPES, len(some) - 2)
     if count < 1:
         return None
@@ -584,19 +576,14 @@ def noise_tests(problem: FitProblem, residual: Array) -> dict[str, NoiseTest]:
         if misfit.noise_is == "given" and misfit.noise > 0:
             given[name] = misfit, len(own), independent
     taken = problem.unknowns.count / max(total, 1.0)
-    return {
-        name: NoiseTest(misfit, values, independent, max(independent * (1.0 - taken), 1.0))
-        for name, (misfit, values, independent) in given.items()
-    }
+    return {name: NoiseTest(misfit, values, independent, max(independent * (1.0 - taken), 1.0))
+            for name, (misfit, values, independent) in given.items()}  # fmt: skip
 
 
 def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
     """Return notes where more, or less, is left than the noise given can leave."""
-    return [
-        Note(kind, f"{test.words}: {REASONS[kind]}", name)
-        for name, test in tests.items()
-        if (kind := test.note_kind) is not None
-    ]
+    return [Note(kind, f"{test.words}: {REASONS[kind]}", name) for name, test in tests.items()
+            if (kind := test.note_kind) is not None]  # fmt: skip
 
 
 REASONS = {

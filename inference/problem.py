@@ -266,10 +266,8 @@ class Group:
 
 def draw_counts(groups: Sequence[Group], random: np.random.Generator) -> list[list[int]]:
     """Return the number of draws of each unit of each group: as many as there are units."""
-    return [
-        random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
-        for group in groups
-    ]
+    return [random.multinomial(len(group.units), [1 / len(group.units)] * len(group.units)).tolist()
+            for group in groups]  # fmt: skip
 
 
 def factors_of(

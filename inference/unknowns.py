@@ -40,10 +40,8 @@ class LawBounds:
             if not 0 < low < high:
                 problem = f"expected 0 < least < largest, got [{low:g}, {high:g}]"
                 raise InputError(None, f"bounds.{name}", problem)
-        return cls(
-            {name: float(low) for name, (low, _) in ranges.items()},
-            {name: float(high) for name, (_, high) in ranges.items()},
-        )
+        return cls({name: float(low) for name, (low, _) in ranges.items()},
+                   {name: float(high) for name, (_, high) in ranges.items()})  # fmt: skip
 
     @classmethod
     def of_entries(

@@ -398,10 +398,8 @@ def _frames_of(table: Table, pressures: Numbers) -> tuple[list[Array], list[Arra
     if pressures is None and "pressure" in table.columns:
         pressures = [own["pressure"].iloc[0] for own in groups]
     whole = [own.assign(z=own["z"] if "z" in own else np.nan) for own in groups]
-    places, moved = (
-        [own[list(names)].to_numpy(dtype=float) for own in whole]
-        for names in (QUANTITIES[:3], QUANTITIES[3:])
-    )
+    places, moved = ([own[list(names)].to_numpy(dtype=float) for own in whole]
+                     for names in (QUANTITIES[:3], QUANTITIES[3:]))  # fmt: skip
     return places, moved, pressures
 
 

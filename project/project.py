@@ -117,11 +117,8 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     """Return what a run of these tests is given, options included, as a project file."""
     written = project.written
     assert written is not None
-    settings: Settings = {
-        **written.common,
-        "law": plain(project.law.model_dump()),
-        "fit": _fit_in_full(project, project.fit.model_dump()),
-    }
+    settings: Settings = {**written.common, "law": plain(project.law.model_dump()),
+                          "fit": _fit_in_full(project, project.fit.model_dump())}  # fmt: skip
     if options := _solver_options(project, project.fit.solver):
         settings["solver"] = {project.fit.solver: options}
     for name in tests:
@@ -157,10 +154,8 @@ def _cards(project: Project) -> list[Settings]:
     """Return each [[card]], its file in full."""
     assert project.written is not None
     here = project.path.parent
-    return [
-        {**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
-        for said in project.written.cards
-    ]
+    return [{**said, "file": os.path.abspath(here / said["file"])} if "file" in said else dict(said)
+            for said in project.written.cards]  # fmt: skip
 
 
 def project_text(settings: Mapping[str, Any]) -> str:
@@ -264,10 +259,8 @@ class Project:
         """Return the tests as objects, by name; those of a file with the folder of their data."""
         if (written := self.written) is None:
             return {}
-        return {
-            name: written.made.get(name) or _definition(written.kinds[name], said, self.scales)
-            for name, said in written.tests.items()
-        }
+        return {name: written.made.get(name) or _definition(written.kinds[name], said, self.scales)
+                for name, said in written.tests.items()}  # fmt: skip
 
     @property
     def objects(self) -> dict[str, Any]:

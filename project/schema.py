@@ -179,10 +179,8 @@ class ProjectFile(CommonSections):
 @functools.cache
 def project_file() -> type[ProjectFile]:
     """Return the model with the sections of all kinds that are there."""
-    tests: dict[str, Any] = {
-        name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
-        for name, kind in kinds().items()
-    }
+    tests: dict[str, Any] = {name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
+                             for name, kind in kinds().items()}  # fmt: skip
     tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in kinds()}
     defaults = create_model("Defaults", **tables)
     return create_model("Project", __base__=ProjectFile, defaults=(defaults, defaults()), **tests)
@@ -287,13 +285,9 @@ def _plain(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     choices = [one for one in part.get("anyOf", []) if one != {"type": "null"}]
-    rest = {
-        key: _plain(value)
-        for key, value in part.items()
-        if key != "anyOf"
-        and not (key == "title" and isinstance(value, str))
-        and not (key == "default" and value is None)
-    }
+    rest = {key: _plain(value) for key, value in part.items() if key != "anyOf"
+            and not (key == "title" and isinstance(value, str))
+            and not (key == "default" and value is None)}  # fmt: skip
     if len(choices) == 1:
         return {**_plain(choices[0]), **rest}
     return {**rest, "anyOf": [_plain(one) for one in choices]} if choices else rest

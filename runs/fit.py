@@ -153,10 +153,8 @@ def every_start(
     fit. done : starts that ended before. ran : receives every record as it ends, None now and then.
     told : receives a stage as it begins, and its earlier records."""
     fit, executor = setup.project.fit, executor_of(setup.project)
-    full, coarse = (
-        {r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
-        for mesh in ("full", "coarse")
-    )
+    full, coarse = ({r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
+                    for mesh in ("full", "coarse"))  # fmt: skip
     if not fit.coarse_to_fine or coarse_problem(setup) is None:
         told(Stage("starts", fit.starts))
         for record in full.values():
@@ -478,10 +476,8 @@ class Check:
 
     def lines(self) -> list[str]:
         """Return the lines for a terminal."""
-        return [
-            f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
-            for test, severity, name, text in self.rows()
-        ]
+        return [f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
+                for test, severity, name, text in self.rows()]  # fmt: skip
 
     def __repr__(self) -> str:
         return "\n".join(self.lines())
@@ -530,10 +526,8 @@ def check(
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return all that a fit's starts depend on, as `folder.Facts`; data : of `data_rows`."""
     names = [test.test.name for test in setup.tests]
-    files = {
-        name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
-        for name in names
-    }
+    files = {name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
+             for name in names}  # fmt: skip
     return {
         "version": __version__, "solver": solver_facts(setup.project.fit.solver, solver.identity),
         **_of_project(setup.project, names), "files": files,
@@ -549,15 +543,10 @@ def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
     fit = {f"fit.{k}": v for k, v in whole["fit"].items() if k not in UNCOUNTED}
     fabric = {f"fabric.{k}": v for k, v in whole["fabric"].items() if k not in NAMES}
     units = {f"units.{key}": value for key, value in whole["units"].items()}
-    return {
-        "settings": {**fabric, **units, **law, **fit},
-        "tests": {name: _without(written.whole.get(name, {})) for name in names},
-    }
+    return {"settings": {**fabric, **units, **law, **fit},
+            "tests": {name: _without(written.whole.get(name, {})) for name in names}}  # fmt: skip
 
 
 def _without(section: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        key: _without(value) if isinstance(value, Mapping) else plain(value)
-        for key, value in section.items()
-        if key not in NAMES
-    }
+    return {key: _without(value) if isinstance(value, Mapping) else plain(value)
+            for key, value in section.items() if key not in NAMES}  # fmt: skip

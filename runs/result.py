@@ -141,10 +141,8 @@ class Fit:
     @cached_property
     def findings(self) -> dict[str, Findings]:
         """Return the findings of each test by name."""
-        return {
-            t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
-            for t in self.setup.tests
-        }
+        return {t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
+                for t in self.setup.tests}  # fmt: skip
 
     @cached_property
     def result(self) -> dict[str, Any]:
@@ -480,10 +478,8 @@ def coefficients_of(fit: Fit) -> pd.DataFrame:
     known = None if sure is None else sure.reported
     y = fit.best.point.unknowns if known is None else known.best
     values = np.concatenate([fit.law.beta[list(unknowns.free)], y[size:]]) / scale
-    ends = [
-        np.concatenate([own, other]) / scale
-        for own, other in zip(unknowns.box, unknowns.nuisance.bounds, strict=True)
-    ]
+    ends = [np.concatenate([own, other]) / scale
+            for own, other in zip(unknowns.box, unknowns.nuisance.bounds, strict=True)]  # fmt: skip
     sigma, correlations = np.full(len(names), np.nan), np.full((len(names), len(names)), np.nan)
     if known is not None:
         sigma = np.sqrt(np.diag(known.coefficients)) / scale
@@ -526,10 +522,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
         "warnings": [], "notes": [], "wall_s": fit.wall_s, "versions": versions(),
     }  # fmt: skip
-    result["misfit"] = {
-        name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
-        for name, m in fit.misfits.items()
-    }
+    result["misfit"] = {name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
+                        for name, m in fit.misfits.items()}  # fmt: skip
     result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
@@ -574,10 +568,8 @@ def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
         return {}
     leading = fit.problem.surrogate or fit.problem
     names = [c.name for c in fit.problem.comparisons]
-    numbers = {
-        name: [names.index(c.name) for c in fitted.comparisons]
-        for name, fitted in fit.tests.items()
-    }
+    numbers = {name: [names.index(c.name) for c in fitted.comparisons]
+               for name, fitted in fit.tests.items()}  # fmt: skip
     sigma = partial(uncertainty_from, leading, point, fit.law, fit.best.valid, noise=sure.rows)
     alone = {name: sigma(numbers=own) for name, own in numbers.items()}
     return {**alone, TOGETHER: dict(sure.sigma)}
@@ -606,11 +598,9 @@ def _together(fit: Fit) -> dict[str, Any]:
     for test, fitted in fit.tests.items():
         mine = np.isin(block, [names.index(c.name) for c in fitted.comparisons])
         errors[test] = float(norms[mine].sum() / fit.project.tests[test].weight)
-    return {
-        "mean_relative_error": errors,
-        "weights": {name: fit.project.tests[name].weight for name in fit.tests},
-        "pinned": pinned_numbers(fit),
-    }
+    return {"mean_relative_error": errors,
+            "weights": {name: fit.project.tests[name].weight for name in fit.tests},
+            "pinned": pinned_numbers(fit)}  # fmt: skip
 
 
 def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:
@@ -634,17 +624,10 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         own += map(as_note, history.remarks)
         notes += [note.about(comparison.name) for note in own] if several else own
     # Computed data hold no noise: that less is left than is reckoned with is as it should be.
-    computed = {
-        c.name
-        for prepared in fit.setup.tests
-        if prepared.known is not None
-        for c in fit.tests[prepared.test.name].comparisons
-    }
-    left = [
-        note
-        for note in notes_of_noise(fit.noise_tests)
-        if note.kind != BELOW_NOISE or note.of not in computed
-    ]
+    computed = {c.name for prepared in fit.setup.tests if prepared.known is not None
+                for c in fit.tests[prepared.test.name].comparisons}  # fmt: skip
+    left = [note for note in notes_of_noise(fit.noise_tests) if note.kind != BELOW_NOISE
+            or note.of not in computed]  # fmt: skip
     notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():
         told = [as_note(note) for note in findings.warnings]

@@ -459,14 +459,11 @@ def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     own = {} if proposed is None else {
         "earlier evaluations": digest_of(proposed.coefficients, proposed.objectives)
     }  # fmt: skip
-    return {
-        **own,
-        "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
-        "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
-        "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
-        "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
-        "solver": digest_of(fit.solver, problem.solver.identity),
-    }
+    return {**own, "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
+            "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
+            "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
+            "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),
+            "solver": digest_of(fit.solver, problem.solver.identity)}  # fmt: skip
 
 
 #: Edge of the full mesh over that of the coarse one.
@@ -515,11 +512,9 @@ class CoarseToFine:
         coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
         if coarse is None:
             return None
-        quads = {
-            own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
-            for other, own in zip(coarse.comparisons, setup.problem().comparisons, strict=True)
-            if hasattr(own.model, "mesh")
-        }
+        quads = {own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
+                 for other, own in zip(coarse.comparisons, setup.problem().comparisons, strict=True)
+                 if hasattr(own.model, "mesh")}  # fmt: skip
         before = sum(record.coarse_analyses for record in records)
         after = sum(record.analyses for record in records) - before
         distinct = sum(record.same_as is None for record in records)

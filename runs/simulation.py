@@ -134,11 +134,8 @@ def simulate_cards(
     of a single test stand at the top level. SolverFailure : nothing ended well. InputError,
     OutputError."""
     analyses = Analyses(project, progress, kept)
-    models = {
-        (test.name, name): test.models(card.thickness)
-        for test in tests
-        for name, card in cards.items()
-    }
+    models = {(test.name, name): test.models(card.thickness) for test in tests
+              for name, card in cards.items()}  # fmt: skip
     analyses.total = sum(map(len, models.values()))
     outcomes: dict[tuple[str, str], dict[str, CardRun]] = {}
     for (of, name), parts in models.items():
@@ -157,16 +154,10 @@ def simulate_cards(
         }
         out = Output.of(folder, test.name, len(tests) > 1)
         shown[test.name] = report_of(test.kind).simulate(test, cards, of_test, out, within_range)
-    notes = [
-        note.about(of) if len(tests) > 1 else note
-        for (of, name), parts in outcomes.items()
-        for note in _notes(name, cards[name], parts)
-    ]
-    notes += [
-        note.about(name)
-        for name, card in cards.items()
-        for note in other_thickness(card, project.fabric.thickness)
-    ]
+    notes = [note.about(of) if len(tests) > 1 else note for (of, name), parts in outcomes.items()
+             for note in _notes(name, cards[name], parts)]  # fmt: skip
+    notes += [note.about(name) for name, card in cards.items()
+              for note in other_thickness(card, project.fabric.thickness)]  # fmt: skip
     result = {
         "command": command, "project": str(project.path), "solver": analyses.solver.name,
         "notes": rows(notes), "tests": {name: one.numbers for name, one in shown.items()},

@@ -64,11 +64,8 @@ class Spline:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return tuple(
-            f"{name} at {knot:.{_digits(self.knots[COMPONENTS[name]])}f}"
-            for name in ORDER
-            for knot in self.knots[COMPONENTS[name]]
-        )
+        return tuple(f"{name} at {knot:.{_digits(self.knots[COMPONENTS[name]])}f}" for name in ORDER
+                     for knot in self.knots[COMPONENTS[name]])  # fmt: skip
 
     def piece_map(self) -> Array:
         return self._map.copy()
