@@ -6,6 +6,7 @@ fit, `residuals` the table of all matched values, `simulate` the results of forw
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from ...reports.maps import (
     write_vtu,
 )
 from ...reports.vega import save
-from ...solvers.base import History
+from ...solvers.base import STRAIN_DATA, STRESS_DATA, History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from . import findings as wording
 from .findings import fitted_model, objective_of
@@ -47,7 +48,7 @@ from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS, Sheet
-from .sheet import at_nodes, inflated_sheets
+from .sheet import at_nodes, states
 from .test import PART, BubbleTest, apex_heights
 
 Array = NDArray[np.float64]
@@ -321,16 +322,12 @@ def bubble_solid(
 ) -> Solid:
     """Return the modelled surface at every pressure; left (nodes, 3) mm."""
     test, model = prepared.test, fitted_model(fitted)
-    mesh, sheets = model.mesh, list(inflated_sheets(model, fitted.histories[0], fitted.law))
+    mesh, known = model.mesh, replace(fitted.histories[0], model=model, law=fitted.law)
     signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
     residual = np.tile(np.array([_sizes(own, mesh.quads) for own in left]), len(signs))
-    largest = max(float(np.abs(sheet.displacement).max()) for sheet in sheets)
-    residual[residual < ROUNDING * largest] = 0.0
+    residual[residual < ROUNDING * float(np.abs(known.displacement).max())] = 0.0
     shades = [Shade("residual, length", "mm", pack(residual))]
-    fields = (
-        (STRAIN_LABELS, "%", np.array([100 * sheet.strain for sheet in sheets])),
-        (STRESSES, "MPa", np.array([sheet.stress for sheet in sheets])),
-    )
+    fields = ((STRAIN_LABELS, "%", 100 * known.strain()), (STRESSES, "MPa", known.stress()))
     for names, unit, values in fields:
         # A mirrored part is sheared the other way.
         every = np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
@@ -338,7 +335,7 @@ def bubble_solid(
             Shade(name, unit, pack(every[..., k]), "about zero" if k == 2 else "from least")
             for k, name in enumerate(names)
         ]
-    points = mesh.points + np.array([sheet.displacement for sheet in sheets])
+    points = mesh.points + known.displacement
     around = [points * (sx, sy, 1.0) for sx, sy in signs]
     quads = [mesh.quads + k * len(mesh.points) for k in range(len(signs))]
     caption = (
@@ -349,7 +346,7 @@ def bubble_solid(
     )
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"
     return Solid(
-        f"{test.name} bubble", [bubbles.kilo(sheet.pressure) for sheet in sheets], "pressure",
+        f"{test.name} bubble", list(map(bubbles.kilo, known.load.tolist())), "pressure",
         pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
         warp_arrow(np.concatenate(around, axis=1)),
     )  # fmt: skip
@@ -554,7 +551,9 @@ def write_series(
     """Write the inflated sheet as a collection `path` (.pvd) and a file a pressure in its folder.
     residuals : (nodes, 3) mm, measured less modelled, one a reported pressure; None without."""
     folder, files = path.with_name(f"{path.stem}-vtu"), []
-    for number, sheet in enumerate(inflated_sheets(model, history, law)):
+    known = replace(history, model=model, law=law)
+    frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
+    for number, (load, u, strain, stress) in enumerate(frames):
         own = residuals[number] if number < len(residuals) else None
         file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
         cells = {"log_strain_1_2_12": sheet.strain, "stress_1_2_12_MPa": sheet.stress,

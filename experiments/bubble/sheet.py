@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -13,11 +13,9 @@ from scipy.spatial import QhullError, cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import Nuisance
-from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import SLACK, BubbleModel
 from ...meshes.disk import Outline, disk_modes
 from ...readers.fields import DisplacementField
-from ...solvers.base import History
 from .section import Sheet
 
 Array = NDArray[np.float64]
