@@ -555,12 +555,10 @@ def write_series(
     frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
     for number, (load, u, strain, stress) in enumerate(frames):
         own = residuals[number] if number < len(residuals) else None
-        file = folder / f"{number:03d}-{1e3 * sheet.pressure:.4g}kPa.vtu"
-        cells = {"log_strain_1_2_12": sheet.strain, "stress_1_2_12_MPa": sheet.stress,
-                 "wrinkling": sheet.state}  # fmt: skip
-        nodal = {} if own is None else {"residual_mm": own}
-        write_vtu(model.mesh, sheet.displacement, file, nodal, cells)
-        files.append((1e3 * sheet.pressure, file))
+        file = folder / f"{number:03d}-{1e3 * float(load):.4g}kPa.vtu"
+        cells = {STRAIN_DATA: strain, STRESS_DATA: stress, "wrinkling": states(stress)}
+        write_vtu(model.mesh, u, file, {} if own is None else {"residual_mm": own}, cells)
+        files.append((1e3 * float(load), file))
     return write_pvd(path, files)
 
 

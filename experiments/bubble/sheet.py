@@ -180,30 +180,6 @@ NONE = 1e-6
 FAR = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class InflatedSheet:
-    """The sheet at one reported pressure (MPa), displaced by (nodes, 3) mm.
-    strain : (quads, 3) log strain (eps1, eps2, gamma12) in the middle of the quads; stress : MPa,
-    Cauchy, along the turned yarns. state : `TAUT`, `WRINKLED` (tension in one direction), `LOOSE`.
-    """
-
-    pressure: float
-    displacement: Array
-    strain: Array
-    stress: Array
-    state: NDArray[np.intp]
-
-
-def inflated_sheets(
-    model: BubbleModel, history: History, law: HypoelasticLaw
-) -> Iterator[InflatedSheet]:
-    """Yield a sheet a reported pressure, the law integrated along the increments of the history."""
-    known = replace(history, model=model, law=law)
-    frames = zip(known.load, known.displacement, known.strain(), known.stress(), strict=True)
-    for load, u, strain, stress in frames:
-        yield InflatedSheet(float(load), u, strain, stress, states(stress))
-
-
 def states(stress: Array) -> NDArray[np.intp]:
     """Return (n,) states of stresses (n, 3) of one sheet."""
     mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
