@@ -10,6 +10,7 @@ from bubblefit.errors import InputError, one_line
 from bubblefit.files import check_regular, content_of
 from bubblefit.materials.card import read_card
 from bubblefit.project.project import read_project
+from bubblefit.readers.curves import LoadUnit
 from bubblefit.readers.frames import read_frames
 from bubblefit.readers.sections import (
     HUGE,
@@ -17,7 +18,6 @@ from bubblefit.readers.sections import (
     MODULUS_UNITS,
     PRESSURE_UNITS,
     LengthUnit,
-    LoadUnit,
     ModulusUnit,
     Number,
     Pair,
@@ -29,7 +29,7 @@ from bubblefit.readers.sections import (
     beside,
     first_error,
 )
-from bubblefit.readers.tables import LOAD_UNITS, read_lines
+from bubblefit.readers.tables import LOAD_UNITS, WIDTH_LOAD_UNITS, read_lines
 from bubblefit.solvers.marc.settings import site_settings
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -39,15 +39,17 @@ from .complaints import complaint
 PASCAL = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5}
 
 
-def test_units_are_those_of_si():
+def test_units_are_those_of_si_and_inches():
     for table in (MODULUS_UNITS, PRESSURE_UNITS):
         pascal = {name: 1e6 * mpa for name, mpa in table.items()}
         assert pascal == pytest.approx({name: PASCAL[name] for name in table})
-    assert LENGTH_UNITS == {"m": 1000.0, "mm": 1.0}
+    assert LENGTH_UNITS == {"m": 1000.0, "mm": 1.0, "in": 25.4}
     assert set(get_args(ModulusUnit)) == {"GPa", "MPa", "Pa"} == set(MODULUS_UNITS)
     assert set(get_args(PressureUnit)) == {"kPa", "MPa", "bar", "Pa"} == set(PRESSURE_UNITS)
-    assert set(get_args(LengthUnit)) == {"mm", "m"} == set(LENGTH_UNITS)
-    assert set(get_args(LoadUnit)) == {"N", "kN"} <= set(LOAD_UNITS)
+    assert set(get_args(LengthUnit)) == set(LENGTH_UNITS)
+    assert set(get_args(LoadUnit)) <= {*LOAD_UNITS, *WIDTH_LOAD_UNITS}
+    assert LOAD_UNITS["lbf"] == pytest.approx(4.4482216152605)
+    assert WIDTH_LOAD_UNITS["lbf/in"] == pytest.approx(0.175126835)
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,8 @@ strain_range = [0.153, 0.232, 0.883]
 E1 = [0.02, 3.0]
 E2 = [0.02, 2.0]
 G12 = [0.001, 0.6]
+[fit]
+mesh_error = "told"
 [[bubble]]
 radius = 100.0
 pressures = [59, 132, 251]
