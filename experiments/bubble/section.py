@@ -386,7 +386,7 @@ class NuisanceSection(sections.Section):
     registration: Literal["given", "fitted"] = "given"
     turn: sections.Positive | None = None
     tilt: sections.Positive | None = None
-    shift: sections.Positive | None = None
+    shift: sections.Length | None = None
 
 
 class BubbleSection(sections.Section):
