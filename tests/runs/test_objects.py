@@ -296,6 +296,10 @@ def content(part):
     return part.tolist() if isinstance(part, np.ndarray) else str(part) if part is None else part
 
 
+BEAM = {"model": "beam", "span": 3.0, "load_spacing": 1.0}
+PLAIN = {**BEAM, "wall": {"axial": 20.0, "hoop": 60.0, "shear": 9.0}}
+BRAID = {"angle": 65.0, "yarn_shear": 2.0, "bladder": 9.6, "bladder_shear": 3.3}
+BRAID |= {"pressure": [60.0, 100.0], "yarn": [1e3, 2e3], "across": [0.1, 0.2]}
 KNOWN = {"data": {"points": None, "known_solution": {"beta": [0.1] * 12}}}
 #: What stands beside a key, or in place of its value, so that the whole makes sense.
 COMPANIONS = {
@@ -331,8 +335,16 @@ COMPANIONS = {
     "cylinder.length": {"length": 2.5},
     "cylinder.element_size": {"element_size": 0.03},
     "cylinder.seam_width": {"seam_width": 0.03},
+    "cylinder.cord": {"cord": [
+        {"angle": 30.0, "stiffness": 1e5, "initial_force": 5.0, "tension_only": False},
+        {"angle": 90.0, "strain": [0.0, 0.02], "force": [0.0, 9e3], "prestrain": 1e-3},
+    ]},
+    "cylinder.wall": {**BEAM, "wall": BRAID, "cord": [{"angle": 0.0, "stiffness": 8e5}]},
+    **{f"cylinder.wall.{key}": PLAIN for key in ("axial", "hoop", "shear", "poisson", "wrinkles")},
+    **{f"cylinder.{key}": PLAIN for key in ("model", "load_spacing", "load_width", "friction",
+                                            "roller_below_axis", "mass_per_length")},
     "cylinder.collar": {"collar": {"inner_diameter": 0.24, "length": 0.15, "fillet": 0.01}},
-}
+}  # fmt: skip
 
 
 def companion(path):
