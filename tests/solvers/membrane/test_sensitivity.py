@@ -76,7 +76,8 @@ def test_each_parameter(law, names, move):
     history, slopes = MembraneSolver(TIGHT).run_with_sensitivity(MODEL, law, names)
     assert slopes.shape == (*history.displacement.shape, len(names))
     for name, slope in zip(names, np.moveaxis(slopes, -1, 0), strict=True):
-        expected = differences(law, name, slope, move)
+        # The field bends with the angle of the yarns: a shorter step is as near as others are.
+        expected = differences(law, name, slope, 0.1 * move if name == "turn" else move)
         assert np.abs(slope - expected).max() < 1e-5 * np.abs(expected).max(), name
         if move == 0.01:  # the first frame, too, is right to 1e-5 of its own largest
             first = np.abs(slope[0] - expected[0]).max()
