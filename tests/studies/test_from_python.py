@@ -47,7 +47,7 @@ STUDIES = {
 }  # fmt: skip
 NOTHING = b'<svg viewBox="0 0 1 1"></svg>'
 #: What no two runs have in common.
-TIMES = ("seconds", "wall_s", "card")
+TIMES = ("seconds", "wall_s", "cpu_s", "card")
 
 
 @pytest.fixture(scope="module")
