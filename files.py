@@ -45,6 +45,7 @@ MOST_PARTS = 100
 KERNELS = (
     "materials/pieces.py", "materials/memory.py", "materials/point_law.py", "materials/wrinkles.py",
     "materials/law.py", "materials/responses.py", "meshes/mesh.py", "solvers/membrane/kernel.py",
+    "inference/posterior.py",
 )  # fmt: skip
 
 # Reading
