@@ -1,9 +1,10 @@
-"""A quarter bubble of 45 quads with a known solution, for the tests of this room."""
+"""A quarter bubble of 45 quads with a known solution, for the tests of inference."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import OFFSETS, FieldObjective, FieldTarget
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
@@ -61,6 +62,26 @@ def targets(fields=None, noise=0.0):
 def problem(unknowns=CUBIC, noise=0.0, normalise="e", **other):
     objective = FieldObjective(targets(noise=noise), normalise)
     return single(MODEL, MembraneSolver(), LAW, objective, unknowns, **other)
+
+
+def differentiated(fit, y, columns=None, floor=0.0):
+    """Return the evaluation at y; its derivatives and those of e are checked by differences.
+
+    floor: share of the largest derivative below which a column is compared with that share.
+    """
+    point = fit.evaluate(y, True)
+    assert point.jacobian.shape == (len(point.residual), len(y))
+    slope = fit.blocks.gradient(point.residual, point.jacobian)
+    size = np.abs(point.jacobian).max()
+    for k in range(len(y)) if columns is None else columns:
+        step = 1e-4 * max(1.0, abs(y[k])) * np.eye(len(y))[k]
+        ahead, behind = (fit.evaluate(y + s, False, warm=False) for s in (step, -step))
+        column = (ahead.residual - behind.residual) / (2 * step[k])
+        off = np.abs(point.jacobian[:, k] - column).max()
+        assert off < 2e-5 * max(np.abs(column).max(), floor * size), k
+        e_slope = (ahead.value - behind.value) / (2 * step[k])
+        assert slope[k] == pytest.approx(e_slope, rel=1e-3, abs=1e-5 * np.abs(slope).max())
+    return point
 
 
 def single(model, solver, law, objective, unknowns, **other):

@@ -28,7 +28,7 @@ from scipy.interpolate import BSpline
 from scipy.stats import ttest_1samp
 
 from ..complaints import complaint
-from .cases import CUBIC, LAW, RANGE, levenberg_marquardt
+from .cases import CUBIC, LAW, RANGE, differentiated, levenberg_marquardt
 
 TIGHT = 1e-10
 PRESSURE = Nuisance("pressure_offset", -18.0, 50.0, "kPa", "pressure_offset", 1e-3)
@@ -75,18 +75,6 @@ def test_nuisance_belongs_to_its_comparison_and_stays_inside_its_bounds():
         outside = y.copy()
         outside[k] = end
         assert (a @ outside < c).any()
-
-
-def differentiated(fit, y, columns):
-    """The evaluation at y, its derivatives checked against differences of whole evaluations."""
-    point = fit.evaluate(y, True)
-    assert point is not None and point.jacobian is not None
-    for k in columns:
-        step = 1e-4 * max(1.0, abs(y[k])) * np.eye(len(y))[k]
-        ahead, behind = (fit.evaluate(y + s, False, warm=False) for s in (step, -step))
-        column = (ahead.residual - behind.residual) / (2 * step[k])
-        assert np.abs(point.jacobian[:, k] - column).max() < 2e-5 * np.abs(column).max(), k
-    return point
 
 
 def test_every_derivative_of_two_comparisons_with_nuisance_each():

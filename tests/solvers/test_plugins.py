@@ -1,7 +1,6 @@
 """Solvers of other distributions: a real one installed and run, and broken ones."""
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -20,6 +19,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import checked, solver_named
 from click.testing import CliRunner
 
+from ..commands import in_process
 from ..fortran_build import BETA, LAWS
 from ..places import EXAMPLES, ROOT
 from ..plug_ins import install
@@ -53,18 +53,16 @@ def strips(tmp_path):
     return tmp_path
 
 
-def bubblefit(site, *arguments, cwd, code=0):
-    done = subprocess.run(
-        [sys.executable, "-m", "bubblefit.cli", *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, timeout=300,
-        env={**os.environ, "PYTHONPATH": str(site)},
-    )  # fmt: skip
-    assert done.returncode == code, done.stderr + done.stdout
-    return done
+@pytest.fixture
+def example(site, monkeypatch):
+    monkeypatch.syspath_prepend(str(site))
+    yield
+    for name in ("bubblefit_homogeneous", "homogeneous_program"):
+        sys.modules.pop(name, None)
 
 
 @pytest.mark.slow
-def test_a_fit_is_led_by_the_membrane_and_counts_the_examples_runs(site, strips):
+def test_a_fit_is_led_by_the_membrane_and_counts_the_examples_runs(example, strips):
     path = strips / "curves.csv"
     kept = [line for line in path.read_text().splitlines() if not line.startswith("bias")]
     path.write_text("\n".join(kept) + "\n")
@@ -74,22 +72,14 @@ def test_a_fit_is_led_by_the_membrane_and_counts_the_examples_runs(site, strips)
     # No bias strip says how far the shear goes.
     text = text.replace("# strain_range = ", "strain_range = ")
     project.write_text(text.replace('form = "cubic"', 'form = "linear"'))
-    done = bubblefit(
-        site, "uniaxial", "project.toml", "--solver", "homogeneous", "--starts", 1, "--out", "out",
-        cwd=strips,
+    done = in_process(
+        "uniaxial", "project.toml", "--solver", "homogeneous", "--starts", 1, "--jobs", 1, "--out",
+        "out", cwd=strips,
     )  # fmt: skip
     result = json.loads((strips / "out" / "result.json").read_text())
     assert result["solver"] == "homogeneous" and 0 < result["external_runs"] < 20, done.stdout
     history = pd.read_csv(strips / "out" / "history.csv")
     assert {"membrane", "homogeneous"} == set(history.solver)
-
-
-@pytest.fixture
-def example(site, monkeypatch):
-    monkeypatch.syspath_prepend(str(site))
-    yield
-    for name in ("bubblefit_homogeneous", "homogeneous_program"):
-        sys.modules.pop(name, None)
 
 
 @pytest.mark.parametrize("direction", ["warp", "fill"])

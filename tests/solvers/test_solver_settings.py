@@ -1,9 +1,7 @@
 """Settings of solvers, and their identity."""
 
-import importlib
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -95,56 +93,6 @@ def test_the_command_line_takes_the_place_of_a_setting(tmp_path, monkeypatch):
 def test_what_the_command_line_cannot_say(name, given, settings, words):
     options = solver_settings(PROJECT, {})[name]
     assert complaint(overridden, name, options, given, settings).startswith(words)
-
-
-# A solver in the tree: one folder, one line
-FOLDER = {
-    "__init__.py": "",
-    "settings.py": """
-from bubblefit.solvers.settings import Offer
-from bubblefit.solvers.settings import Override, SolverSettings
-
-class AcmeSettings(SolverSettings):
-    paths = ("deck",)
-    programs = ("acme",)
-    overrides = (
-        Override("acme", "The ACME to run.", metavar="PATH", look="An ACME to look at."),
-        Override("element", "Shell element", "A1 or A2"),
-    )
-    acme: str = "acme"
-    deck: str | None = None
-    element: str = "A1"
-
-OFFER = Offer("acme", __package__, "AcmeSolver", AcmeSettings)
-""",
-    "solver.py": """
-from bubblefit.solvers.base import Diagnosis, SolverCheck
-
-class AcmeSolver:
-    name, external, progress, identity = "acme", True, None, "acme 1"
-    def __init__(self, acme="acme", deck=None, element="A1"):
-        self.given = acme, deck, element
-    def run(self, model, law, scratch=None, timeout=None): ...
-    def check(self): return SolverCheck("acme", True, "1", True)
-
-def diagnose(named=None):
-    return [Diagnosis("acme", "1", named, "named", named is not None, None, True)]
-""",
-}
-
-
-@pytest.fixture
-def acme(tmp_path, monkeypatch):
-    folder = tmp_path / "acme_in_the_tree"
-    folder.mkdir()
-    for name, text in FOLDER.items():
-        (folder / name).write_text(text)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    offer = importlib.import_module("acme_in_the_tree.settings").OFFER
-    monkeypatch.setitem(SOLVERS, "acme", offer)
-    yield
-    for name in [name for name in sys.modules if name.startswith("acme_in_the_tree")]:
-        del sys.modules[name]
 
 
 # --- identity ---

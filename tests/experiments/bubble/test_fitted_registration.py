@@ -39,15 +39,17 @@ def fitted(**nuisance):
 
 
 def test_turn_tilt_and_shift_are_found_with_their_sigma():
-    table = fitted(registration="fitted").coefficients().set_index("unknown")
+    found = fitted(registration="fitted")
+    table = found.coefficients().set_index("unknown")
     known = {"turn": TURN, "tilt_x": TILT, "tilt_y": 0.0}
     known |= {"shift_x": -SHIFT[0], "shift_y": -SHIFT[1]}
     for name, value in known.items():
         assert table.value[name] == pytest.approx(value, abs=0.1), name
         assert abs(table.value[name] - value) < 4 * table.sigma[name] + 0.01, name
-    law = fitted(registration="fitted").law
     for name, value in TRUE.items():
-        assert law.modulus(name, 0.0) == pytest.approx(value, rel=0.1 if name == "G12" else 0.01)
+        assert found.law.modulus(name, 0.0) == pytest.approx(
+            value, rel=0.1 if name == "G12" else 0.01
+        )
 
 
 def test_a_quarter_cannot_be_turned():

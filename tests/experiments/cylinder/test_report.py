@@ -225,17 +225,6 @@ def drawn(monkeypatch) -> dict[str, list[Any]]:
     return {**calls, "saved": caught(monkeypatch, report, "bending_charts", "gas_charts")}
 
 
-def ended(*runs, bent) -> CylinderOutcome:
-    return outcome_of(
-        *runs,
-        bent={i: replace(BENT, load=BENT.load + i) for i in bent},
-        measures={
-            i: replace(MEASURES, knee=(1.0 + i, 2.0), error=None if i else MEASURES.error)
-            for i in bent
-        },
-    )
-
-
 # A band: both ends with one card, the prediction alone with another, whose other end failed
 
 

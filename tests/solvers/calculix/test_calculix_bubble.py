@@ -27,7 +27,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
 
 from ...fortran_build import LAWS
-from ...projects import BUBBLE, changed
+from ...projects import BUBBLE
 from ...published_laws import TABLE_4_2
 
 # MPa.
@@ -268,18 +268,6 @@ def test_own_templates_can_build_on_ours(tmp_path):
     assert text == "** mine\n*INCLUDE, INPUT=m\n"
 
 
-FIT = """
-[fit]
-starts = 1
-tolerance = 1e-6
-[solver.calculix]
-element = "S4"
-"""
-FINER = ("elements = 32", "elements = 64")
-WIDER = ("lower = [0.03, 0.3, 0.3]", "lower = [0.01, 0.1, 0.1]")
-PROJECT = changed(BUBBLE, FINER, WIDER) + FIT
-
-
 def test_a_pressure_offset_reaches_calculix_and_a_disk_is_four_quarters(ccx):
     model = bubble(64, "quarter", (0.022, 0.059))
     moved = model.with_parameters({"pressure_offset": 0.003})
@@ -306,13 +294,13 @@ def test_it_can_be_turned_off(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.setenv("BUBBLEFIT_CACHE", str(tmp_path / "usual"))
     path = tmp_path / "project.toml"
-    path.write_text(PROJECT)
+    path.write_text(BUBBLE + "[fit]\nstarts = 1\n")
     project = read_project(path)
     assert project.run_cache.folder == tmp_path / "usual" / "runs"
     given = {"solver": "calculix", "cache": True}
     assert with_solver(project, given).run_cache is project.run_cache
     assert with_solver(project, {**given, "cache": False}).run_cache is None
-    path.write_text(PROJECT.replace("[fit]", '[fit]\ncache = "kept"'))
+    path.write_text(BUBBLE + '[fit]\ncache = "kept"\n')
     assert read_project(path).run_cache.folder == tmp_path / "kept"
-    path.write_text(PROJECT.replace("[fit]", "[fit]\ncache = false"))
+    path.write_text(BUBBLE + "[fit]\ncache = false\n")
     assert read_project(path).run_cache is None

@@ -134,7 +134,7 @@ def bent(ccx, scratch):
         text = text.replace(before, asked + before)
     (own / "cylinder.inp.j2").write_text(text)
     steps = np.arange(1.0, 9.0).tolist()
-    model = replace(case(60.0, 40.0), deflections=[3.0, 8.0], increments=steps)
+    model = replace(case(75.0, 40.0), deflections=[3.0, 8.0], increments=steps)
     solver = CalculixSolver(ccx=ccx.path, scratch=scratch, keep=True, templates=own)
     return model, solver.run(model, LINEAR)
 

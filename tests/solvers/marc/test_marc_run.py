@@ -1,18 +1,15 @@
 """Runs of Marc, each with a small program in its place: what ends well, and all that does not."""
 
-import pickle
 import re
 import time
 
 import numpy as np
 import pytest
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.project.project import read_project
 from bubblefit.solvers.bars import BARS, TOLERANCE
 from bubblefit.solvers.base import log_strain
 from bubblefit.solvers.marc import solver as proof
@@ -23,7 +20,7 @@ from bubblefit.solvers.registry import diagnose, solver_named
 
 from ...complaints import complaint
 from ...marc_files import sts_text, t19_text
-from ...places import KNOWN, ROOT
+from ...places import ROOT
 from ...solvers.calculix.test_calculix_faults import gone
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
@@ -205,22 +202,6 @@ def test_3004_is_not_enough(machine, fake, good):
     assert "inside out (element 17)" in failure(fake(f"cp {folder}/job.* .")).reason
 
 
-def test_a_licence_is_waited_for(fake, good):
-    folder, _ = good
-    script = f"""echo x >> {folder}/tries
-[ $(wc -l < {folder}/tries) -lt 3 ] && echo 'ERROR: license not available' && exit 1
-cp {folder}/job.* ."""
-    fake(script, licence_wait=20.0, licence_retry=0.05).run(model(), LAW)
-    assert (folder / "tries").read_text().count("x") == 3
-    assert not list((folder.parent / "scratch").iterdir())
-    (folder / "tries").unlink()
-    error = failure(fake(script, licence_wait=0.12, licence_retry=0.1))
-    # Only the last try is kept.
-    assert list((folder.parent / "scratch").iterdir()) == [error.scratch]
-    again = pickle.loads(pickle.dumps(error))
-    assert str(again) == str(error) and again.scratch == error.scratch
-
-
 def test_a_job_that_hangs_is_ended_with_all_it_started(machine, fake):
     solver = fake(f"sleep 300 & echo $! > {machine}/pid; wait")
     begun = time.monotonic()
@@ -305,13 +286,6 @@ def no_site(monkeypatch):
     monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
 
 
-def project(folder, *tables):
-    path = folder / "project.toml"
-    text = KNOWN.read_text().replace("elements = 800", "elements = 32", 1)
-    path.write_text("\n".join([text, *tables]))
-    return path
-
-
 def test_a_site_file_is_below_what_is_given(tmp_path, monkeypatch):
     settings = marc_settings({})
     assert (settings.executable, settings.element, settings.law) == ("run_marc", 139, "nlelast")
@@ -376,37 +350,22 @@ def test_mistakes_elsewhere_are_one_line(given, words):
     assert words in complaint(MarcSolver, **given)
 
 
-@pytest.fixture
-def ready(tmp_path):
-    path = project(tmp_path)
-    settings = read_project(path, need_data=False)
-    card = tmp_path / "card.toml"
-    write_card(MaterialCard(LAW, 0.81, "linear"), card)
-    (test,) = settings.tests.values()
-    (given,) = test.models().values()
-    history = MembraneSolver().run(given, read_card(card).law)
-    folder = files(tmp_path / "good", given, history)
-    program = tmp_path / "run_marc"
-    program.write_text(f"#!/bin/sh\ncp {folder}/job.* .\n")
-    program.chmod(0o755)
-    return path, card, program, history
-
-
-def test_doctor_tells_of_a_marc_that_was_named(ready, tmp_path, monkeypatch):
-    _, _, program, _ = ready
+def test_doctor_tells_of_a_marc_that_was_named(fake, good, tmp_path, monkeypatch):
+    folder, _ = good
+    fake(f"cp {folder}/job.* .")
     monkeypatch.setenv("PATH", "/usr/bin:/bin")
     assert [one.name for one in diagnose()][-1] != "marc"
     # It is there, but does not answer the bars.
     site = tmp_path / "site.toml"
     site.write_text('executable = "./run_marc"\nscratch = "scratch"\nversion = "2023.1"\n')
     (found,) = [one for one in diagnose(marc=site) if one.name == "marc"]
-    assert found.expected and not found.usable and "ended at time 9 of 100" in found.advice
+    assert found.expected and not found.usable and "ended at time 2 of 100" in found.advice
     assert found.version == "2023.1"
     (found,) = [one for one in diagnose(marc=tmp_path / "none") if one.name == "marc"]
     assert not found.usable and "no such file" in found.advice
     monkeypatch.setenv("BUBBLEFIT_MARC", str(site))
     (found,) = [one for one in diagnose() if one.name == "marc"]
-    assert found.origin == "BUBBLEFIT_MARC" and found.path == program
+    assert found.origin == "BUBBLEFIT_MARC" and found.path == tmp_path / "run_marc"
 
 
 def test_every_setting_and_block_is_documented_and_there():
