@@ -152,7 +152,8 @@ LENGTHS = {
     **dict.fromkeys(("cm", "centimeter", "centimetre"), 10.0),
     **dict.fromkeys(("m", "meter", "metre", "meters", "metres"), 1e3),
     **dict.fromkeys(("µm", "μm", "um", "micron", "microns", "micrometer", "mikrometer"), 1e-3),
-    **dict.fromkeys(("in", "inch", "inches", "zoll"), 25.4),
+    **dict.fromkeys(("in", "inch", "inches", "zoll", '"', "″"), 25.4),
+    **dict.fromkeys(("mil", "mils", "thou"), 0.0254),
     **dict.fromkeys(("ft", "foot", "feet"), 304.8),
 }
 PIXELS = frozenset({"px", "pix", "pixel", "pixels"})

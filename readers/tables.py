@@ -405,15 +405,17 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 #: mm in one of each unit of length, N in one of each unit of load.
 LENGTH_UNITS = {
     "mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "μm": 1e-3, "um": 1e-3, "in": 25.4, "ft": 304.8,
+    "mil": 0.0254,
 }  # fmt: skip
 LOAD_UNITS = {
     "N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "kgf": 9.80665, "kp": 9.80665,
-    "gf": 9.80665e-3, "lbf": 4.4482216152605,
+    "gf": 9.80665e-3, "lbf": 4.4482216152605, "kip": 4448.2216152605, "ozf": 0.27801385095378,
 }  # fmt: skip
 #: Other names of units, in small letters; a weight is that of its mass.
 OTHER_NAMES = {
     "n": "N", "kn": "kN", "lb": "lbf", "lbs": "lbf", "lbf": "lbf", "g": "gf", "kg": "kgf",
-    "in": "in", "inch": "in", "inches": "in", "zoll": "in",
+    "in": "in", "inch": "in", "inches": "in", "zoll": "in", '"': "in", "″": "in", "mils": "mil",
+    "thou": "mil", "kips": "kip", "kipf": "kip", "oz": "ozf",
 }  # fmt: skip
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {
@@ -433,10 +435,10 @@ TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 LONGEST, MOST_NAMES = 300, 2000
 _KNOWN = (
     r"%|‰|mm/mm|kN/m|N/mm|N/cm|N/50mm|N/5cm|daN/5cm|N/m|mm|cm|kN|kn|N|n|m|kPa|MPa|hPa|Pa|mbar|bar"
-    "|psi|lbf/in|lbf|lbs|lb|kgf|kg|gf|g|daN|inches|inch|in|ft|µm|μm|um"
+    "|psi|lbf/in|lbf|lbs|lb|kgf|kg|kips|kip|gf|g|ozf|daN|inches|inch|in|ft|mils|mil|µm|μm|um"
 )
 # "Strain (Extension)", "Load (Channel 1)": what is long or has a blank in it is no unit.
-_UNIT = r"[A-Za-zµμ°%‰][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"
+_UNIT = r"[A-Za-zµμ°%‰\"″][A-Za-z0-9µμ°%‰/^*·²-]{0,6}"
 _PER_WIDTH = re.compile(r"N ?/ ?(50?) ?([cm]m)\b")
 _IN_BRACKETS = re.compile(rf"^(.*?)[\s_]*[(\[<{{]\s*({_UNIT}|)\s*[)\]>}}]$")
 _AT_THE_END = re.compile(rf"^(.*?)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)({_KNOWN})$")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
@@ -22,6 +23,8 @@ Lines = list[tuple[int, str]]
 SEPARATORS = ("\t", ";", ",", None)
 #: The row of names stands within so many lines; rows looked at for the decimal mark.
 TOP, SAMPLE = 300, 500
+#: Rows of units and other words between the names and the numbers.
+MOST_BELOW = 3
 
 
 @dataclass(frozen=True)
@@ -37,12 +40,16 @@ class TextLayout:
     below: int = 0
 
 
+_INCH = re.compile(r'[\[(]"[\])]')
+
+
 def cells_of(text: str, separator: str | None) -> list[str] | None:
     """Return the cells of one line; None where a quotation mark is not closed on it."""
     if separator is None and '"' not in text:
         return text.split()
     if '"' not in text:
         return [cell.strip() for cell in text.split(separator)]
+    text = _INCH.sub("[in]", text)
     if text.count('"') % 2:
         return None
     try:
@@ -74,13 +81,17 @@ def find_layout(
     index, separator, names = found
     header, body = lines[index][0], lines[index + 1 :]
     units = [""] * len(names)
-    below = (cells_of(body[0][1], separator) if body else None) or []
-    plain = [cell.strip("()[]<>{} ") for cell in below]
-    # A row of units: some are lengths, none a number.
-    if {*frames.LENGTHS, *frames.PIXELS} & {cell.casefold() for cell in plain} and not any(
-        map(tables.is_number, plain)
-    ):
-        units, body = plain + units, body[1:]
+    # A row of units, some of them lengths, among rows below the names that have no number.
+    for k, (_, text) in enumerate(body[:MOST_BELOW]):
+        plain = [cell.strip("()[]<>{} ") for cell in cells_of(text, separator) or []]
+        words = {cell.casefold() for cell in plain} - {*tables.HOLES, *WORDS}
+        if not words or any(map(tables.is_number, plain)):
+            body = body[k:] if any(units) else body
+            break
+        if {*frames.LENGTHS, *frames.PIXELS} & words:
+            units = plain + units
+    else:
+        body = body[MOST_BELOW:] if any(units) else body
     headings = [frames.heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
     columns = frames.columns_of(headings, named, upper)
     total = len(body)

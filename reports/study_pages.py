@@ -69,7 +69,8 @@ def write_folder(
         save(folder / name, charts)
     write_notes(folder, study.notes)
     warnings, files = [note.line for note in study.notes], [*page.files, *FILES]
-    written = write_report(folder, replace(page, warnings=warnings, files=files))
+    about = about_of(study.project, None)
+    written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
     write_text(folder / RESULT, json_text(study.result))
     return written
 
@@ -111,7 +112,7 @@ def plain(
 
 
 def _refinement(study: Refinement) -> Content:
-    title = f"{study.project.name}: finer and finer {study.what}"
+    title = f"{study.project.path.name}: finer and finer {study.what}"
     charts = studies.convergence_charts(panels(study), study.what, title)
     return plain(study, title, "convergence", [charts], charts)
 
@@ -142,13 +143,13 @@ def _nu12(study: Nu12Study) -> Content:
         name: {response: (r.nu12, r.to_base) for response, r in part.responses.items()}
         for name, part in study.parts.items()
     }
-    title = f"{study.project.name}: what nu12 changes"
+    title = f"{study.project.path.name}: what nu12 changes"
     charts = studies.nu12_charts(shown, study.base, study.response, title)
     return plain(study, title, "nu12", [charts], charts)
 
 
 def _validation(study: Validation) -> Content:
-    title = f"{study.title}: errors at data left out of the fit"
+    title = f"{study.project.title}: errors at data left out of the fit"
     charts = studies.held_out_charts(
         *study.errors(), "Errors at data left out of the fit (predicted), and given to it (fitted)"
     )
@@ -170,7 +171,7 @@ def _weights(study: weights.WeightStudy) -> Content:
         {name: study.sigma(name) for name in COMPONENTS},
     )  # fmt: skip
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
-    title = f"{study.title}: the weight of {study.counted}"
+    title = f"{study.project.title}: the weight of {study.counted}"
     return plain(study, title, "weights", parts, figure, 9)
 
 
@@ -189,7 +190,6 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
     )  # fmt: skip
     page = Report(
         title=f"{found.setup.project.title}: bootstrap over {study.over}",
-        about=about_of(found.setup.project, None),
         summary=f"1 sigma over {len(study.samples)} samples: {sigma}.",
         facts=[
             ("card", found.card),
@@ -222,7 +222,7 @@ def _profiles(study: profile.Profiles) -> Content:
     ]  # fmt: skip
     rows = [_interval(one) for one in study.each]
     page = Report(
-        title=f"{study.title}: profile likelihood",
+        title=f"{study.project.title}: profile likelihood",
         summary=f"{study.each[0].name}: {study.each[0].words}.",
         facts=[
             ("card", study.card), ("tests", ", ".join(study.tests)), ("analyses", study.analyses),
@@ -274,7 +274,8 @@ def _plan(study: plan.Plan) -> Content:
     )
     title = "Which test next"
     page = Report(
-        title=f"{study.title}: which test next?", summary=f"{first.title}: 1 sigma of {change}.",
+        title=f"{study.project.title}: which test next?",
+        summary=f"{first.title}: 1 sigma of {change}.",
         facts=facts,
         sections=[
             Section(title, [charts, Table(title, header, rows, plan.ASSUMED, text=(4,))]),
@@ -300,7 +301,6 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
     responses = [shown for test in chosen for shown in _responses(study, test, folder or Path())]
     page = Report(
         title=f"{study.project.title}: forms of the moduli",
-        about=about_of(study.project, None),
         summary="; ".join(study.conclusion),
         facts=[("error", error), ("the data's own noise", total)],
         sections=[

@@ -92,6 +92,11 @@ class Bootstrap(Presented):
     before: int
 
     @property
+    def project(self) -> Project:
+        """The project of the fit."""
+        return self.found.setup.project
+
+    @property
     def analyses(self) -> int:
         """Number of all analyses."""
         return self.before + sum(sample.analyses for sample in self.samples)

@@ -107,8 +107,7 @@ class Plan(Presented):
     the moduli. rank : WORST, or a modulus. now : of the present tests alone. candidates : ranked.
     following : the best test after the first, None where there is none."""
 
-    title: str
-    project: Path
+    project: Project
     card: str
     tests: Sequence[str]
     ends: Array
@@ -155,7 +154,8 @@ class Plan(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "plan", "title": self.title, "project": str(self.project), "card": self.card,
+            "command": "plan", "title": self.project.title,
+            "project": str(self.project.path), "card": self.card,
             "tests": list(self.tests), "criterion": self.criterion,
             "strains": {name: at.tolist() for name, at in self.strains.items()},
             "up_to_strain": by_strain(self.ends), "now": self._numbers(self.now),
@@ -307,7 +307,7 @@ def plan(
         raise InputError(project.path, "", "no test could be made that a plan can compute")
     found.sort(key=lambda pair: pair[0].value(rank))
     made = Plan(
-        project.title, project.path, card_words(card),
+        project, card_words(card),
         [test.name for test in chosen], asked.ends, rank,
         Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
         _following(asked, before, found, rank), notes,

@@ -84,7 +84,7 @@ class PartRatios:
 class Nu12Study(Presented):
     """The result of a study of nu12, by part of a test. base : the card's own nu12."""
 
-    project: Path
+    project: Project
     card: str
     solver: str
     base: float
@@ -100,7 +100,8 @@ class Nu12Study(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "study nu12", "project": str(self.project), "card": self.card,
+            "command": "study nu12", "project": str(self.project.path),
+            "card": self.card,
             "solver": self.solver, "base_nu12": self.base, "response": self.response,
             "models": {
                 name: {
@@ -167,7 +168,7 @@ def vary_nu12(
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
     series.total = len(parts) * (1 + len(several))
     study = Nu12Study(
-        project.path, card_words(card), series.solver.name, material.law.nu12,
+        project, card_words(card), series.solver.name, material.law.nu12,
         {name: _part(series, part, several) for name, part in parts.items()},
         tuple(thickness_notes(project, material)),
     )  # fmt: skip

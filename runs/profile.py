@@ -171,8 +171,7 @@ def _end(end: float | None, side: Side, limit: float) -> str:
 class Profiles(Presented):
     """Profiles of moduli. card : its name. analyses : in all, those of the optimum included."""
 
-    title: str
-    project: Path
+    project: Project
     card: str
     tests: Sequence[str]
     each: Sequence[Profile]
@@ -196,7 +195,8 @@ class Profiles(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "profile", "title": self.title, "project": str(self.project),
+            "command": "profile", "title": self.project.title,
+            "project": str(self.project.path),
             "card": self.card, "tests": list(self.tests), "level": LEVEL, "threshold": THRESHOLD,
             "profiles": [one.numbers for one in self.each], "analyses": self.analyses,
             "method": METHOD, "notes": rows(self.notes),
@@ -261,7 +261,7 @@ def profile(
     analyses += sum(p.analyses for p in each)
     tested, notes = tuple(t.test.name for t in found.setup.tests), [*found.notes]
     notes += [note for one in each for note in one.notes]
-    done = Profiles(project.title, project.path, found.card, tested, each, analyses, tuple(notes))
+    done = Profiles(project, found.card, tested, each, analyses, tuple(notes))
     return finished(done, out)
 
 

@@ -179,7 +179,7 @@ class LevelRun:
 class Refinement(Presented):
     """A study of refinement: runs by part, coarse to fine; noise : relative, of the solver."""
 
-    project: Path
+    project: Project
     card: str
     solver: str
     what: Refined
@@ -191,7 +191,8 @@ class Refinement(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json: cost and values of each level, orders and limits."""
         return {
-            "command": "study mesh", "project": str(self.project), "card": self.card,
+            "command": "study mesh", "project": str(self.project.path),
+            "card": self.card,
             "solver": self.solver, "refined": self.what,
             "models": {name: _part(runs, self.noise) for name, runs in self.runs.items()},
             "notes": rows(self.notes),
@@ -389,7 +390,7 @@ def refine(
         raise SolverFailure(f"fewer than two levels ended well: {reason}", series.solver.name)
     # Result files of other programs have 6 digits.
     noise, notes = 1e-5 if series.solver.external else 1e-7, thickness_notes(project, material)
-    named = project.path, card_words(card), series.solver.name
+    named = project, card_words(card), series.solver.name
     return finished(Refinement(*named, what, runs, noise, tuple(notes)), out)
 
 

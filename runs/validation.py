@@ -164,7 +164,7 @@ class Judged:
 class Validation(Presented):
     """Laws at data that they were not fitted to: whole tests, or the parts named by `leave`."""
 
-    title: str
+    project: Project
     judged: tuple[Judged, ...]
     leave: str = "tests"
 
@@ -203,7 +203,7 @@ class Validation(Presented):
         table = self.table()
         means = {law: None if np.isnan(mean) else mean for law, mean in self.means.items()}
         return {
-            "command": "validate", "title": self.title, "version": __version__,
+            "command": "validate", "title": self.project.title, "version": __version__,
             "left_out": self.leave, "error": "mean relative RMS error of a test, or of its part",
             "mean_foretold": means,
             "rows": [
@@ -437,7 +437,7 @@ def validate(
             words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
             found = fitted(own, words, others, place)
             judged.append(Judged(form, _judge(found, test), _judge(together, test)))
-    return finished(Validation(project.title, tuple(judged), leave), out)
+    return finished(Validation(project, tuple(judged), leave), out)
 
 
 def judge_cards(
@@ -469,7 +469,7 @@ def judge_cards(
             for i, run in enumerate(found.each)
             if run.predicted
         ]
-    return Validation(project.title, tuple(judged))
+    return Validation(project, tuple(judged))
 
 
 def _predicted(run: PredictedRun, error: float | None, ended: str) -> HeldOut:

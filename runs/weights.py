@@ -57,7 +57,7 @@ class WeightedFit:
 class WeightStudy(Presented):
     """Fits over the weight of the tests counted (names); found : at the project's weights."""
 
-    title: str
+    project: Project
     counted: str
     names: Sequence[str]
     found: Fit
@@ -118,7 +118,7 @@ class WeightStudy(Presented):
     def result(self) -> dict[str, Any]:
         """The content of result.json."""
         return {
-            "command": "validate", "title": self.title, "version": __version__,
+            "command": "validate", "title": self.project.title, "version": __version__,
             "weights_of": self.counted, "tests_counted": list(self.names), "error": ERROR,
             "strain": {n: [self.strain(n, p) for p in PLACES] for n in COMPONENTS},
             "sigma_relative": {name: self.sigma(name) for name in COMPONENTS},
@@ -195,7 +195,7 @@ def weights(
     depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
     record = StudyRecord(folder, RUNS, "runs", WeightedFit, "count", depends, resume)
     runs = sorted(_runs(found, names, sorted(counts), record, tell), key=lambda run: run.count)
-    return finished(WeightStudy(project.title, counted, tuple(names), found, tuple(runs)), out)
+    return finished(WeightStudy(project, counted, tuple(names), found, tuple(runs)), out)
 
 
 def _runs(

@@ -114,7 +114,8 @@ def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:
 
     return Project(
         path=Path("bars.toml"),
-        fabric=SimpleNamespace(name="", thickness=0.5, thickness_change="constant"), scales=None,
+        scales=None,
+        fabric=SimpleNamespace(name="", lab="", thickness=0.5, thickness_change="constant"),
         tests={test.name: test for test in tests}, law=None, fit=FitSection(solver="bars"),
         cards={name: SimpleNamespace(card=card) for name, card in (cards or {}).items()},
         solver_options={},

@@ -183,6 +183,10 @@ def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
         fit = bf.fit(project, tests="datasheet", starts=1, jobs=1)
         (row,) = fit.residuals().itertuples()
         print(fit.objective, row.quantity, row.measured, row.modelled)
+        made = bf.Project.of(**project.objects)
+        again = bf.read_project(made.to_toml("again.toml")).with_fit(solver="bar")
+        for other in (made, again):
+            assert bf.fit(other, tests="datasheet", starts=1, jobs=1).objective == fit.objective
         main(["doctor"], standalone_mode=False)
         """)  # fmt: skip
     objective, quantity, measured, modelled = out.splitlines()[0].split()

@@ -106,6 +106,14 @@ STRIPS = {
         for length, mm in {"in": 25.4, "inch": 25.4, "Inches": 25.4, "ft": 304.8}.items()
         for load, newton in {"lb": 4.44822, "lbs": 4.44822, "g": 9.80665e-3, "kg": 9.80665}.items()
     },
+    **{
+        head: ([head, *rows(ELONGATION / mm, LOAD / newton, form="{:.9f}")], "utf-8", 61, 0)
+        for head, mm, newton in (
+            ('Extension ["],Load (ozf)', 25.4, 0.278013851),
+            ("Extension (mils),Load (oz)", 0.0254, 0.278013851),
+            ("Extension in mil,Load [kip]", 0.0254, 4448.22162),
+        )
+    },
     "inches at the end": (
         ["Extension in,Load_lb", *rows(ELONGATION / 25.4, LOAD / 4.44822)], "utf-8", 61, 0,
     ),
@@ -174,9 +182,12 @@ def test_a_frame_keeps_to_its_points(tmp_path):
     draw = np.random.default_rng(0).uniform(-9, 9, (20, 6)).round(4)
     means = ["mean,1,1,1,1,1,1,1", "std. dev.,2,2,2,2,2,2,2"]
     behind = ["99,1,1,1,1,1,1,1,Mittelwert", ",2,2,2,2,2,2,2,max"]
-    for unit, below in (("mm", means), ("cm", behind), ("in", [])):
+    third = ["µm", "µm,µm,µm,µm,µm,µm,µm,µm", "Cam 1,Cam 1,Cam 2,Cam 2,,,left,right"]
+    for unit, below in (("mm", means), ("cm", behind), ('"', []), ("µm", third), ("in", [])):
         names = ",".join(["no", *(f"{q} [{unit}]" for q in ("x", "y", "z", "dx", "dy", "dz", "x"))])
-        path = tmp_path / f"{unit}.csv"
+        path = tmp_path / f"{len(unit)}{len(below)}.csv"
+        if below == third:
+            names, below = "\n".join([names.replace(" [µm]", ""), *third[1:]]), []
         body = rows(map(str, range(20)), *draw.T, draw[:, 0], form="{:.4f}")
         names, note = (f"{names},note", ",") if below == behind else (names, "")
         lines = ["# a lab's own", names, *(row + note for row in body), *below]

@@ -38,12 +38,13 @@ def test_units_of_columns_are_those_of_si():
         "bar": 1e5, "MPa": 1e6,
     }  # fmt: skip
     assert {k: 1e6 * v for k, v in tables.PRESSURE_UNITS.items()} == pytest.approx(pascal)
-    lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8, "um": 1e-3}
+    lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8, "um": 1e-3, "mil": 0.0254}
     assert (
         pytest.approx(lengths | dict.fromkeys(("\u00b5m", "\u03bcm"), 1e-3)) == tables.LENGTH_UNITS
     )
     pond, pound = 9.80665e-3, 0.45359237 * 9.80665
     loads = {"N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "gf": pond, "lbf": pound}
+    loads |= {"kip": 1e3 * pound, "ozf": pound / 16}
     assert pytest.approx(loads | {"kgf": 1e3 * pond, "kp": 1e3 * pond}) == tables.LOAD_UNITS
     per_metre = {"kN/m": 1e3, "N/mm": 1e3, "N/m": 1.0, "N/cm": 1e2, "N/50mm": 20.0}
     per_metre |= {"N/5cm": 20.0, "daN/5cm": 200.0, "lbf/in": pound / 0.0254}

@@ -131,6 +131,7 @@ def test_what_a_heading_means(name, unit, quantity, state):
 
 def test_units_of_headings():
     scales = {"mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "um": 1e-3, "in": 25.4, "INCH": 25.4}
+    scales |= {'"': 25.4, "mil": 0.0254}
     for unit, scale in scales.items():
         assert heading_of("x", unit).scale == scale
         assert heading_of(f"x [{unit}]", "mm").scale == scale  # the name's own comes first

@@ -7,6 +7,7 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.files import json_text
 from bubblefit.inference.virtual_work import disk_fields
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
@@ -163,6 +164,8 @@ def test_biaxial_paths_and_strips_are_estimated_from(strips_project):
 def test_the_command_and_the_page_of_check(tmp_path):
     path = project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 240"))
     result = json.loads(in_process("estimate", str(path), "--json", cwd=tmp_path).stdout)
+    own = json.loads(json_text(bf.estimate(bf.read_project(path)).result))
+    assert {**own, "cpu_s": 0} == {**result, "cpu_s": 0}
     assert {"E1", "E2", "G12"} == set(result["moduli"]) and result["chi"]["bubble"] < 1
     assert "chi" in in_process("estimate", str(path), cwd=tmp_path).stdout
     found = check(bf.read_project(path))

@@ -110,7 +110,9 @@ def form(name, coefficients, *folds):
     fit = SimpleNamespace(
         law=SimpleNamespace(form=Polynomial(0)), problem=SimpleNamespace(comparisons=parts),
         objective=9.0, notes=[Note(SNAP, "snaps", "warp")],
-        project=SimpleNamespace(title="made"),
+        project=SimpleNamespace(
+            title="made", fabric=SimpleNamespace(lab="", thickness=0.5)
+        ),
         setup=SimpleNamespace(tests=[], objective_is="error"),
         best=SimpleNamespace(ranked=[SimpleNamespace(objective=9.0)]),
     )  # fmt: skip
