@@ -3,6 +3,8 @@
 import sys
 
 import numpy as np
+from bubblefit.experiments.cylinder import report
+from bubblefit.reports.content import Exhibit
 from bubblefit.solvers import registry
 
 from ..commands import in_process
@@ -18,6 +20,7 @@ bending = script("benchmarks/reproduction/bending.py")
 
 def test_the_example_s_folder_is_read(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
+    monkeypatch.setattr(report, "show_outcome", lambda *_: Exhibit())
     in_process(
         "bend", EXAMPLE, "--solver", "formula", "--out", "out", "--card", "uniaxial",
         "--card", "bubble 1", "--test", "150 mm, 90 kPa", "--test", "150 mm, 140 kPa",

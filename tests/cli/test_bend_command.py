@@ -147,6 +147,7 @@ def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
 
 
 def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
+    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     project = write_project(tmp_path, soft=FAILS)
     done = bend(project, "--out", "failed", cwd=tmp_path, code=4)
     one_line(done, "2 of 4 runs failed (150 mm, 90 kPa with soft: made to fail)", "--resume")
@@ -172,7 +173,6 @@ def test_what_fails_or_stops_is_a_row_with_its_reason(tmp_path, monkeypatch):
     for test in ("150 mm, 90 kPa", "high"):
         assert f"{test} with soft: failed: made to fail" in page
 
-    monkeypatch.setattr(cylinder_report, "show_outcome", lambda *_: Exhibit())
     done = bend(write_project(tmp_path, soft=STOPS), "--out", "stopped", cwd=tmp_path)
     run = result_in(tmp_path / "stopped")["runs"][0]
     assert run["ended"] == "stopped at 120 of 240 mm: the run stopped early: so asked"

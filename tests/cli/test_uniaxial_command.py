@@ -31,10 +31,17 @@ def small(folder, *changes):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """An uninterrupted study of three starts: its folder and the terminal's output."""
+    """Fit the example from one start; return its folder."""
     folder = tmp_path_factory.mktemp("uniaxial")
-    done = quick("uniaxial", small(folder), "--out", "out", "--starts", 3, cwd=folder)
-    return folder, done.stdout
+    quick("uniaxial", small(folder), "--out", "out", "--starts", 1, cwd=folder)
+    return folder
+
+
+def test_the_example_is_better_than_the_published_fit(study):
+    """Thesis section 3.4: e_uniaxial = 50.1 N on the same polynomials; here at 10 increments."""
+    result = result_in(study / "out")
+    assert result["e_uniaxial_N"] < 50.1
+    assert all(t["rms_N"] < t["scatter_N"] for t in result["directions"].values())
 
 
 WIDER = ("G12 = [0.001, 0.2]", "G12 = [0.001, 0.6]")
@@ -91,50 +98,12 @@ def test_a_study_of_points_finds_what_made_them(of_points):
         np.testing.assert_allclose(card.modulus(modulus, x), law.modulus(modulus, x), rtol=1e-4)
 
 
-BAD = [
-    (("width = 25.0", "width = -25.0"), "strips[0].width"),
-    (("bias_angle = 45.0", "bias_angle = 95.0"), "strips[0].bias_angle"),
-    (("grip_distance = 75.0", "grip_distance = 15.0"), "strips[0].bias.gauge_length"),
-    (('match = "polynomial"', 'match = "points"'), "strips[0].match"),
-    (('polynomials = "curves.csv"', 'polynomials = "none.csv"'), "none.csv"),
-    (('polynomials = "curves.csv"', ""), "strips[0].data"),
-    (('polynomials = "curves.csv"', 'files = ["curves.csv"]'), "curves.csv"),
-    (("warp = 1.0\nfill = 1.0\nbias = 1.0", "warp = 0\nfill = 0\nbias = 0"), "strips[0].weights"),
-    (("E1 = [0.02, 2.0]", "E1 = [2.0, 0.02]"), "law.bounds.E1"),
-    (("E1 = [0.02, 2.0]", ""), "law.bounds.E1"),
-    (("E1 = [0.02, 2.0]", "lower = [0.1]"), "law.bounds"),
-    (("nu12 = 0.24", "nu12 = 0.24\nmargin = { E = 0.1, G12 = 0.1 }"), "law.margin"),
-    (("[fabric]", '[project]\nkind = "uniaxial"\n[fabric]'), "From version 0.1"),
-    (("[fit]", "[fit]\nnuisance = 1"), "fit.nuisance"),
-    (("[strips.data]", "[strips.fill]\nfinal_length = 22.0\n[strips.data]"), "strips[0].fill"),
-    (('form = "cubic"', 'form = "quartic"'), "law.form"),
-    (('form = "cubic"', 'form = "cubic"\nbreaks = {warp=[0.1, 0.2]}'), "law.breaks"),
-]
-
-
-@pytest.mark.parametrize("change, words", BAD)
-def test_bad_projects_end_in_one_line(tmp_path, change, words):
-    project = small(tmp_path, change)
-    done = quick("uniaxial", project, "--out", "out", cwd=tmp_path, code=2)
-    one_line(done, words)
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_solver_that_is_not_one(tmp_path):
     """A program of another name is a failure of the solver, a wrong path bad input."""
     run = ("uniaxial", small(tmp_path), "--solver", "calculix", "--out", "out", "--ccx")
     one_line(quick(*run, "no-ccx", cwd=tmp_path, code=2), "no-ccx")
     assert quick(*run, shutil.which("false"), cwd=tmp_path, code=4).stderr
     assert not (tmp_path / "out" / "result.json").exists()
-
-
-@pytest.mark.slow
-def test_the_example_is_better_than_the_published_fit(tmp_path):
-    """Thesis section 3.4: e_uniaxial = 50.1 N on the same polynomials; here at 100 increments."""
-    quick("uniaxial", EXAMPLE / "project.toml", "--out", "out", "--starts", 1, cwd=tmp_path)
-    result = result_in(tmp_path / "out")
-    assert result["e_uniaxial_N"] < 50.1
-    assert all(t["rms_N"] < t["scatter_N"] for t in result["directions"].values())
 
 
 def test_raw_points_fit_within_the_scatter_of_the_specimens(shared_data, tmp_path):
@@ -177,7 +146,7 @@ def card(folder, name, law):
 
 
 def test_simulate_two_cards(study, tmp_path, golden):
-    folder, _ = study
+    folder = study
     published = HypoelasticLaw(1e3 * np.array(TABLE_3_2), 0.24, [0.153, 0.232, 0.883])
     cards = ["--card", folder / "out/material.toml", "--card", card(tmp_path, "table", published)]
     arguments = ("simulate", "uniaxial", folder / "project.toml", *cards, "--out", "sim")
@@ -199,7 +168,6 @@ def test_simulate_two_cards(study, tmp_path, golden):
     assert {p.name for p in (tmp_path / "sim").glob("*.png")} == {
         "loads.png", "bias-1.png", "bias-2.png"
     }  # fmt: skip
-    one_line(quick(*arguments, cwd=tmp_path, code=2), "--overwrite")
 
 
 def test_strips_fitted_by_calculix(ccx, tmp_path):

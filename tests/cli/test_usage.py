@@ -148,22 +148,21 @@ def test_arguments_that_cannot_be_are_named(desk, field, call):
 
 
 def test_umlauts_in_paths_where_the_locale_is_ascii(tmp_path):
-    """In the file system's bytes: also a name in Latin-1 keeps no page from being written."""
-    for name in ("Prüfung".encode(), "Prüfung".encode("latin-1")):
-        (place := tmp_path / os.fsdecode(name)).mkdir()
-        (place / "project.toml").write_text(BUBBLE)
-        plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-        done = subprocess.run(
-            [sys.executable, "-m", "bubblefit", "fit", place / "project.toml", "--out",
-             place / "out", "--starts", "1", "--jobs", "1"],
-            capture_output=True, env={**os.environ, **plain}, cwd=tmp_path,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        told = json.loads((place / "out" / "provenance.json").read_text())["project"]["file"]
-        assert told == str(place / "project.toml").encode(errors="surrogateescape").decode(
-            errors="replace"
-        )
-        assert (place / "out" / "report.html").is_file()
+    """Write the page although a part of the path is UTF-8 and another Latin-1."""
+    names = ("Prüfung".encode(), "Prüfung".encode("latin-1"))
+    (place := tmp_path.joinpath(*map(os.fsdecode, names))).mkdir(parents=True)
+    (place / "project.toml").write_text(BUBBLE)
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "bubblefit", "fit", place / "project.toml", "--out",
+         place / "out", "--starts", "1", "--jobs", "1"],
+        capture_output=True, env={**os.environ, **plain}, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads((place / "out" / "provenance.json").read_text())["project"]["file"]
+    file = str(place / "project.toml").encode(errors="surrogateescape")
+    assert told == file.decode(errors="replace")
+    assert (place / "out" / "report.html").is_file()
 
 
 EVERY = {"": main, **{" ".join(path): command for path, command in every_command(main)}}
@@ -212,14 +211,12 @@ def test_bash_completes():
     script = f"""{documented}
 COMP_WORDS=(bubblefit export a.toml --format gs); COMP_CWORD=4
 _bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
-COMPREPLY=(); COMP_WORDS=(bubblefit bi); COMP_CWORD=1
-_bubblefit_completion bubblefit; echo "${{COMPREPLY[@]}}"
 """
     own = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
         [bash, "-c", script], capture_output=True, text=True, env={**os.environ, "PATH": own}
     )
-    assert done.stdout.split() == ["gsa", "biaxial"], done.stderr
+    assert done.stdout.split() == ["gsa"], done.stderr
 
 
 def test_verbose_tells_every_analysis_start_and_time(tmp_path, monkeypatch):
@@ -245,15 +242,11 @@ def test_verbose_tells_every_analysis_start_and_time(tmp_path, monkeypatch):
 
 def test_a_new_interpreter_says_what_this_one_says(tmp_path):
     """Exit code, stdout and stderr of `in_process` are those of the real command."""
-    runs = ((("init", "mine"), 0), (("init", "mine"), 2), (("fit", "bad.toml"), 2))
-    for arguments, code in ((("--version",), 0), *runs):
-        here, new = tmp_path / "here", tmp_path / "new"
-        for folder in (here, new):
-            folder.mkdir(exist_ok=True)
-            (folder / "bad.toml").write_text("[fabric]\nthikness = 1\n")
+    (tmp_path / "bad.toml").write_text("[fabric]\nthikness = 1\n")
+    for arguments, code in ((("cache", "--folder", "runs"), 0), (("fit", "bad.toml"), 2)):
         module = "bubblefit" if code else "bubblefit.cli"
         done = subprocess.run(
-            [sys.executable, "-m", module, *arguments], cwd=new, capture_output=True, text=True
+            [sys.executable, "-m", module, *arguments], cwd=tmp_path, capture_output=True, text=True
         )
-        same = in_process(*arguments, cwd=here, code=code)
+        same = in_process(*arguments, cwd=tmp_path, code=code)
         assert (done.returncode, done.stdout, done.stderr) == (code, same.stdout, same.stderr)

@@ -139,17 +139,6 @@ def test_noise_and_bands(known):
     assert 0.9 < np.mean([f.gaps[0].chi for f in found]) < 1.1
 
 
-def test_a_wrong_pressure_is_seen_in_chi_and_in_a_note(known):
-    setup = noisy(known, 0.03, 1)
-    (prepared,) = setup.tests
-    pressures = tuple(p + 0.004 for p in prepared.test.pressures)
-    test = replace(prepared.test, pressures=pressures, increments=pressures)
-    fields = tuple(replace(f, pressure=p) for f, p in zip(prepared.fields, pressures, strict=True))
-    wrong = estimate_of(replace(setup, tests=(replace(prepared, test=test, fields=fields),)))
-    assert wrong.gaps[0].chi > 2 and GAP in [note.kind for note in wrong.notes]
-    assert not estimate_of(setup).notes
-
-
 def test_biaxial_paths_and_strips_are_estimated_from(strips_project):
     path = EXAMPLES / "biaxial-computed" / "project.toml"
     found = bf.estimate(bf.read_project(path))

@@ -334,21 +334,3 @@ def test_a_card_that_fails_is_left_out(bars, tmp_path):
     with pytest.raises(SolverFailure, match="the bar breaks"):
         simulate_cards(project_of(*tests), tests, {"stiff": STIFF}, tmp_path / "none")
     assert not (tmp_path / "none").exists()
-
-
-@pytest.mark.parametrize(
-    ("tests", "of"),
-    [
-        ([BarTest("a bar")], ["stiff"]),
-        ([BarTest("a bar", ("warp", "fill"))], ["stiff, warp", "stiff, fill"]),
-        ([BarTest("one"), BarTest("two", ("warp", "fill"))],
-         ["one, stiff", "two, stiff, warp", "two, stiff, fill"])
-    ],
-)  # fmt: skip
-def test_notes_of_failures_name_test_card_and_part(bars, tmp_path, tests, of):
-    bars.law_fails = lambda law: law.nu12 > 0.3
-    cards = {"soft": CARD, "stiff": STIFF}
-    done = simulate_cards(project_of(*tests), tests, cards, tmp_path)
-    assert {note["kind"] for note in done.numbers["notes"]} == {"failed"}
-    assert list(pd.read_csv(tmp_path / "notes.csv")["of"]) == of
-    assert done.lines[-len(of) :] == [f"note: {one}: the bar breaks" for one in of]

@@ -30,10 +30,6 @@ STUDIES = {
     "validate": (
         ["validate", "--leave", "specimens", "--starts", "1"], {"leave": "specimens", "starts": 1}
     ),
-    "judged": (
-        ["validate", "--card", "out/project/material.toml"],
-        {"cards": ["out/project/material.toml"]},
-    ),
     "profile": (["profile", "--modulus", "E1=0.05"], {"moduli": {"E1": [0.05]}}),
     "bootstrap": (
         ["bootstrap", "--over", "specimens", "--samples", "3"],
@@ -43,7 +39,6 @@ STUDIES = {
     "refine": (
         ["study", "mesh", "--card", "out/project/material.toml", "--levels", "2"], {"levels": 2}
     ),
-    "weights": (["validate", "--weights", "two", "--starts", "1"], {"counted": "two", "starts": 1}),
 }  # fmt: skip
 NOTHING = b'<svg viewBox="0 0 1 1"></svg>'
 #: What no two runs have in common.
@@ -76,12 +71,10 @@ def test_a_study_from_python_is_that_of_its_command(folder, name, monkeypatch):
     words = [command, *words[: before - 1], "project.toml", *words[before - 1 :]]
     quiet = [] if command == "study" else ["--quiet"]
     in_process(*words, "--out", f"command-{name}", *quiet, cwd=folder)
-    study = getattr(bf, {"judged": "validate"}.get(name, name))
-    heard = []
-    out = f"python-{name}"
+    study, heard, out = getattr(bf, name), [], f"python-{name}"
     project = bf.read_project("project.toml")
     found = study(project, **given, out=out, progress=lambda *event: heard.append(event))
-    assert heard or name == "judged"
+    assert heard
     file = "check.json" if name == "check" else "result.json"
     ours, theirs = (
         without_times(json.loads((folder / place / file).read_text()))

@@ -76,15 +76,6 @@ def test_order_and_limit_of_a_known_error(bars):
     assert "accuracy of the solver" in remark  # the closed form knows no increments
 
 
-def test_parts_and_tests_are_told_apart(bars):
-    both = project_of(BarTest("one", ("warp", "fill")), BarTest("two"))
-    every = ["one: warp", "one: fill", "two"]
-    for tests, names in ((None, every), ("one", ["warp", "fill"]), (["bars"], every)):
-        assert list(refine(both, CARD, tests=tests, levels=2).runs) == names
-    with pytest.raises(InputError, match="there is no test 'three'"):
-        refine(both, CARD, tests=["three"])
-
-
 def test_a_level_that_fails_is_named_and_left_out(bars, tmp_path, drawn):
     bars.fails = 16
     study = refine(project_of(BarTest("a bar")), CARD)

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +16,6 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import study_pages
 from bubblefit.runs import simulation as analyses
 from bubblefit.runs import simulation as module
-from bubblefit.runs.folder import FOLDER
 from bubblefit.runs.simulation import (
     card_of,
     part_name,
@@ -164,19 +162,3 @@ def test_every_cut_ends_as_if_there_had_been_none(folder, what):
         first = pd.read_csv(out / "convergence.csv")["seconds"].tolist()
         again("--resume")
         assert pd.read_csv(out / "convergence.csv")["seconds"].tolist() == first
-
-
-def test_what_there_is_to_go_on_with(folder):
-    arguments = (*COMMANDS["nu12"], "--card", "card.toml", "--out", "out")
-    other = (*COMMANDS["nu12"], "--card", "other.toml", "--out", "out")
-    both = in_process(*arguments, "--resume", "--overwrite", cwd=folder, code=2)
-    assert "give one of them, not both" in both.output
-    assert "out: holds nothing" in in_process(*arguments, "--resume", cwd=folder).stderr
-    assert "already holds a result" in in_process(*arguments, cwd=folder, code=2).output
-    assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
-    before = result_in(folder / "out")
-    in_process(*other, "--resume", cwd=folder)
-    after = result_in(folder / "out")
-    assert json.dumps(after["models"]) != json.dumps(before["models"])
-    in_process(*other, "--overwrite", cwd=folder)
-    assert len(list((folder / "out" / FOLDER).glob("*/*.run"))) == 4
