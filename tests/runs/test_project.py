@@ -203,7 +203,6 @@ def test_breaks(example):
         (KNOWN, "strain_range", "# strain_range", ["law.strain_range", "missing"]),
         (KNOWN, "elements = 800", "elements = 400000000", ["bubble[0].elements"]),
         (KNOWN, "thickness = 0.81", "thickness = 810.0", ["bubble[0].radius"]),
-        (KNOWN, 'by = "points"', 'by = "surfaces"\ndegree = 12', ["bubble[0].match.degree"]),
         (KNOWN, "7.0e-3,     # G12", "7.0e-1,     # G12", ["beta_3"]),
         (KNOWN, "[[bubble]]", "[[bubble]]\nweight = 0", ["bubble[0].weight"]),
         (KNOWN, "lower = [", "E1 = [0.1, 1.0]\nlower = [", ["law.bounds", "some of both"]),
