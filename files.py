@@ -20,7 +20,7 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -368,24 +368,40 @@ def kernels_are_compiled() -> bool:
     return folder is not None and next(folder.rglob("*.nbc"), None) is not None
 
 
-def compiled(**options: Any) -> Callable[[Any], Any]:
-    """Return `numba.njit(**options)`, cached where a folder can be written."""
-    import numba
+class Compiled:
+    """A function that numba compiles, or loads, at its first call, with those that it calls."""
 
-    def decorate(function: Any) -> Any:
+    def __init__(self, function: Any, options: Mapping[str, Any]) -> None:
+        self.function, self.options = function, options
+
+    def __call__(self, *given: Any) -> Any:
+        return self.dispatcher(*given)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Return numba's function, which takes its place in the module from now on."""
+        import numba
+
+        names = self.function.__globals__
+        for name in self.function.__code__.co_names:
+            if isinstance(other := names.get(name), Compiled):
+                names[name] = other.dispatcher
         folder = _kernel_folder()
-        if folder is None:
-            return numba.njit(**options)(function)
         # numba reads this setting once, here; other packages' functions keep their own.
         settings: Any = numba.config
         before = settings.CACHE_DIR
-        settings.CACHE_DIR = str(folder)
+        settings.CACHE_DIR = str(folder or before)
         try:
-            return numba.njit(cache=True, **options)(function)
+            made = numba.njit(cache=folder is not None, **self.options)(self.function)
         finally:
             settings.CACHE_DIR = before
+        names[self.function.__name__] = made
+        return made
 
-    return decorate
+
+def compiled(**options: Any) -> Callable[[Any], Any]:
+    """Return `numba.njit(**options)`, cached where a folder can be written, loaded when called."""
+    return lambda function: Compiled(function, options)
 
 
 def write_notes(folder: Path, notes: Iterable[Note]) -> None:

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
@@ -16,6 +15,7 @@ from ..files import compiled
 
 if TYPE_CHECKING:
     import meshio
+    import scipy.sparse as sp
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +76,11 @@ INSIDE = 1.0 + 1e-6
 
 def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
     """Return bilinear interpolation (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
-    corner = mesh.points[:, :2][mesh.quads]
-    count = min(NEIGHBOURS, len(mesh.quads))
+    import scipy.sparse as sp
     from scipy.spatial import cKDTree
 
+    corner = mesh.points[:, :2][mesh.quads]
+    count = min(NEIGHBOURS, len(mesh.quads))
     _, candidate = cKDTree(corner.mean(axis=1)).query(points, k=count)
     candidate = candidate.reshape(len(points), count)
     owner = np.full(len(points), -1)
@@ -250,6 +251,8 @@ class SmoothReading:
 
     def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
         """Return the matrix (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
+        import scipy.sparse as sp
+
         bilinear, inside = sampling_matrix(self.mesh, points)
         shares = bilinear.tocoo()
         away = points[inside][shares.row] - self.mesh.points[shares.col, :2]
@@ -267,6 +270,8 @@ def _terms(away: Array) -> Array:
 
 
 def _quadratics(mesh: Mesh) -> sp.csr_matrix:
+    import scipy.sparse as sp
+
     nodes = mesh.points[:, :2]
     count = len(nodes)
     rows, columns, values = [], [], []
@@ -288,6 +293,8 @@ def _quadratics(mesh: Mesh) -> sp.csr_matrix:
 
 
 def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
+    import scipy.sparse as sp
+
     count, each = len(mesh.points), mesh.quads.shape[1]
     of_quad = np.repeat(np.arange(len(mesh.quads)), each)
     ones = np.ones(mesh.quads.size, dtype=np.int64)
@@ -367,6 +374,8 @@ class FacetReading:
 
     def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
         """Return as `SmoothReading.matrix`; a facet over the edge reads the rest."""
+        import scipy.sparse as sp
+
         _, inside = self.reading.matrix(points)
         own = points[inside]
         total = sp.csr_matrix((len(own), len(self.reading.mesh.points)))
@@ -384,6 +393,8 @@ class FacetReading:
 
     def _facets(self, middles: Array) -> tuple[sp.csr_matrix, Array]:
         """Return rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
+        import scipy.sparse as sp
+
         offsets, share = self.facet.places
         places = (middles[:, None] + offsets).reshape(-1, 2)
         read, inside = self.reading.matrix(places)

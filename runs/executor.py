@@ -134,6 +134,8 @@ def run_tasks(
     A task whose process dies is done again, once: its earlier reports come twice. A second death,
     or an error of a task, ends all."""
     context = process_context()
+    if context.get_start_method() == "fork":
+        import numba  # noqa: F401 - here once, not in every process
     waiting, left, died = deque(numbers), len(numbers), Counter[int]()
     workers: list[_Worker] = []
 

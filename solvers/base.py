@@ -394,27 +394,6 @@ def pass_on(said: Announcement) -> None:
     _listener.get()(said)
 
 
-def cell_blocks(
-    path: Path, numbers: NDArray[np.int64], elements: Iterable[tuple[int, NDArray[np.int64]]],
-    names: Mapping[int, tuple[str, tuple[int, ...] | None]],
-) -> list[tuple[str, NDArray[Any]]]:  # fmt: skip
-    """Return meshio's blocks of elements of one type, their nodes counted from 0.
-    numbers : (n,) of the nodes, increasing. names : meshio's name by type, and its order of nodes.
-    InputError : an unknown type or node."""
-    cells: list[tuple[str, list[Any]]] = []
-    for kind, nodes in elements:
-        if kind not in names:
-            raise InputError(path, "elements", f"of type {kind} are not known here")
-        name, order = names[kind]
-        place = np.minimum(np.searchsorted(numbers, nodes), len(numbers) - 1)
-        if (numbers[place] != nodes).any():
-            raise InputError(path, "elements", "refer to a node that is not there")
-        if not cells or cells[-1][0] != name:
-            cells.append((name, []))
-        cells[-1][1].append(place if order is None else place[list(order)])
-    return [(name, np.array(rows)) for name, rows in cells]
-
-
 def log_strain(mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None) -> Array:
     """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's."""
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)

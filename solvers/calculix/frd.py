@@ -8,15 +8,14 @@ that does not hold what its headers announce, or stops before 9999, is refused.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import reading
+from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
 SHORT, LONG, FLOAT, DOUBLE = range(4)
@@ -36,25 +35,6 @@ CELLS: dict[int, tuple[str, tuple[int, ...] | None]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class FrdMesh:
-    """Numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
-
-    numbers: NDArray[np.int64]
-    points: Array
-    elements: tuple[tuple[int, NDArray[np.int64]], ...]
-
-
-@dataclass(eq=False)
-class FrdFrame:
-    """An increment: total time, step, increment, fields by name (nodes, c), NaN: no value."""
-
-    time: float
-    step: int
-    increment: int
-    fields: dict[str, Array] = field(default_factory=dict)
-
-
 class FrdFile:
     """A result file, `mesh`, then `frames()`; InputError: none, or corrupt (which byte)."""
 
@@ -66,10 +46,10 @@ class FrdFile:
         self.mesh = self._header()
         self._first = self._at
 
-    def frames(self, ended: bool = True) -> Iterator[FrdFrame]:
+    def frames(self, ended: bool = True) -> Iterator[ResultFrame]:
         """Yield every increment in order; `ended`: with its mark; if not, all whole results."""
         self._at, self._held = self._first, 0
-        frame: FrdFrame | None = None
+        frame: ResultFrame | None = None
         step = increment = 0
         while ended or self._at < len(self._data):
             line = self._line()
@@ -82,14 +62,14 @@ class FrdFile:
                 if frame is None or (frame.step, frame.increment) != (step, increment):
                     if frame is not None:
                         yield frame
-                    frame = FrdFrame(time, step, increment)
+                    frame = ResultFrame(time, step, increment)
                 self._result(line, frame)
             elif not line.startswith("    1"):
                 raise self._wrong(f"unknown record {line[:12]!r}")
         if frame is not None:
             yield frame
 
-    def _header(self) -> FrdMesh:
+    def _header(self) -> ResultMesh:
         if not self._data.startswith(b"    1C"):
             raise InputError(self.path, "", "is not a CalculiX result file (no 1C record)")
         numbers, points, elements = np.empty(0, np.int64), np.empty((0, 3)), []
@@ -109,9 +89,9 @@ class FrdFile:
             raise self._wrong("no node block")
         if not (np.diff(numbers) > 0).all():
             raise self._wrong("node numbers do not increase")
-        return FrdMesh(numbers, points, tuple(elements))
+        return ResultMesh(numbers, points, tuple(elements))
 
-    def _result(self, header: str, frame: FrdFrame) -> None:
+    def _result(self, header: str, frame: ResultFrame) -> None:
         count, flag = self._int(header[24:36]), self._int(header[73:75])
         line = self._line()
         if not line.startswith(" -4"):
@@ -224,18 +204,4 @@ class FrdFile:
         return InputError(self.path, f"byte {self._at}", problem)
 
 
-def read(filename: Path | str) -> meshio.Mesh:
-    """Return mesh and last increment for `meshio.read("job.frd")`; InputError: not whole."""
-    from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
-
-    file = FrdFile(filename)
-    cells = cell_blocks(file.path, file.mesh.numbers, file.mesh.elements, CELLS)
-    mesh = meshio.Mesh(file.mesh.points, cells)
-    for frame in file.frames():
-        mesh.point_data = dict(frame.fields)
-        names = ("time", "step", "increment")
-        mesh.field_data = {name: np.array([getattr(frame, name)]) for name in names}
-    return mesh
-
-
-meshio.register_format("frd", [".frd"], read, {})
+register_with_meshio("frd", lambda path: last_frame(FrdFile(path), CELLS))

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import reading
+from ..result_files import ResultFrame, ResultMesh, last_frame, register_with_meshio
 
 Array = NDArray[np.float64]
 WIDTH, PER_LINE = 13, 6
@@ -119,27 +118,10 @@ class Records:
 
 
 #: meshio's name of the element types that public decks show.
-CELLS = {7: "hexahedron", 134: "tetra", 138: "triangle"} | dict.fromkeys((18, 75, 139, 140), "quad")
+CELLS = {7: ("hexahedron", None), 134: ("tetra", None), 138: ("triangle", None)}
+CELLS |= dict.fromkeys((18, 75, 139, 140), ("quad", None))
 #: Columns of a vector's name.
 NAME = 48
-
-
-@dataclass(frozen=True, eq=False)
-class T19Mesh:
-    """Numbers (n,) and points (n, 3) of the nodes; per element its type and node numbers."""
-
-    numbers: NDArray[np.int64]
-    points: Array
-    elements: tuple[tuple[int, NDArray[np.int64]], ...]
-
-
-@dataclass(eq=False)
-class T19Frame:
-    """An increment: total time, its number, and vectors by name (nodes of the mesh, c)."""
-
-    time: float = 0.0
-    increment: int = 0
-    fields: dict[str, Array] = field(default_factory=dict)
 
 
 class T19File:
@@ -154,7 +136,7 @@ class T19File:
         self.mesh = self._model()
         self._first = self._file.at
 
-    def frames(self, ended: bool = True) -> Iterator[T19Frame]:
+    def frames(self, ended: bool = True) -> Iterator[ResultFrame]:
         """Yield every increment in order; `ended`: with its mark; if not, all whole ones."""
         self._file.at = self._first
         while True:
@@ -171,7 +153,7 @@ class T19File:
                 return
             yield frame
 
-    def _model(self) -> T19Mesh:
+    def _model(self) -> ResultMesh:
         numbers, points = np.empty(0, np.int64), np.empty((0, 3))
         elements: list[tuple[int, NDArray[np.int64]]] = []
         header = [0] * 30
@@ -188,10 +170,10 @@ class T19File:
             self._file.end()
         if not len(numbers):
             raise self._file.wrong("no nodes (block 508) before the first increment")
-        return T19Mesh(numbers, points, tuple(elements))
+        return ResultMesh(numbers, points, tuple(elements))
 
-    def _frame(self) -> T19Frame:
-        frame, timed = T19Frame(), False
+    def _frame(self) -> ResultFrame:
+        frame, timed = ResultFrame(), False
         while self._file.peek() != "----":
             if self._file.peek() in ("****", "++++"):
                 raise self._file.wrong("an increment without its end (----): truncated")
@@ -219,7 +201,7 @@ class T19File:
             raise self._file.wrong("an increment without its time (block 518)")
         return frame
 
-    def _vectors(self, frame: T19Frame) -> None:
+    def _vectors(self, frame: ResultFrame) -> None:
         for _ in range(self._file.integers(2)[0]):
             name = self._file.line()[:NAME].strip()
             numbers = self._file.integers(12)
@@ -249,18 +231,4 @@ class T19File:
         return numbers.astype(np.int64), np.pad(values[:, :width], ((0, 0), (0, 3 - width)))
 
 
-def read(filename: Path | str) -> meshio.Mesh:
-    """Return mesh, last increment for `meshio.read("job.t19")`; InputError: not whole."""
-    from ..base import cell_blocks  # this module is imported with bubblefit, and reading is rare
-
-    file = T19File(filename)
-    kinds = {kind: (name, None) for kind, name in CELLS.items()}
-    cells = cell_blocks(file.path, file.mesh.numbers, file.mesh.elements, kinds)
-    mesh = meshio.Mesh(file.mesh.points, cells)
-    for frame in file.frames():
-        mesh.point_data = dict(frame.fields)
-        mesh.field_data = {name: np.array([getattr(frame, name)]) for name in ("time", "increment")}
-    return mesh
-
-
-meshio.register_format("t19", [".t19"], read, {})
+register_with_meshio("t19", lambda path: last_frame(T19File(path), CELLS))
