@@ -10,6 +10,7 @@ from bubblefit.reports import vega
 from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 from . import needs
 from .bars import BarKind, BarSolver
@@ -34,6 +35,13 @@ settings.load_profile("bubblefit")
 def pytest_addoption(parser):
     """Add the option that writes tests/golden/."""
     parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread():
+    """As in a study: BLAS threads on so small a band cost more than they bring."""
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -117,3 +117,27 @@ def clean_fit(model, law, unknowns, shift=0.0, parameters=None):
     pairs = zip(model.pressures, fields, strict=True)
     data = [FieldTarget(p, u + shift) for p, u in pairs]
     return single(model, MembraneSolver(), law, FieldObjective(data), unknowns)
+
+
+def noise_of(fit, each, random):
+    """(m,) white noise of each comparison's data, as it stands in the residual."""
+    sizes = {c.name: sum(c.objective.sizes) for c in fit.comparisons}
+    drawn = [each[name] * random.standard_normal(size) for name, size in sizes.items()]
+    return np.concatenate(drawn) / fit.scale
+
+
+def follows(fit, point, noise):
+    """Where a fit goes (unknowns,) that began at `point`, to first order.
+
+    Its blocks are weighted so that the sum of their norms is least.
+    """
+    root = 1.0 / np.sqrt(fit.blocks.norms(point.residual)[fit.blocks.of])
+    by_noise = root * noise.T
+    return np.linalg.lstsq(root[:, None] * point.jacobian, by_noise.T, rcond=None)[0]
+
+
+def scatter_of(fit, point, each, draws=4000):
+    """Standard deviation of the unknowns (n,) over drawn noise: sure to 1.1 % with 4000 draws."""
+    random = np.random.default_rng(11)
+    noise = np.array([noise_of(fit, each, random) for _ in range(draws)])
+    return np.std(follows(fit, point, noise.T), axis=1)

@@ -39,12 +39,13 @@ from .cases import (
     MODEL,
     PRESSURES,
     clean_fit,
+    follows,
     problem,
     reference,
+    scatter_of,
     single,
     targets,
 )
-from .scatter import follows, scatter_of
 
 REACHED = np.array([0.08, 0.08, 0.08])
 FLAT_LAW = HypoelasticLaw.linear(400.0, 250.0, 12.0)

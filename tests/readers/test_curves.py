@@ -274,13 +274,11 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
         ("Load (N);disp_mm\n1,5;1.000\n", {"decimal": ","}, "column 'disp_mm': expected a number"),
         ("Load (N),disp_mm,disp_mm\n1,2,3\n", {}, "'disp_mm' appears twice, with other numbers"),
         ("Load (N),disp_mm\n1,2\n", {"direction": None}, "no column says the direction"),
-        ("Load (N),disp_mm\n1,2\n", {"direction": "90"}, "direction: unknown direction '90'"),
         ("Load (N),disp_mm\n1,2\n", {"columns": {"force": "Load"}}, "unknown quantity 'force'"),
         ("Load (N),disp_mm\n1,2\n", {"columns": {"time": "t"}}, "column of time 't' is missing"),
         ("Load (N),disp_mm\n1,2\n", {"columns": {"load": "F"}}, "with the columns one of elon"),
         ("Load,disp_mm\n1,2\n", {"load_unit": "stone"}, "load_unit: expected one of N, kN"),
         ("Load (kN),disp_mm\n1e307,2\n", {}, "numbers too large; is the unit 'kN' right?"),
-        ("Load (N),disp_mm\n1,2\n", {"decimal": ";"}, "decimal: expected a point or a comma"),
         ("Specimen,Load (N),disp_mm\n,1,2\n", {}, "column 'Specimen': expected the specimen's"),
     ],
 )
@@ -288,7 +286,7 @@ def test_the_refusal_says_what_is_wrong(scratch, text, options, words):
     assert words in complaint(read, scratch, text, **options)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=100)
 @given(
     rows=st.lists(
         st.tuples(*[st.floats(-1e6, 1e6, allow_subnormal=False)] * 2), min_size=1, max_size=20

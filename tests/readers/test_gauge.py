@@ -265,7 +265,7 @@ def test_with_the_loads_of_a_machine(tmp_path):
     assert set(read["specimen"]) == {"w1"} and set(read["direction"]) == {"warp"}
 
 
-LOADS, LOW, HIGH = "time_s,load_N\n0,0\n1,10\n2,30\n", (1.0, 1.0), (1.0, 9.0)
+LOADS = "time_s,load_N\n0,0\n1,10\n2,30\n"
 LOW, HIGH = (1.0, 1.0), (1.0, 9.0)
 
 

@@ -122,17 +122,12 @@ def test_missing_data_says_what_to_do(tmp_path):
         ("[bubble.match]", '[bubble.sheet]\nrim = "measured"\n[bubble.match]', ["sheet.rim"]),
         ("[bubble.match]", "[bubble.sheet]\nmodes = 46\n[bubble.match]", ["sheet.modes"]),
         ("radius =", "raduis =", ["bubble[0].raduis", "did you mean 'radius'"]),
-        ("[bubble.match]", "[bubble.matsch]", ["bubble[0].matsch", "did you mean 'match'"]),
         ("displacement_offset", "offset", ["bubble[0].nuisance.offset", "displacement_offset"]),
-        ("radius = 100.0", 'radius = "100 mm"', ["bubble[0].radius", "number", "'100 mm'"]),
-        ("radius = 100.0", "radius = -1.0", ["bubble[0].radius", "greater than 0"]),
         (R, ELLIPSE % "120, minor = 80, angle = 120", ["bubble[0].ellipse.angle", "90"]),
         (R, ELLIPSE % "120", ["bubble[0].ellipse.minor", "missing"]),
         ("[22, 59, 97", "[22, 97, 59", ["bubble[0].pressures[2]", "59 after 97"]),
         ("[22, 59, 97", "[22, 22, 97", ["bubble[0].pressures[1]", "increase"]),
-        ("[22, 59, 97", "[0, 59, 97", ["bubble[0].pressures[0]", "greater than 0"]),
         ("[6, 40]", "[6, 301]", ["bubble[0].increments[1]", "last pressure"]),
-        ("-7.96788e-3,", "inf,", ["bubble[0].data.known_solution.beta[0]", "finite"]),
         ("[fit]", "[bubble.data.points]\nfiles=[]\n[fit]", ["bubble[0].data", "exactly one"]),
     ],
 )
@@ -148,7 +143,6 @@ def test_bad_input_names_file_and_field(edit, tmp_path, old, new, words):
         ("{index:02d}", "{number}", ["data.points.pattern", "{index}"]),
         ("{index:02d}", "02", ["data.points.pattern", "same file"]),
         ("pattern =", 'files = ["a.csv"]\npattern =', ["data.points", "exactly one"]),
-        ('dz = "dz"', 'w = "dz"', ["data.points.columns.w", "allowed here: x, y, z, dx, dy, dz"]),
     ],
 )
 def test_bad_point_files(edit, old, new, words):

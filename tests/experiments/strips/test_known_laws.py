@@ -38,8 +38,13 @@ from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.interpolate import CubicSpline
 
-from ...inference.cases import Failing, differentiated, levenberg_marquardt
-from ...inference.scatter import follows, scatter_of
+from ...inference.cases import (
+    Failing,
+    differentiated,
+    follows,
+    levenberg_marquardt,
+    scatter_of,
+)
 from ...projects import constant_strips
 from ...published_laws import TABLE_3_2
 
@@ -190,18 +195,6 @@ def test_loads_between_the_increments_lie_on_a_spline_from_the_origin():
     assert objective.unit == "N"
 
 
-@pytest.mark.parametrize("scale, weight", [(1.0, 2.0), (1400.0, 1.0), (1400.0, 0.25)])
-def test_scale_and_weight_of_a_strip(scale, weight):
-    model, history = STRIPS["fill"], exact("fill", LAW)
-    load = history.load + np.linspace(-3, 9, 10)
-    plain = LoadObjective(model.elongations, model.elongations, load)
-    other = LoadObjective(model.elongations, model.elongations, load, scale, weight)
-    norm = np.linalg.norm(other.residual(history))
-    assert norm == pytest.approx(weight / scale * plain.rms(history))
-    assert other.rms(history) == plain.rms(history)
-    assert other.residual(history) * other.scale == pytest.approx(history.load - load)
-
-
 @pytest.mark.parametrize(
     "elongation, words",
     [([], "no point"), ([-0.1], "from 0 to 3.307 mm, got -0.1$"), ([3.4], "got 3.4$"),
@@ -227,17 +220,6 @@ def test_blocks():
     rest = Blocks([2, 4])
     keep = [0, 1, 5, 6, 7, 8]
     assert blocks.gradient(r, j) == pytest.approx(rest.gradient(r[keep], j[keep]))
-
-
-def test_shifted_reckons_as_if_one_solver_gave_what_another_gives():
-    model, here = STRIPS["bias"], exact("bias", LAW)
-    there = MembraneSolver().run(model, LAW.with_beta(1.1 * LAW.beta))
-    u = np.array([0.5, 4.0, 10.0])
-    objective = LoadObjective(model.elongations, u, [30.0, 200.0, 900.0], 900.0, 0.5)
-    moved = objective.shifted(here, there)
-    assert moved.residual(there) == pytest.approx(objective.residual(here))
-    assert objective.load.tolist() == [30.0, 200.0, 900.0]
-    assert np.linalg.norm(moved.residual(here) - objective.residual(here)) > 1e-3
 
 
 @pytest.mark.parametrize("unknowns", [SHIFTED, CUBIC], ids=["offsets", "moduli"])
@@ -286,17 +268,6 @@ def test_the_law_that_made_the_data_is_found(form, number):
     found = levenberg_marquardt(fit, feasible_start(fit, 2, number), tolerance, 100)
     assert found.value < 100 * tolerance, found
     assert max(errors(fit, unknowns, law, found.best.unknowns)) < 1e-4
-
-
-def test_offsets_of_the_bubble_are_found_beside_the_strips():
-    fit = joint(SHIFTED)
-    shift, offset = np.array([0.2, -0.1, 0.8]), 0.003
-    model = BUBBLE.with_parameters({"pressure_offset": offset})
-    moved = MembraneSolver(TIGHT).run(model, LAW).displacement + shift
-    fit.comparisons[0].objective = field_objective(moved)
-    found = levenberg_marquardt(fit, near(SHIFTED, LAW, 1.1), 1e-9, 100)
-    assert found.value < 1e-7
-    assert found.best.unknowns[12:] == pytest.approx([*shift, 1e3 * offset], abs=1e-4)
 
 
 def test_a_warm_start_changes_nothing():

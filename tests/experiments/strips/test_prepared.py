@@ -25,7 +25,7 @@ from ...complaints import complaint
 from ...drawings import caught
 from ...projects import project_file
 from ...published_laws import TABLE_4_2
-from .sections import CURVES, PUBLISHED, SMALL, read, rows, write_exports
+from .test_reading import CURVES, PUBLISHED, SMALL, read, rows, write_exports
 
 LAW = HypoelasticLaw.linear(500.0, 200.0, 20.0)
 COARSE = ("increments = 100", "increments = 5")

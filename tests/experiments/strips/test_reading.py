@@ -1,14 +1,96 @@
 """[[strips]] of a project: units, defaults, data by direction."""
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.strips.test import StripsTest
+from bubblefit.experiments.kinds import Fabric, Place, Scales
+from bubblefit.experiments.strips import KIND
+from bubblefit.experiments.strips.test import StripsSection, StripsTest
+from bubblefit.readers.sections import LENGTH_UNITS, first_error
+from pydantic import ValidationError
 
 from ...complaints import complaint, complaint_with
+from ...places import EXAMPLES
 from ...projects import project_file
-from .sections import CURVES, ENDS, LENGTHS, PUBLISHED, SMALL, ends, read, rows, write_exports
+
+CURVES = EXAMPLES / "uniaxial-valmex7318"
+#: Table 3.1: gauge and final lengths, mm.
+LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 30.734)}
+ENDS = {direction: float(np.log(b / a)) for direction, (a, b) in LENGTHS.items()}
+
+#: The published polynomials, everything said.
+PUBLISHED = """
+width = 25.0
+grip_distance = 75.0
+bias_angle = 45.0
+increments = 100
+match = "polynomial"
+objective = "N"
+
+[data]
+polynomials = "curves.csv"
+"""
+
+#: As little as there can be, and machine exports as they come: one file a direction.
+SMALL = """
+[warp]
+gauge_length = 20.0
+
+[fill]
+gauge_length = 22.0
+
+[bias]
+gauge_length = 19.0
+
+[data]
+files = { warp = ["w1.csv", "w2.csv"], fill = ["f.TXT"], bias = ["b.csv"] }
+"""
+
+
+def ends(further: float) -> list[tuple[str, str]]:
+    """Final lengths (mm) of the small section so much beyond its gauges."""
+    gauges = {a: f"gauge_length = {a}.0" for a in (20, 22, 19)}
+    return [(said, f"{said}\nfinal_length = {a + further}") for a, said in gauges.items()]
+
+
+def read(
+    path: Path, data_folder: Path | None = None, need_data: bool = True, length: str = "mm"
+) -> StripsTest:
+    try:
+        section = StripsSection.model_validate(tomllib.loads(path.read_text()))
+    except ValidationError as found:
+        raise first_error(path, found, StripsSection, at="strips[0]") from None
+    scales = Scales(length=LENGTH_UNITS[length], length_unit=length)
+    place = Place(path, "strips[0]", Fabric("", 0.81), scales, data_folder, need_data)
+    return KIND.read(section, place, section.name or "strips")
+
+
+def rows(separator: str, *columns: np.ndarray, comma: bool = False) -> str:
+    lines = [separator.join(f"{v:.6f}" for v in row) for row in zip(*columns, strict=True)]
+    text = "\n".join(lines)
+    return text.replace(".", ",") if comma else text
+
+
+def write_exports(folder: Path):
+    """MTS (warp, 200 N/mm, in kN), ZwickRoell (fill, 80 N/mm), Instron (bias, 50 N/mm)."""
+    u = np.linspace(0, 4, 21)
+    mts = "Test: cut strip\nTest Run: 3\n\nAxial Displacement,Axial Force,Running Time\nmm,kN,sec\n"
+    (folder / "w1.csv").write_text(mts + rows(",", u, 0.2 * u, u))
+    (folder / "w2.csv").write_text(mts + rows(",", 0.9 * u, 0.18 * u, u))
+    zwick = (
+        '"Prüfgeschwindigkeit"\t300\t"mm/min"\n"Prüfzeit"\t"Standardkraft"\t"Standardweg"\n'
+        '"s"\t"N"\t"mm"\n'
+    )
+    text = zwick + rows("\t", u, 80 * u, u, comma=True)
+    (folder / "f.TXT").write_bytes(text.encode("latin-1"))
+    instron = "Specimen label,,\n\nTime,Extension,Load,Tensile stress\n(s),(mm),(N),(MPa)\n"
+    # Two specimens one after the other.
+    two = np.concatenate([u, u[:11]])
+    (folder / "b.csv").write_text(instron + rows(",", two, two, 50 * two, two))
+
 
 Edit = Callable[..., StripsTest]
 HEAD = "Extension (mm),Load (N)\n"
@@ -241,13 +323,7 @@ def test_loads_per_width_are_multiplied_by_the_strips_own(small, tmp_path):
 ADDED = {
     "[warp]\n": [
         ("thikness = 0.81", ".thikness", "unknown key"),
-        ("widht = 1", ".widht", "'width'"),
-        ("width = -1", ".width", "greater than 0"),
         ("bias_angle = 90", ".bias_angle", "90"),
-        ("increments = 0", ".increments", "1"),
-        ('match = "all"', ".match", "'points'"),
-        ('objective = "e"', ".objective", "'N' or 'relative'"),
-        ("weight = -1", ".weight", "0"),
         ("grip_distance = 19.0", ".bias.gauge_length", "19 mm"),
     ],
     "gauge_length = 22.0": [
@@ -256,11 +332,7 @@ ADDED = {
     ],
     "files": [
         ('polynomials = "c.csv"', ".data", "exactly one"),
-        ("order = 0", ".data.order", "1"),
-        ("through_origin = 1", ".data.through_origin", "boolean"),
-        ('load_unit = "kip"', ".data.load_unit", "'N', 'kN', 'lbf'"),
         ('length_unit = "yd"', ".data.length_unit", "'cm', 'm', 'in' or '%'"),
-        ('decimal = ";"', ".data.decimal", "'.' or ','"),
         ('load_unit = "N"', "w1.csv: line 4", "'kN'", "load_unit"),
         ('columns = { force = "F" }', ".data.columns.force", "load, specimen"),
         ('columns = { load = "F" }', "w1.csv", "elongation and 'F'"),
@@ -272,18 +344,12 @@ ADDED = {
 }
 CHANGED = [
     ("gauge_length = 20.0", "", ".warp.gauge_length", "missing"),
-    ("gauge_length = 20.0", "length = 20.0", ".warp.length", "gauge_length"),
     ("[warp]\ngauge_length = 20.0", "", ".warp.gauge_length", "missing"),
     (FILES, "", ".data", "exactly one of 'polynomials' and 'files'"),
     (FILES, 'polynomials = "c.csv"', ".data.polynomials", "there is no file"),
-    (FILES, "files = []", ".data.files", "at least 1 items"),
     (FILES, "files = {}", ".data.files", "one direction at least"),
-    (FILES, "files = 3", ".data.files", "list"),
     (FILES, 'files = "w1.csv"', ".data.files", "list", "'w1.csv'"),
-    (FILES, 'files = ["w1.csv", 2]', ".data.files[1]", "string", "2"),
     (FILES, 'files = ["w1.csv"]', "w1.csv: line 4", "files = { warp = [...] }"),
-    ('warp = ["w1.csv", "w2.csv"]', "warp = []", ".data.files.warp", "at least 1"),
-    ('warp = ["w1.csv", ', "warp = [1, ", ".data.files.warp[0]", "string"),
     ('warp = ["w1.csv", "w2.csv"]', 'warp = "w1.csv"', "files.warp", "list", "'w1.csv'"),
     ("fill = [", "weft = [", ".data.files.weft", "warp, fill, bias"),
     ('"w2.csv"', '"./w1.csv"', ".data.files.warp[1]", "twice"),

@@ -275,7 +275,7 @@ def mean_of(form: str, name: str, x: float, x_old: float) -> tuple[float, float,
     return increment_modulus(OF_STRAIN[form].pieces, COMPONENTS[name], x, x_old)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(forms, names, strains, strains)
 @example("spline", "G12", 0.2, -0.2)
 @example("trilinear", "E1", 0.03, 0.01)
@@ -299,7 +299,7 @@ def test_the_mean_is_the_integral_over_the_increment(form, name, x, x_old):
     assert mean - (x - x_old) * behind == pytest.approx(start, rel=1e-9)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(forms, names, strains, strains)
 def test_derivatives_against_finite_differences(form, name, x, x_old):
     law, step = OF_STRAIN[form], 1e-6
@@ -325,7 +325,7 @@ def test_small_increments_lose_no_digits(form, name, x, change):
     assert slopes == pytest.approx([half, half], rel=1e-4, abs=scale)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(forms, names, strains, strains)
 @example("trilinear", "E1", 0.01, 0.01)
 @example("trilinear", "E1", 0.01 + 1e-13, 0.01 - 1e-13)

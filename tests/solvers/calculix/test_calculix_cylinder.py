@@ -96,7 +96,7 @@ def run(ccx, model, folder):
 
 
 def test_the_middle_of_the_tube_has_the_closed_form(ccx, tmp_path):
-    model = case(40.0)
+    model = case(50.0)
     history = run(ccx, model, tmp_path)
     side = model.mesh.node_sets["side_line"]
     for frame, pressure in enumerate(model.inflation):

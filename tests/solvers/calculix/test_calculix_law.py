@@ -473,6 +473,24 @@ WAVES = np.concatenate([size * (1 + 0.3 * np.sin(40 * KNOTS)) for size in (20, 1
 MANY = HypoelasticLaw(WAVES, strain_range=[0.13] * 3, form=Spline.at([KNOTS.tolist()] * 3))
 
 
+def check_patch(ccx, folder, deck, gradient, increments, law, warp_at, libraries):
+    """Run the deck; compare its Cauchy stresses, printed with seven digits, with the law's."""
+    (folder / "patch.inp").write_text(deck)
+    environment = {**os.environ, "LD_LIBRARY_PATH": str(libraries)}
+    done = subprocess.run([ccx.path, "patch"], cwd=folder, env=environment, capture_output=True,
+                          text=True, timeout=60)  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:]
+    printed = [line.split() for line in (folder / "patch.dat").read_text().splitlines()]
+    found = np.array([row[2:] for row in printed if len(row) == 8 and row[0] == "1"], float)
+    assert len(found) >= 4
+    axes, state = rotation((0, 0, 1), warp_at).T, np.zeros(6)
+    for step in range(1, increments + 1):
+        f = np.eye(3) + step / increments * (gradient - np.eye(3))
+        s, _, state = expected(law, axes, f, state, 1.0, 1.0)
+    wanted = voigt(f @ tensor(s) @ f.T / np.linalg.det(f))
+    np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=2e-6 * wanted.max())
+
+
 @pytest.mark.parametrize(
     ("element", "how", "law"),
     [
@@ -489,18 +507,5 @@ def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element,
     gradient, increments = np.eye(3), 10
     gradient[:2, :2] = [[1.06, 0.03], [0.05, 1.04]]
     deck = patch_deck(element, law, gradient, increments, angle, orientation)
-    (tmp_path / "patch.inp").write_text(deck)
-    environment = {**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)}
-    done = subprocess.run([ccx.path, "patch"], cwd=tmp_path, env=environment, capture_output=True,
-                          text=True, timeout=60)  # fmt: skip
-    assert done.returncode == 0, done.stdout[-2000:]
-    printed = [line.split() for line in (tmp_path / "patch.dat").read_text().splitlines()]
-    found = np.array([row[2:] for row in printed if len(row) == 8 and row[0] == "1"], float)
-    assert len(found) >= 4
-    axes, state = rotation((0, 0, 1), warp_at).T, np.zeros(6)
-    for step in range(1, increments + 1):
-        f = np.eye(3) + step / increments * (gradient - np.eye(3))
-        s, _, state = expected(law, axes, f, state, 1.0, 1.0)
-    wanted = voigt(f @ tensor(s) @ f.T / np.linalg.det(f))
-    # Seven digits are printed.
-    np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), atol=2e-6 * wanted.max())
+    libraries = material_library().parent
+    check_patch(ccx, tmp_path, deck, gradient, increments, law, warp_at, libraries)

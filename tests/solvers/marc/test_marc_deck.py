@@ -397,14 +397,6 @@ def test_forces_that_do_not_balance_are_remarked(marc, model, grown):
     assert any("do not balance" in words for words in history.remarks)
 
 
-def test_a_collapse_is_reported_up_to_there(marc, model, grown):
-    frames, loads = frames_of(model, grown, last=2)
-    history = marc(frames, 3015, ended=False).run(model, LINEAR)
-    np.testing.assert_allclose(history.load, [0, *loads], rtol=ROUNDING)
-    assert any("last increment is at 60 mm" in words for words in history.remarks)
-    assert any("time step could not get smaller" in words for words in history.remarks)
-
-
 @pytest.mark.parametrize("what", ["collapse", "missing", "forces"])
 def test_results_that_are_not_whole_are_failures(marc, model, grown, what):
     name = "Something Else" if what == "forces" else "Contact Normal Force"

@@ -132,24 +132,6 @@ def test_every_truncation_is_refused(tmp_path):
     assert len(read(path)) == 2
 
 
-def test_a_line_that_is_missing_is_refused(tmp_path):
-    lines = t19_text(POINTS, QUADS, frames(2)).splitlines(keepends=True)
-    # Without the title, and without what is skipped anyway, it is still a whole file.
-    skipped = ("job", "inflation")
-    for i, line in enumerate(lines):
-        if line.strip() in skipped or i == 0:
-            continue
-        path = tmp_path / "job.t19"
-        path.write_text("".join(lines[:i] + lines[i + 1 :]))
-        begun = "".join(lines[: i + 1]).rsplit("=beg=", 1)[-1]
-        of_sets = begun.startswith("513") and not line.startswith("=")
-        unused_header = begun.startswith("502") and begun.count("\n") > 3 and line != "=end=\n"
-        if of_sets or unused_header:
-            continue
-        with pytest.raises(InputError):
-            read(path)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [

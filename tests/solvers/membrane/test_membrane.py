@@ -16,7 +16,7 @@ from bubblefit.solvers.base import analysis_of
 from bubblefit.solvers.membrane import factorisation, newton
 from bubblefit.solvers.membrane.factorisation import BandedTangent, SparseTangent, tangent_for
 from bubblefit.solvers.membrane.kernel import reference_elements
-from bubblefit.solvers.membrane.newton import Asked, Loading, Membrane, NoEquilibrium
+from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
@@ -267,58 +267,6 @@ def test_progress_failure_and_stability_of_a_patch():
     law = HypoelasticLaw.linear(100.0, 100.0, 5.0, 0.6)
     history = MembraneSolver().run(PatchModel([[10.0, 10.0], [100.0, 100.0]], 0.8), law)
     assert history.unstable == ("100 and 100 N/mm",)
-
-
-class Ladder(Loading):
-    """u = level, found only from a start nearer than `reach`; every look is noted."""
-
-    most_cuts = 3
-
-    def __init__(self, reach, top=np.inf):
-        self.reach, self.top, self.looks = reach, top, []
-
-    def equilibrium(self, start, level):
-        self.looks.append((float(start[0, 0]), level))
-        near = abs(float(start[0, 0]) - level) <= self.reach and level <= self.top
-        return np.full((1, 3), level) if near else None
-
-    def first(self, level):
-        return self.reached(0.0, np.zeros((1, 3)), level, np.zeros((1, 3)), self.most_cuts)
-
-    def ahead(self, levels, path, level):
-        return path[-1]
-
-    def onward(self, u, at, to, before):
-        return u
-
-    def problem(self, before, level, place):
-        return f"nothing between {before:g} and {level:g}, {place}"
-
-
-def ends(loading, levels, **options):
-    return [float(u[0, 0]) for u in newton.march(loading, levels, Asked(), **options)]
-
-
-def test_levels_are_reached_directly_or_in_parts():
-    ladder = Ladder(1.0)
-    assert ends(ladder, [1.0, 2.0, 3.0]) == [1.0, 2.0, 3.0]
-    assert ladder.looks == [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]
-    ladder = Ladder(1.0)
-    assert ends(ladder, [6.0], begun=(5.0, np.full((1, 3), 5.0))) == [6.0]
-    assert ladder.looks == [(5.0, 6.0)]
-    ladder = Ladder(1.0)
-    assert ends(ladder, [1.0, 5.0]) == [1.0, 5.0]
-    assert [level for _, level in ladder.looks] == [1.0, 5.0, 3.0, 2.0, 3.0, 5.0, 4.0, 5.0]
-    assert ends(Ladder(0.125), [1.0]) == [1.0]  # eighths: three cuts
-    with pytest.raises(NoEquilibrium, match="nothing between 0 and 1, increment 1 of 1"):
-        ends(Ladder(0.1), [1.0])
-    found = []
-    with pytest.raises(SolverFailure, match="nothing between 2 and 3, increment 3 of 3"):
-        found.extend(newton.march(Ladder(1.0, top=2.0), [1.0, 2.0, 3.0], Asked()))
-    assert [u[0, 0] for u in found] == [1.0, 2.0]
-    ladder, guess = Ladder(1.0), np.array([1.0, 9.0])[:, None, None] * np.ones((2, 1, 3))
-    assert [u[0, 0] for u in newton.march(ladder, [2.0, 3.0], Asked(guess=guess))] == [2.0, 3.0]
-    assert ladder.looks == [(1.0, 2.0), (9.0, 3.0), (2.0, 3.0)]
 
 
 def test_extrapolation():
