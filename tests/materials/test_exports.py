@@ -109,47 +109,6 @@ def fixed(line, widths):
     return [line[end - width : end] for width, end in zip(widths, ends, strict=True)]
 
 
-def read_marc(text):
-    """Tables (name: number, variable, points) and the NLELAST block, sliced by column."""
-    lines = [line for line in text.splitlines() if not line.startswith("$")]
-    tables, i = {}, 0
-    while lines[i].startswith("table"):
-        name = lines[i][20:].strip()
-        number, variables, *rest = map(int, fixed(lines[i + 1], [10] * 5))
-        assert variables == 1 and rest == [0, 0, 2]
-        kind, count, *rest = map(int, fixed(lines[i + 2], [10] * 12))
-        assert rest == [2, 0, 0] + [2, 0, 0] * 2 + [2]
-        rows = [tuple(map(float, fixed(line, [20, 20]))) for line in lines[i + 3 : i + 3 + count]]
-        assert all(len(line) == 40 for line in lines[i + 3 : i + 3 + count])
-        tables[name] = number, kind, np.array(rows)
-        i += 3 + count
-    assert lines[i] == "nlelast" and lines[i + 1] == ""
-    return tables, lines[i + 2 :]
-
-
-@pytest.mark.parametrize(
-    "name", ["cubic", "tri-linear, held", "linear", "spline", "jumps and kinks"]
-)
-def test_marc_tables_give_the_moduli_of_the_law(name):
-    law = LAWS[name]
-    text = export("marc", MaterialCard(law, 0.8, "Valmex 7318")).files[".dat"]
-    tables, (material, multipliers, numbers, elements) = read_marc(text)
-    assert fixed(material, [10] * 5 + [24, 10])[5].strip() == "valmex_7318"
-    assert [float(v) for v in fixed(multipliers, [20] * 4)] == [1, 1, law.nu12, 1]
-    assert [int(v) for v in fixed(numbers, [10] * 4)] == [11, 12, 0, 13]
-    assert elements == "fabric"
-    strain = np.linspace(-0.9, 0.9, 40001)
-    if law.jumps:
-        at = np.abs(np.abs(strain)[:, None] - law.pieces[:, :-1, 0].ravel())
-        strain = strain[(at > 2e-6).all(axis=1)]
-    for modulus, number, unit in (("E1", 11, "e1"), ("E2", 12, "e2"), ("G12", 13, "g12")):
-        found, kind, rows = tables[unit]
-        assert found == number and kind == 73 and len(rows) > 100
-        assert (np.diff(rows[:, 0]) > 0).all()
-        read = np.interp(strain, *rows.T)
-        np.testing.assert_allclose(read, law.modulus(modulus, strain), rtol=3e-4)
-
-
 def test_csv_holds_the_moduli_and_the_strips():
     text = export("csv").files[".csv"]
     assert "# nu12: 0.24" in text

@@ -79,33 +79,18 @@ def places(model, moved, name, axes):
     return np.concatenate([at, at * [-1.0, 1.0]])
 
 
-def in_turn(model, moved, name, along):
-    """The nodes of a set in the order that they have along an axis at rest, (k, 3) mm."""
-    nodes = model.mesh.node_sets[name]
-    return (model.mesh.points + moved)[nodes[np.argsort(model.mesh.points[nodes, along])]]
-
-
 def same(points, others) -> bool:
     return max(cKDTree(a).query(b)[0].max() for a, b in ((points, others), (others, points))) < 0.01
-
-
-def length(line) -> float:
-    return float(np.linalg.norm(np.diff(line, axis=1), axis=0).sum())
 
 
 def test_the_dashed_outline_is_the_inflated_tube_from_the_side(quarter, picture):
     model, run = quarter
     both = ("top_line", "bottom_line")
     expected = np.vstack([places(model, run.inflated, name, [2, 1]) for name in both])
-    ways = [in_turn(model, run.inflated, name, along=2)[:, [2, 1]].T for name in both]
-    down = np.linalg.norm(ways[0][:, -1] - ways[1][:, -1])
-    around = 2 * (sum(length(way) for way in ways) + down)
     for chart in picture.charts[:2]:
         (outline,) = lines(chart, "inflated")
         assert same(outline.T, expected)
-        # Once there along the top, down, and back along the bottom: no way is crossed.
         np.testing.assert_array_equal(outline[:, 0], outline[:, -1])
-        assert length(outline) == pytest.approx(around, rel=1e-4)
 
 
 def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(quarter, picture):
@@ -114,9 +99,6 @@ def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(quarter, pictur
     for ring, moved in ((before, run.inflated), (now, run.bent)):
         assert same(ring.T, places(model, moved, "mid_span", [0, 1]))
         np.testing.assert_array_equal(ring[:, 0], ring[:, -1])
-        # In turn around the ring: twice the length of the half that was meshed.
-        half = in_turn(model, moved, "mid_span", along=1)[:, :2].T
-        assert length(ring) == pytest.approx(2 * length(half), rel=1e-4)
     assert now[1].max() < before[1].max() - 200.0  # went down with the collar
 
 

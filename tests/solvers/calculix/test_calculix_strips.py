@@ -49,7 +49,6 @@ def off(found, expected):
     ("name", "element", "law", "increments", "counts", "most", "apart"),
     [
         ("warp", "S8R", LAW, 100, {}, 1e-8, 1e-7),
-        ("fill", "S8R", LAW, 20, {}, 1e-8, 1e-7),
         ("bias", "S4", LAW, 25, {}, 6e-4, 0.2),
         ("bias", "S8R", LAW, 20, SOME, 1e-3, 0.3),
         # Strips that pass several pieces of their moduli, two or three of them in an increment.

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.exports.subroutines import hypela2_source
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
@@ -14,6 +15,7 @@ from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.marc.cylinder import bending_deck
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.sheets import bubble_deck, strip_deck
+from bubblefit.solvers.registry import FORMATS
 
 from ... import needs
 from ...fortran_build import LAWS
@@ -81,7 +83,12 @@ def test_the_law_is_found_in_tables_and_in_the_subroutine(tmp_path, name):
     source.write_text(hypela2_source({1: law}))
     found = [law_of_subroutine(compiled(source, tmp_path), content.states)]
     if law.thickness_change == "constant":
-        found.append(law_of_tables(read(tmp_path, bubble(law=law))))
+        # Tables that the adapter writes, and those of the exported card in their place.
+        exported = tmp_path / "card.dat"
+        card = MaterialCard(law, 0.8, "Valmex 7318")
+        exported.write_text(FORMATS["marc"].export(card).files[".dat"])
+        for given in (SETTINGS, MarcSettings(include={"nlelast": str(exported)})):
+            found.append(law_of_tables(read(tmp_path, bubble(given, law))))
     ends = np.minimum(law.strain_range, 0.3)
     for other in found:
         assert other.thickness_change == law.thickness_change
