@@ -126,29 +126,25 @@ def _natural(corner: Array, point: Array) -> Array:
 MIDDLE = 0.25 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
-def middle_strain(mesh: Mesh, displacement: Array, warp: Array) -> Array:
-    """Return (quads, 3) log strain of a mesh in the xy plane; warp (3,) in the plane, at rest."""
-    rest, u = mesh.points[mesh.quads], displacement[mesh.quads]
-    jacobian = np.einsum("mni,nj->mij", rest[:, :, :2], MIDDLE)
-    # Columns of the gradient are the images of the unit warp and fill vectors.
-    yarns = np.array([[warp[0], -warp[1]], [warp[1], warp[0]]])
-    slopes = np.einsum("nj,mjk,kl->mnl", MIDDLE, np.linalg.inv(jacobian), yarns)
-    gradient = np.einsum("mni,mnl->mil", rest + u, slopes)
-    return log_strain_of(gradient)
+#: Direction of the warp where none is given.
+X = np.array([1.0, 0.0, 0.0])
 
 
-def surface_strain(mesh: Mesh, displacement: Array) -> Array:
-    """Return (quads, 3) log strain at the middles of a curved mesh, `warp` laid on each quad."""
-    if mesh.warp is None:
-        raise ValueError("surface_strain: the mesh has no direction of the warp in each quad")
+def surface_strain(mesh: Mesh, displacement: Array, warp: Array | None = None) -> Array:
+    """Return (quads, 3) log strain at the middles; warp : (3,) or one a quad, else the mesh's.
+
+    It is laid on each quad, x where there is none.
+    """
+    yarn = mesh.warp if warp is None else warp
+    yarn = np.broadcast_to(X if yarn is None else yarn, (len(mesh.quads), 3))
     rest = mesh.points[mesh.quads]
     tangents = np.einsum("mni,nj->mij", rest, MIDDLE)
     normal = np.cross(tangents[..., 0], tangents[..., 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    along = np.einsum("mi,mi->m", mesh.warp, normal)[:, None]
-    warp = mesh.warp - along * normal
-    warp = warp / np.linalg.norm(warp, axis=1, keepdims=True)
-    yarns = np.stack([warp, np.cross(normal, warp)], axis=1)
+    along = np.einsum("mi,mi->m", yarn, normal)[:, None]
+    yarn = yarn - along * normal
+    yarn = yarn / np.linalg.norm(yarn, axis=1, keepdims=True)
+    yarns = np.stack([yarn, np.cross(normal, yarn)], axis=1)
     # Slopes along the two yarns, from those along the quad's own two directions.
     inverse = np.linalg.inv(np.einsum("mki,mij->mkj", yarns, tangents))
     slopes = np.einsum("nj,mjk->mnk", MIDDLE, inverse)

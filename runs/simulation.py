@@ -29,7 +29,7 @@ from ..project.project import Project, chosen_cards
 from ..project.schema import FITTED, usual_folder
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
-from ..solvers.run_cache import Once, RunCache, run_cache
+from ..solvers.run_cache import RunCache, once, run_cache
 from .folder import RESULT, KeptAnalyses, Store, draw
 from .progress import listener
 from .starts import timed
@@ -70,9 +70,8 @@ class Analyses:
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
-        self._runs = self.solver
         if kept is not None:
-            self._runs = Once(self.solver, kept, counted(name, options))
+            once(self.solver, kept, counted(name, options))
         self.total = self.count = 0
         self._progress = listener(progress)
 
@@ -89,7 +88,7 @@ class Analyses:
             say(0.0)
             self.solver.progress = lambda increment: say(increment.time)
             try:
-                return self._runs.run(model, law)
+                return self.solver.run(model, law)
             finally:
                 self.solver.progress = None
 

@@ -17,7 +17,7 @@ from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
-from ..meshes.mesh import Mesh, log_strain_of, meshio_of, surface_strain
+from ..meshes.mesh import Mesh, X, log_strain_of, meshio_of, surface_strain
 from .membrane.kernel import reference_elements
 
 if TYPE_CHECKING:
@@ -138,14 +138,15 @@ class History:
 
     def _strained(self, u: Array, at: Places) -> Array:
         """Return the strain of one displacement (nodes, 3)."""
-        mesh, quads = self.mesh, self.mesh.quads
+        mesh = self.mesh
         rest = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
         warp = getattr(self.model, "warp", mesh.warp)
-        yarn = np.broadcast_to([1.0, 0.0, 0.0] if warp is None else warp, (len(quads), 3))
         if at not in ("elements", "points"):
             raise InputError(None, "at", f"expected 'elements' or 'points', got {at!r}")
-        sheet, moved = replace(mesh, points=rest, warp=yarn), mesh.points + u - rest
-        return surface_strain(sheet, moved) if at == "elements" else log_strain(sheet, [moved])[0]
+        sheet, moved = replace(mesh, points=rest), mesh.points + u - rest
+        if at == "elements":
+            return surface_strain(sheet, moved, warp)
+        return log_strain(sheet, [moved], X if warp is None else warp)[0]
 
     def _steps(self) -> tuple[Array, list[int]]:
         """Return displacements from increment to increment, and the place of each frame there."""
@@ -273,55 +274,6 @@ class DifferentiatingSolver(Solver, Protocol):
     ) -> tuple[History, Array]:  # fmt: skip
         """Run; return d displacement / d parameters too, (frames, nodes, 3, parameters)."""
         ...
-
-
-class WrappedSolver:
-    """All of the protocol `Solver` but `run`, forwarded to the solver within."""
-
-    def __init__(self, solver: Any) -> None:
-        self.solver = solver
-        self.name: str = solver.name
-        self.external: bool = solver.external
-
-    @property
-    def progress(self) -> Callable[[Any], None] | None:
-        """Return the listener of a run on its way."""
-        listener: Callable[[Any], None] | None = self.solver.progress
-        return listener
-
-    @progress.setter
-    def progress(self, listener: Callable[[Any], None] | None) -> None:
-        self.solver.progress = listener
-
-    @property
-    def identity(self) -> str:
-        """Return the identity of the solver within."""
-        return str(self.solver.identity)
-
-    @property
-    def keep(self) -> bool:
-        """Return whether folders of runs are kept."""
-        return bool(getattr(self.solver, "keep", False))
-
-    @property
-    def load_ratios(self) -> bool:
-        """Return whether it runs laws that depend on the load ratio."""
-        return carries_load_ratios(self.solver)
-
-    def check(self) -> SolverCheck:
-        """Check the solver within."""
-        found: SolverCheck = self.solver.check()
-        return found
-
-
-class WrappedBand:
-    """The band of the solver within, for a `WrappedSolver` around a `BandedSolver`."""
-
-    solver: Any
-
-    def band(self, model: Any) -> list[BandEnd]:
-        """Return the ends of the band; nothing is run."""
-        return list(self.solver.band(model))
 
 
 def carries_load_ratios(solver: Solver) -> bool:

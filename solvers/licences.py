@@ -8,7 +8,6 @@ renewed is free again after `distributed.scheduler.locks.lease-timeout`, 30 s by
 
 from __future__ import annotations
 
-import inspect
 import os
 import random
 import socket
@@ -24,7 +23,6 @@ from typing import Any, TypeVar
 from filelock import lock_descriptor
 
 from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
-from ..materials.law import HypoelasticLaw
 from . import base
 from .process import CONNECT_S, check_wanted, dask, kept_open
 from .scratch import remove
@@ -43,61 +41,26 @@ _clients: dict[tuple[str, int], Any] = {}
 
 
 def licensed(solver: base.Solver, name: str, given: Mapping[str, Any]) -> base.Solver:
-    """Return the solver with a licence for every run (itself if none matters); name : of these."""
-    plain = {key: value for key, value in given.items() if key != SCHEDULER}
-    settings = licence_settings(name, plain)
+    """Let every run of a solver hold a licence where these are counted; return it; name : of these.
+
+    Its runs raise as the solver, and as `held`.
+    """
+    settings = licence_settings(name, {k: v for k, v in given.items() if k != SCHEDULER})
     if not solver.external or (settings.licences is None and settings.wait <= 0):
         return solver
-    # The wrapper has the further methods of the solver within, and no others.
-    protocols = ((_Slopes, base.DifferentiatingSolver), (base.WrappedBand, base.BandedSolver))
-    more: list[type] = [part for part, protocol in protocols if isinstance(solver, protocol)]
-    # Not by a call: where there is no program that is an error, of the run.
-    if inspect.getattr_static(solver, "programs", None) is not None:
-        more.append(_Program)
-    # A cache of runs needs the module of the solver's code.
-    own = {"__module__": type(solver).__module__}
-    kind: Any = type("LicensedSolver", (LicensedSolver, *more), own)
-    made: base.Solver = kind(solver, settings, given.get(SCHEDULER))
-    return made
 
+    def with_one(run: Callable[..., T]) -> Callable[..., T]:
+        def run_licensed(*given_to_run: Any, **named: Any) -> T:
+            with held(solver.name, settings, given.get(SCHEDULER)):
+                return patiently(lambda: run(*given_to_run, **named), solver.name, settings)
 
-class LicensedSolver(base.WrappedSolver):
-    """A solver that runs only with a licence; scheduler : the address of Dask that counts too."""
+        return run_licensed
 
-    def __init__(
-        self, solver: base.Solver, settings: LicenceSettings, scheduler: str | None = None
-    ) -> None:
-        super().__init__(solver)
-        self.licences, self.scheduler = settings, scheduler
-
-    def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
-        timeout: float | None = None, **more: Any,
-    ) -> base.History:  # fmt: skip
-        """Run the model with a licence; raises as the solver, and as `held`."""
-        return self._with_one(lambda: self.solver.run(model, law, scratch, timeout, **more))
-
-    def _with_one(self, run: Callable[[], T]) -> T:
-        with held(self.name, self.licences, self.scheduler):
-            return patiently(run, self.name, self.licences)
-
-
-class _Slopes:
-    """A mixin for a solver that differentiates."""
-
-    def run_with_sensitivity(self: Any, *given: Any, **named: Any) -> Any:
-        """Run as the solver does, with a licence."""
-        return self._with_one(lambda: self.solver.run_with_sensitivity(*given, **named))
-
-
-class _Program:
-    """A mixin for a solver that names its programs."""
-
-    @property
-    def programs(self: Any) -> tuple[Path, ...]:
-        """Return the programs of the solver within."""
-        found: tuple[Path, ...] = self.solver.programs
-        return found
+    solver.run = with_one(solver.run)  # type: ignore[method-assign]
+    if isinstance(solver, base.DifferentiatingSolver):
+        slopes = with_one(solver.run_with_sensitivity)
+        solver.run_with_sensitivity = slopes  # type: ignore[method-assign]
+    return solver
 
 
 @contextmanager

@@ -306,52 +306,48 @@ def _numbers(value: Any, name: str) -> Any:
 
 
 def with_cache(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
-    """Return the solver with a cache before it; as it is if embedded, differentiating or `keep`."""
+    """Let a solver look into a cache first unless it is embedded, differentiates, or keeps folders.
+
+    options : those that may change a result.
+    """
     embedded = not solver.external or isinstance(solver, base.DifferentiatingSolver)
-    if embedded or getattr(solver, "keep", False):
-        return solver
-    kind = BandedOnce if isinstance(solver, base.BandedSolver) else Once
-    return kind(solver, cache, options)
+    return solver if embedded or getattr(solver, "keep", False) else once(solver, cache, options)
 
 
-class Once(base.WrappedSolver):
-    """A solver that looks into a cache first; runs that fail are not kept, nor their cause."""
+def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> base.Solver:
+    """Let a solver return runs that are in a cache; those that fail are not kept."""
+    run = solver.run
 
-    def __init__(self, solver: Any, cache: RunCache, options: Mapping[str, Any]) -> None:
-        super().__init__(solver)
-        self.cache, self.options = cache, options
-
-    def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
-        timeout: float | None = None,
-    ) -> base.History:  # fmt: skip
-        """Return the run from the cache (`History.from_cache`); else run and keep it."""
-        key = self.key(model, law)
-        history = None if key is None else self.cache.read(key)
+    def run_once(
+        model: Any, law: HypoelasticLaw, scratch: Path | None = None, timeout: float | None = None
+    ) -> base.History:
+        key = key_of(solver, options, model, law)
+        history = None if key is None else cache.read(key)
         if history is not None:
             return history
-        given = {"scratch": scratch, "timeout": timeout}
-        said = {name: value for name, value in given.items() if value is not None}
+        given: dict[str, Any] = {"scratch": scratch, "timeout": timeout}
         begun = time.perf_counter()
-        ended: base.History = self.solver.run(model, law, **said)
+        ended = run(model, law, **{name: v for name, v in given.items() if v is not None})
         if key is not None and isinstance(ended, base.History):
             seconds = time.perf_counter() - begun
-            self.cache.write(key, ended, seconds)
+            cache.write(key, ended, seconds)
             ended = replace(ended, seconds=seconds)
         return ended
 
-    def key(self, model: Any, law: HypoelasticLaw) -> str | None:
-        """Return the digest of all that the result depends on; None where that is not known."""
-        try:
-            files = self.solver.programs if isinstance(self.solver, base.ProgramSolver) else ()
-            program = [program_mark(path) for path in files]
-            code = code_mark(type(self.solver).__module__)
-            own = (self.name, self.solver.identity, dict(self.options), program, code)
-            return digest_of("run", own, model, law)
-        except (TypeError, BubblefitError) as error:  # the run raises the latter again
-            log.info("runs of %s are not kept: %s", self.name, error)
-            return None
+    solver.run = run_once  # type: ignore[method-assign]
+    return solver
 
 
-class BandedOnce(base.WrappedBand, Once):
-    """A solver with bands that looks into a cache before it runs."""
+def key_of(
+    solver: base.Solver, options: Mapping[str, Any], model: Any, law: HypoelasticLaw
+) -> str | None:
+    """Return the digest of all that a result depends on; None where that is not known."""
+    try:
+        files = solver.programs if isinstance(solver, base.ProgramSolver) else ()
+        program = [program_mark(path) for path in files]
+        code = code_mark(type(solver).__module__)
+        own = (solver.name, solver.identity, dict(options), program, code)
+        return digest_of("run", own, model, law)
+    except (TypeError, BubblefitError) as error:  # the run raises the latter again
+        log.info("runs of %s are not kept: %s", solver.name, error)
+        return None

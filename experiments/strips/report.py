@@ -15,7 +15,7 @@ from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
-from ...meshes.mesh import middle_strain
+from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
 from ...reports.charts import Charts
 from ...reports.content import Exhibit, Table
@@ -111,7 +111,7 @@ def load_panels(
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
     """Draw the deformed strip with its shear strain; write it for ParaView."""
     u, mesh = history.displacement[-1], model.mesh
-    strain = middle_strain(mesh, u, model.warp)
+    strain = surface_strain(mesh, u, model.warp)
     gauge = mesh.node_sets["gauge"]
     save(picture, strip_charts(mesh.points, mesh.quads, u, strain[:, 2], gauge))
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
@@ -132,7 +132,7 @@ def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
     for s in strips:
         if s.direction == "bias":  # the largest shear of the quads between the gauge's ends
             mesh = s.model.mesh
-            strain = middle_strain(mesh, s.history.displacement[-1], s.model.warp)
+            strain = surface_strain(mesh, s.history.displacement[-1], s.model.warp)
             corners = mesh.points[mesh.quads][:, :, 1]
             low, high = mesh.points[mesh.node_sets["gauge"]][:, 1]
             inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
@@ -217,7 +217,7 @@ def _pull(
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
     """Return the number of increments within the card's valid range."""
     for i, u in enumerate(history.displacement):
-        strain = middle_strain(model.mesh, u, model.warp)
+        strain = surface_strain(model.mesh, u, model.warp)
         reached = np.array([*strain[:, :2].max(axis=0), np.abs(strain[:, 2]).max()])
         if (reached > card.law.strain_range * (1 + 1e-6)).any():
             return i

@@ -27,7 +27,7 @@ from ...meshes.beam_model import PlainWall, TubeSection
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import InflatedModel
 from ...meshes.disk import disk_mesh
-from ...meshes.mesh import Mesh, middle_strain
+from ...meshes.mesh import Mesh, surface_strain
 from ...meshes.strip_models import TubeModel
 from ...meshes.tube import half_tube, sphere_octant, tube_warp
 from ...solvers.base import History
@@ -137,7 +137,7 @@ def bubble(nu: float) -> tuple[float, float]:
     u, apex = history.displacement[0], mesh.node_sets["apex"][0]
     height = u[apex, 2] / RADIUS * (pressure * RADIUS / MODULUS / THICKNESS) ** (-1 / 3)
     around = np.flatnonzero((mesh.quads == apex).any(axis=1))
-    strain = middle_strain(mesh, u, np.array([1.0, 0.0, 0.0]))[around, :2].mean()
+    strain = surface_strain(mesh, u, np.array([1.0, 0.0, 0.0]))[around, :2].mean()
     force = MODULUS * THICKNESS * strain / (1 - nu)
     scale = (MODULUS * THICKNESS * pressure**2 * RADIUS**2) ** (1 / 3)
     return float(height), float(4 * force / scale)

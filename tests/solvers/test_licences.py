@@ -13,15 +13,14 @@ from pathlib import Path
 
 import pytest
 from bubblefit.errors import LicenceDenied
-from bubblefit.solvers import licences
+from bubblefit.solvers import licences, registry
 from bubblefit.solvers.base import (
     Announcement,
     hearing,
 )
-from bubblefit.solvers.licences import LicensedSolver, held, locked, patiently
-from bubblefit.solvers.registry import solver_named, solver_settings
-from bubblefit.solvers.run_cache import Once, RunCache
-from bubblefit.solvers.settings import LicenceSettings
+from bubblefit.solvers.licences import held, locked, patiently
+from bubblefit.solvers.registry import counted, solver_named, solver_settings
+from bubblefit.solvers.settings import LicenceSettings, licence_settings, split
 
 from ..complaints import complaint
 from ..counted_program import CountedSolver, seen
@@ -221,7 +220,7 @@ def test_pauses_double_up_to_ten_times_the_first(tmp_path, pauses):
     assert failure.scratch == tries[-1]
 
 
-def test_defaults_and_the_file_of_the_site(tmp_path):
+def test_defaults_and_the_file_of_the_site(tmp_path, monkeypatch):
     waits = [
         LicenceSettings(**g).wait
         for g in ({}, {"licences": 3}, {"licences": 3, "licence_wait": 0.0})
@@ -229,9 +228,10 @@ def test_defaults_and_the_file_of_the_site(tmp_path):
     assert waits == [0, 600, 0]
     site = tmp_path / "site.toml"
     site.write_text('licences = 3\nlicence_retry = 2.0\nlicence_folder = "locks"\n')
-    solver = solver_named("marc", marc=site, licences=5)
-    assert (solver.licences.licences, solver.licences.licence_retry) == (5, 2.0)
-    assert solver.licences.licence_folder == str(tmp_path / "locks")
+    monkeypatch.setattr(registry, "licensed", lambda _, name, given: licence_settings(name, given))
+    found = solver_named("marc", marc=site, licences=5)
+    assert (found.licences, found.licence_retry) == (5, 2.0)
+    assert found.licence_folder == str(tmp_path / "locks")
 
 
 ACME = """
@@ -243,28 +243,25 @@ class THING:
 """
 
 
-def test_every_external_solver_has_the_keys(packages, tmp_path):
+def test_every_external_solver_has_the_keys(packages):
     install(packages, "acme", ACME, group="bubblefit.solvers")
     keys = {"licences": 4, "licence_folder": "locks", "licence_denied": ["no seat"]}
     tables = {"marc": keys, "calculix": keys, "acme": {**keys, "acmes": 1}}
     found = solver_settings(PROJECT, tables)
     for name in tables:
         solver = solver_named(name, **found[name])
-        assert isinstance(solver, LicensedSolver), name
-        assert solver.licences.licences == 4 and solver.licences.wait == 600
-        assert solver.licences.licence_folder == "/somewhere/locks"
-        assert solver.licences.licence_denied == ["no seat"]
+        assert "run" in vars(solver), name
+        given = licence_settings(name, split(found[name])[0])
+        assert (given.licences, given.wait) == (4, 600)
+        assert given.licence_folder == "/somewhere/locks"
+        assert given.licence_denied == ["no seat"]
         # Who answers as a scheduler runs code here: no project names one.
         for key, value in {"licences": 0, "licence_wait": -1.0, "licence_denied": "text",
                            "licence_scheduler": "tcp://x:1"}.items():  # fmt: skip
             said = complaint(solver_settings, PROJECT, {name: {key: value}})
             assert said.startswith(f"{PROJECT}: solver.{name}.{key}: "), said
     assert found["acme"]["acmes"] == 1
-    # A run that is in the cache needs no licence.
-    cache, folder = RunCache(tmp_path / "runs"), str(tmp_path / "locks")
-    solver = solver_named("acme", cache, licences=1, licence_folder=folder)
-    assert isinstance(solver, Once) and isinstance(solver.solver, LicensedSolver)
-    assert solver.options == {}  # licences change no result
+    assert counted("acme", found["acme"]) == {"acmes": 1}  # licences change no result
 
 
 def wait_for(there):

@@ -225,7 +225,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
         assert of is mesh and warp == "warp" and (u == 1.0).all()
         return strain
 
-    monkeypatch.setattr(report, "middle_strain", middle)
+    monkeypatch.setattr(report, "surface_strain", middle)
     strip = SimpleNamespace(direction="bias", model=model, history=history)
     assert report.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
     drawn = caught(monkeypatch, report, "strip_charts")
@@ -375,7 +375,7 @@ def simulated(folder, outcomes, within: bool = False):
 def test_curves_end_where_the_range_of_the_card_does(tmp_path, drawn, monkeypatch, strains, shown):
     """At the first increment and at the second."""
     strain = iter(strains)
-    monkeypatch.setattr(report, "middle_strain", lambda *_: np.array([next(strain)]))
+    monkeypatch.setattr(report, "surface_strain", lambda *_: np.array([next(strain)]))
     found = simulated(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)
     (card,) = found.numbers["cards"].values()
     warp = card["directions"]["warp"]

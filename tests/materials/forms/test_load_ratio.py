@@ -1,8 +1,5 @@
 """Moduli that go with the load ratio: closed forms, derivatives, increments, pressed yarns."""
 
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from bubblefit.materials.card import MaterialCard, positive
@@ -12,9 +9,8 @@ from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.point_law import RIGHT, load_angle
 from bubblefit.materials.responses import biaxial_response, piece_constants
-from bubblefit.solvers.base import carries_load_ratios, check_carries
+from bubblefit.solvers.base import check_carries
 from bubblefit.solvers.registry import FORMATS, solver_named
-from bubblefit.solvers.run_cache import Once, RunCache
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -181,7 +177,3 @@ def test_what_knows_strain_alone_refuses_it_in_one_line():
     assert "solver membrane" in complaint(piece_constants, card.law)
     check_carries(solver_named("membrane"), card.law)
     assert "calculix" in complaint(check_carries, solver_named("calculix"), card.law)
-    # One that is run once and kept carries what the solver behind the cache carries.
-    for carries in (True, False):
-        behind = SimpleNamespace(name="lab", external=True, load_ratios=carries)
-        assert carries_load_ratios(Once(behind, RunCache(Path("runs")), {})) == carries
