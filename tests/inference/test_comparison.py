@@ -336,13 +336,17 @@ def judged_strips(off, load, elongation):
     places = x + elongation
     scatter = 0.02 * (np.stack([x**0, x**2], axis=1) * random.standard_normal((6, 2))[count]).sum(1)
     measured = off * (100 * places + 20 * places**3) + load + scatter
-    objective = LoadObjective(knots, x, measured, specimens=count)
-    slopes = np.column_stack([x, x**3]) / objective.scale[:, None]
+    return differences(knots, x, measured, count, np.column_stack([x, x**3]), model)
+
+
+def differences(knots, places, measured, count, slopes, model):
+    """Return what specimens (their numbers in `count`) read alike beside a model's load."""
+    objective = LoadObjective(knots, places, measured, specimens=count)
     problem = SimpleNamespace(
         comparisons=[SimpleNamespace(name="warp", objective=objective)],
         rows=lambda _: slice(None), scale=objective.scale,
     )  # fmt: skip
-    best = SimpleNamespace(jacobian=slopes, histories=[model])
+    best = SimpleNamespace(jacobian=slopes / objective.scale[:, None], histories=[model])
     return differences_of_all(problem, objective.residual(model), best, lambda step: 0.0)["warp"]
 
 
@@ -383,15 +387,8 @@ def test_what_a_spline_leaves_is_small_beside_scatter_and_load():
     scatter += 0.02 * random.standard_normal(len(scatter))
     measured = np.tile(load + far, 6) + scatter
     knots = np.linspace(0.25, 3.5, 14)
-    objective = LoadObjective(knots, x, measured, specimens=count)
-    slopes = np.tile(basis, (6, 1)) / objective.scale[:, None]
     model = SimpleNamespace(load=500 * knots)
-    problem = SimpleNamespace(
-        comparisons=[SimpleNamespace(name="warp", objective=objective)],
-        rows=lambda _: slice(None), scale=objective.scale,
-    )  # fmt: skip
-    best = SimpleNamespace(jacobian=slopes, histories=[model])
-    one = differences_of_all(problem, objective.residual(model), best, lambda step: 0.0)["warp"]
+    one = differences(knots, x, measured, count, np.tile(basis, (6, 1)), model)
     assert np.sqrt(np.mean(scatter**2)) == pytest.approx(14.0, rel=0.3)
     assert one.systematic and one.ratio > 100 and one.rms == pytest.approx(0.3, rel=0.3)
     assert not one.significant and not notes_of_discrepancies({"warp": one})

@@ -579,15 +579,6 @@ def test_increments_of_any_size_from_anywhere(library, name, size):
         assert (request == 1.0) == np.isfinite(after).all()
 
 
-def test_free_form_is_the_same_subroutine(library, tmp_path):
-    export = exported(LAWS["tri-linear"])
-    free = build(tmp_path, export.files[".f"], "-ffree-form", beside=XIT)
-    one, other = (Point(each, properties(export)) for each in (library, free))
-    for increment in np.diff(strain_path(5), axis=0, prepend=0):
-        for a, b in zip(one.commit(increment), other.commit(increment), strict=True):
-            assert np.array_equal(a, b)
-
-
 def test_a_modulus_that_runs_out_asks_for_half_the_increment(library):
     # E1 is gone at 5 % strain.
     law = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])

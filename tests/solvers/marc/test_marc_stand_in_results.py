@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.errors import SolverFailure
-from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
@@ -127,26 +126,6 @@ def test_ends_of_a_cylinder(marc):
         assert len(marc.runs) == run and failed.value.scratch.is_dir()
 
 
-BUBBLE = """
-[fabric]
-thickness = 0.81
-[law]
-form = "linear"
-strain_range = [0.1, 0.1, 0.1]
-[law.bounds]
-lower = [-0.5, 0.01, -3.0, 0.1, -10.0, 0.1]
-upper = [0.5, 0.2, 10.0, 1.0, 10.0, 1.0]
-[[bubble]]
-radius = 100.0
-pressures = [22, 59]
-elements = 64
-symmetry = "quarter"
-[bubble.data.known_solution]
-beta = [0, 0, -0.1, 0.08, 0, 0, 5.0, 0.2, 0, 0, -6.0, 0.8]
-[fit]
-starts = 1
-tolerance = 1e-5
-"""
 SITE = 'executable = "./run_marc"\nincrements = 0\n'
 
 
@@ -160,21 +139,6 @@ def site(marc):
     path = marc.folder / "site.toml"
     path.write_text(SITE + f'scratch = "{marc.folder}"\n')
     return path
-
-
-@pytest.fixture
-def finer(marc, site):
-    """A site whose Marc takes more increments than the membrane: not the same solver."""
-    path = marc.folder / "finer.toml"
-    path.write_text(site.read_text().replace("increments = 0", "increments = 9"))
-    return path
-
-
-@pytest.fixture
-def card(tmp_path):
-    law = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
-    write_card(MaterialCard(law, 0.81, "test", "Table 4.2"), tmp_path / "card.toml")
-    return tmp_path / "card.toml"
 
 
 @pytest.mark.slow
@@ -192,23 +156,6 @@ def test_the_known_solution_is_found_in_four_runs_of_marc(marc, tmp_path):
     assert e[1] < 3e-5, "six digits spoil it"
     result = result_in(tmp_path / "out")
     assert result["solver"] == "marc" and result["external_runs"] == len(e)
-
-
-@pytest.mark.slow
-def test_a_fit_whose_last_run_fails_is_resumed(marc, finer, tmp_path):
-    (tmp_path / "project.toml").write_text(BUBBLE)
-    fit = ("bubble", "project.toml", "--solver", "marc", "--marc", finer, "--jobs", 1, "--quiet",
-           "--out", "out")  # fmt: skip
-    # Data, two runs of the fit, then the best fit once more, and again.
-    marc.told("licence@4,5")
-    done = bubblefit(*fit, cwd=tmp_path, code=4)
-    assert "does not run again: no licence" in done.stderr and "--resume" in done.stderr
-    assert len(marc.runs) == 5
-    # Data and the best fit are run again, nothing else; once more where it fails.
-    marc.told("3015@7")
-    bubblefit(*fit, "--resume", cwd=tmp_path)
-    assert marc.runs[5:] == ["job none", "job 3015", "job none"]
-    assert result_in(tmp_path / "out")["objective"] < 1e-5
 
 
 def test_doctor_proves_the_stand_in(marc, site, tmp_path):
