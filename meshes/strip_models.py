@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,16 +25,8 @@ def strip_mesh(
     `top`, `gauge` (the lower first), `free_edges`; on a half also `symmetry_x` (where u_x = 0).
     """
     gauge = length if gauge_length is None else gauge_length
-    for name, value in (("width", width), ("length", length), ("gauge_length", gauge)):
-        if not 0 < value < math.inf:
-            raise InputError(None, name, f"expected a length above 0 mm, got {value!r}")
     if gauge > length:
         raise InputError(None, "gauge_length", f"{gauge} mm is longer than the strip, {length} mm")
-    for name, count in (("across", across), ("along", along)):
-        if count != int(count) or count < 1:
-            raise InputError(None, name, f"expected a whole number of quads, got {count!r}")
-    if symmetry == "full" and across % 2:
-        raise InputError(None, "across", f"expected an even number on a whole strip, got {across}")
     y, lower = _levels(length, along, gauge)
     x = np.linspace(0.0 if symmetry == "half" else -0.5 * width, 0.5 * width, across + 1)
     middle = 0 if symmetry == "half" else across // 2
@@ -106,19 +98,10 @@ class UniaxialModel(OfThickness):
     unloaded: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("gauge", self.pulled, *self.supports):
-            if name not in self.mesh.node_sets:
-                raise InputError(None, "mesh", f"has no node set {name!r}")
-        if len(self.mesh.node_sets["gauge"]) != 2:
-            raise InputError(None, "mesh", "the node set 'gauge' must hold two nodes")
         levels = np.array(self.elongations, float)
         if not are_levels(levels, self.unloaded):
             raise InputError(None, "elongations", f"expected positive, increasing, got {levels} mm")
-        for name in ("thickness", "load_factor"):
-            if not getattr(self, name) > 0:
-                raise InputError(None, name, f"expected > 0, got {getattr(self, name)}")
-        if np.isin(self.driven, self.fixed).any():
-            raise InputError(None, "supports", f"{self.pulled!r} is pulled along y and held there")
+        self.check_thickness()
         object.__setattr__(self, "elongations", tuple(levels.tolist()))
         object.__setattr__(self, "warp", np.asarray(self.warp, float))
 
@@ -143,8 +126,6 @@ def straight_strip(
     along: int = QUADS["straight"][1]
 ) -> UniaxialModel:  # fmt: skip
     """Return half of a warp or fill test over the gauge (mm; Fig. 3.5, Table 3.1; 40 quads)."""
-    if direction not in ("warp", "fill"):
-        raise InputError(None, "direction", f"expected 'warp' or 'fill', got {direction!r}")
     mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
     levels = _equal(gauge_length, final_length, increments)
     # Fill lies along the pull when warp is a quarter turn clockwise from it.
@@ -176,13 +157,14 @@ def _equal(gauge_length: float, final_length: float, increments: int) -> tuple[f
         raise InputError(
             None, "final_length", f"expected more than {gauge_length} mm, got {final_length}"
         )
-    if increments != int(increments) or increments < 1:
-        raise InputError(None, "increments", f"expected a whole number, got {increments!r}")
-    return tuple(np.linspace(0.0, final_length - gauge_length, int(increments) + 1)[1:].tolist())
+    return tuple(np.linspace(0.0, final_length - gauge_length, increments + 1)[1:].tolist())
 
 
 #: mm; any square would do.
 SIDE = 100.0
+SQUARE = Mesh(
+    SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2, 3]]), {}
+)
 #: Degrees of freedom held at zero: the lines x = 0 and y = 0 stay where they are.
 ROLLERS_PATCH: Mapping[str, tuple[int, ...]] = {"symmetry_x": (0,), "symmetry_y": (1,)}
 #: Node sets of the edges that are pulled, along x and along y.
@@ -199,20 +181,13 @@ class PatchModel(OfThickness):
     thickness: float
 
     def __post_init__(self) -> None:
-        values = np.array(self.loads, dtype=float)
-        if values.ndim != 2 or values.shape[1:] != (2,) or not len(values):
-            raise InputError(None, "loads", f"expected loads (n, 2), got shape {values.shape}")
-        if not np.isfinite(values).all():
-            raise InputError(None, "loads", "expected finite numbers")
-        if not self.thickness > 0:
-            raise InputError(None, "thickness", f"expected > 0, got {self.thickness}")
-        object.__setattr__(self, "loads", values)
+        self.check_thickness()
+        object.__setattr__(self, "loads", np.array(self.loads, dtype=float))
 
     @cached_property
     def mesh(self) -> Mesh:
-        points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
-        return Mesh(points, np.array([[0, 1, 2, 3]]), {n: np.array(i) for n, i in sets.items()})
+        return replace(SQUARE, node_sets={name: np.array(own) for name, own in sets.items()})
 
     def displacements(self, elongation: ArrayLike) -> Array:
         """Return (n, 4, 3) mm of the corners at elongations (n, 2)."""
@@ -240,21 +215,10 @@ class TubeModel(OfThickness):
     thickness: float
 
     def __post_init__(self) -> None:
-        values = np.array(self.loads, dtype=float)
-        if values.ndim != 2 or values.shape[1:] != (3,) or not len(values):
-            raise InputError(None, "loads", f"expected loads (n, 3), got shape {values.shape}")
-        if not np.isfinite(values).all():
-            raise InputError(None, "loads", "expected finite numbers")
-        for name in ("radius", "thickness"):
-            if not getattr(self, name) > 0:
-                problem = f"expected > 0 mm, got {getattr(self, name)}"
-                raise InputError(None, name, problem)
-        object.__setattr__(self, "loads", values)
+        self.check_thickness()
+        object.__setattr__(self, "loads", np.array(self.loads, dtype=float))
 
-    @cached_property
-    def mesh(self) -> Mesh:
-        points = SIDE * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-        return Mesh(points, np.array([[0, 1, 2, 3]]), {})
+    mesh: ClassVar[Mesh] = SQUARE
 
     def strains(self, displacement: ArrayLike) -> Array:
         """Return (n, 3): change of length and of radius over their own, radius times twist per mm.

@@ -13,8 +13,9 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Literal
 
-from ...errors import InputError, OutputError, SolverFailure
+from ...errors import OutputError, SolverFailure
 from ...files import cache_folder, render
 from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, Format, NoOptions, Says, heading
@@ -64,30 +65,20 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-pthread")
 
 
 def constants(
-    law: HypoelasticLaw, normal_modulus: float | None = None, transverse_shear: float | None = None,
-    angle: float = 0.0, normal_axis: int = 3, whole_times: bool = False, whole_until: int = 0,
+    law: HypoelasticLaw, angle: float = 0.0, normal_axis: Literal[1, 3] = 3,
+    whole_times: bool = False, whole_until: int = 0,
 ) -> tuple[float, ...]:  # fmt: skip
     """Return the constants (9,) of `*USER MATERIAL`, in the order of `law.c`.
 
-    No multiple of 8, of which CalculiX reads one more line, and never above 21. normal_modulus,
-    transverse_shear : MPa; the larger of E1 and E2, and G12, at no strain unless given. angle :
-    degrees from the first in-plane axis to the warp. normal_axis : 3 without `*ORIENTATION` or with
-    a rectangular one; 1 with a cylindrical one: warp is axial and fill hoop at angle 0. whole_times
-    : commit strain and stress only at whole total times, so that the law's increments are the
-    deck's steps. whole_until : so up to this time, then at every increment.
+    No multiple of 8, of which CalculiX reads one more line, and never above 21. Through the
+    thickness the larger of E1 and E2, and G12, at no strain. angle : degrees from the first
+    in-plane axis to the warp. normal_axis : 3 without `*ORIENTATION` or with a rectangular one; 1
+    with a cylindrical one: warp is axial and fill hoop at angle 0. whole_times : commit strain and
+    stress only at whole total times, so that the law's increments are the deck's steps. whole_until
+    : so up to this time, then at every increment.
     """
-    if normal_modulus is None:
-        normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
-    if transverse_shear is None:
-        transverse_shear = max(float(law.G12(0.0)), LEAST)
-    for name, value in (
-        ("normal modulus", normal_modulus),
-        ("transverse shear modulus", transverse_shear),
-    ):
-        if not 0 < value < float("inf"):
-            raise InputError(None, name, f"expected > 0 MPa, got {value}")
-    if normal_axis not in (1, 3):
-        raise InputError(None, "normal_axis", f"expected 1 or 3, got {normal_axis}")
+    normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
+    transverse_shear = max(float(law.G12(0.0)), LEAST)
     whole = -float(whole_until) if whole_until else float(whole_times)
     shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), whole)
     moduli = (float(law_number(law)), sum(piece_constants(law)[:3]))

@@ -157,21 +157,16 @@ def changed(**change):
 @pytest.mark.parametrize(
     ("make", "change", "field"),
     [
-        (cylinder, {"pressure": 0.0}, "pressure"), (cylinder, {"pressure": np.nan}, "pressure"),
-        (cylinder, {"thickness": -0.8}, "thickness"), (cylinder, {"size": 100.0}, "size"),
+        (cylinder, {"size": 100.0}, "size"),
         (cylinder, {"diameter": 260.0}, "collar"),
         (cylinder, {"collar": Collar(140.0, 145.0)}, "collar.inner_diameter"),
         (cylinder, {"collar": Collar(240.0, 1950.0)}, "collar.length"),
         (cylinder, {"supports": RigidSupports(3200.0)}, "supports.span"),
         (cylinder, {"supports": RigidSupports(2950.0)}, "supports.span"),
         *((cylinder, {"deflections": d}, "deflections") for d in ([20.0, 10.0], [], [np.inf])),
-        (changed, {"thickness": np.full(3, 0.8)}, "thickness"),
         (changed, {"inflation": [0.1, 0.1]}, "inflation"),
-        (changed, {"increments": [1.0, 3.0]}, "increments"), (changed, {"mesh": BOX}, "mesh"),
+        (changed, {"increments": [1.0, 3.0]}, "increments"),
         (changed, {"supports": RigidSupports(1800.0)}, "supports.span"),
-        (Gas, {"ambient": 0.0}, "gas.ambient"), (Gas, {"density": np.nan}, "gas.density"),
-        (RigidSupports, {"span": -1.0}, "supports.span"),
-        (Collar, {"inner_diameter": 0.0, "length": 145.0}, "collar.inner_diameter"),
         (Collar, {"inner_diameter": 240.0, "length": 15.0}, "collar.fillet"),
     ],
 )  # fmt: skip

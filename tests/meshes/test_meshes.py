@@ -113,10 +113,7 @@ def test_the_full_disk_is_the_quarter_mirrored():
 
 
 NONSENSE = [
-    *((disk_mesh, {key: value}, key) for key, some in {
-        "elements": [7, 0, -800, 800.0, True, None, 10**12], "symmetry": ["half"],
-        "radius": [0.0, -1.0, np.nan, np.inf, "100"], "generator": ["abaqus"],
-    }.items() for value in some),
+    *((disk_mesh, {"elements": value}, "elements") for value in (7, 0, -800, 10**12)),
     (elliptic_disk_mesh, {"outline": TURNED, "symmetry": "quarter"}, "symmetry"),
     *((elliptic_disk_mesh, {"outline": Outline(*axes)}, "minor")
       for axes in ((80.0, 120.0), (120.0, -80.0), (120.0, 29.0))),

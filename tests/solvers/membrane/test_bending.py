@@ -181,11 +181,6 @@ def test_what_wrinkles_carry_is_their_work_over_the_way(monkeypatch):
 
 
 def test_mistakes_in_the_plan_and_jumps_between_frames(monkeypatch):
-    model = beam()
-    with pytest.raises(InputError, match=r"displacements: expected positive, increasing"):
-        replace(model, bending=replace(model.bending, displacements=[4.0, 2.0]))
-    with pytest.raises(InputError, match="no node set 'nowhere'"):
-        replace(model, bending=replace(model.bending, released="nowhere"))
     moves = (2.0, 4.0, 6.0, 8.0)
     assert not [r for r in bend(beam(moves))[0].remarks if "snaps" in r]
     monkeypatch.setattr(bending, "LEAP", 1e-6)

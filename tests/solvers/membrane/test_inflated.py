@@ -170,9 +170,6 @@ def test_long_capped_tube_against_the_closed_form(law, pressure):
 
 def test_refusals():
     model = sphere(2, [0.01])
-    assert "expected positive, increasing" in complaint(replace, model, pressures=[0.2, 0.1])
-    assert "expected > 0 mm in every element" in complaint(replace, model, thickness=np.zeros(12))
-    assert "no node set 'rim' in the mesh" in complaint(replace, model, supports={"rim": (0, 1, 2)})
     with pytest.raises(InputError, match="takes no parameters"):
         MembraneSolver().run_with_sensitivity(model, ISOTROPIC)
     # p = 2 t E e/((1 - nu) R exp(e)) has its maximum at e = 1.

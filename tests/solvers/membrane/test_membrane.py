@@ -10,7 +10,6 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import SIDE, PatchModel, elongations, straight_strip
 from bubblefit.solvers.base import analysis_of
 from bubblefit.solvers.membrane import factorisation, newton
@@ -21,7 +20,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import solver_named
 
 from ...biaxial_files import BENT
-from ...complaints import complaint, complaint_with
+from ...complaints import complaint
 from ...published_laws import TABLE_4_2
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
@@ -210,16 +209,10 @@ def test_bad_input():
     for field, *values in (
         *(("pressures", mesh, 1.0, p) for p in ([], [0, 0.1], [0.2, 0.1], [0.1, 0.1], [-0.1])),
         ("increments", mesh, 1.0, [0.1, 0.2], [0.05, 0.2]),
-        ("rim", Mesh(mesh.points, mesh.quads, {}), 1.0, [0.1]),
         ("thickness", mesh, 0.0, [0.1]),
     ):
         assert field in complaint(BubbleModel, *values)
-    for words, *values in (
-        (["loads", "(n, 2)", "(3,)"], [1.0, 2.0, 3.0], 0.8),
-        (["finite"], [[1.0, np.nan]], 0.8),
-        (["thickness", "> 0"], [[1.0, 1.0]], 0.0),
-    ):
-        complaint_with(words, PatchModel, *values)
+    assert "thickness" in complaint(PatchModel, [[1.0, 1.0]], 0.0)
     check = solver_named("membrane").check()
     assert check.available and check.carries_law
     assert "membrane" in complaint(solver_named, "abacus")

@@ -106,17 +106,9 @@ def test_parameters_and_modes_of_the_sheet():
     assert doubly_symmetric(1) and not doubly_symmetric(2)
 
 
-@pytest.mark.parametrize(
-    ("bad", "problem"),
-    [
-        ({"slack": (-1.0, 0.0)}, "slack: expected shares above -1"),
-        ({"modes": {"z0_1": np.zeros(3)}}, r"modes\.z0_1: expected one height a node"),
-        ({"rim_motion": np.zeros((1, len(RIM), 3))}, "rim_motion: expected finite numbers"),
-    ],
-)
-def test_bad_sheets(bad, problem):
-    with pytest.raises(InputError, match=problem):
-        replace(FLAT, **bad)
+def test_bad_sheets():
+    with pytest.raises(InputError, match="slack: expected shares above -1"):
+        replace(FLAT, slack=(-1.0, 0.0))
 
 
 RATIO_LAW = HypoelasticLaw([12.0, 240.0, 120.0, 600.0, -150.0], 0.24, form=LoadRatio())

@@ -74,23 +74,13 @@ def test_every_quad_and_set(symmetry, along, gauge):
 
 def test_bad_meshes_and_models_are_named():
     good = {"width": 4.0, "length": 8.0, "across": 4, "along": 6}
-    for change in (
-        {"width": 0.0}, {"length": np.inf}, {"gauge_length": 9.0}, {"across": 3},
-        {"along": 2, "gauge_length": 4.0},
-    ):  # fmt: skip
+    for change in ({"gauge_length": 9.0}, {"along": 2, "gauge_length": 4.0}):
         assert next(iter(change)) in complaint(strip_mesh, **{**good, **change})
     model = bias()
-    mesh = model.mesh
     for word, call, values, options in (
         ("elongations", replace, [model], {"elongations": [1.0, 1.0]}),
         ("thickness", replace, [model], {"thickness": 0.0}),
-        ("held there", replace, [model], {"supports": {"top": (1,), "bottom": (0, 1)}}),
-        ("jaw", replace, [model], {"supports": {"jaw": (1,)}}),
-        ("gauge", lambda: replace(
-            model, mesh=Mesh(mesh.points, mesh.quads, {**mesh.node_sets, "gauge": [0]})), [], {}),
         ("final_length", straight_strip, ["warp", 20.0, 19.0, THICKNESS], {}),
-        ("direction", straight_strip, ["bias", *WARP, THICKNESS], {}),
-        ("increments", straight_strip, ["warp", *WARP, THICKNESS], {"increments": 0}),
         ("pressure_offset", MembraneSolver().run_with_sensitivity,
          [straight("warp"), LAW, ["pressure_offset"]], {}),
     ):  # fmt: skip
