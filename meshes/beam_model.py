@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, places_of
 from .tube import cylinder_mesh
 
 #: Places around a wall at which its force is taken, and stiffness left to a slack wall.
@@ -300,8 +300,7 @@ class BeamModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        steps = np.array(self.increments)
-        return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
+        return places_of(self.deflections, self.increments)
 
     @property
     def supports(self) -> RigidSupports:

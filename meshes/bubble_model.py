@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh, are_levels
+from .mesh import Array, Mesh, are_levels, places_of
 
 THICKNESS = "thickness"
 
@@ -161,20 +161,13 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        steps = np.array(self.increments)
         if self.unloaded:
-            return np.arange(len(steps))
-        return np.array([int(np.argmin(np.abs(steps - p))) for p in self.pressures])
+            return np.arange(len(self.increments))
+        return places_of(self.pressures, self.increments)
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        dofs = [
-            3 * self.mesh.node_sets[name] + direction
-            for name, directions in self.supports.items()
-            if name in self.mesh.node_sets
-            for direction in directions
-        ]
-        return np.unique(np.concatenate(dofs)).astype(np.intp)
+        return self.mesh.unknowns(self.supports)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh
+from .mesh import Array, Mesh, places_of
 from .tube import Refinement, cylinder_mesh
 
 #: Inner diameter and length (mm) of the collar by the largest diameter of cylinder (thesis 6.2).
@@ -264,8 +264,7 @@ class CylinderModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        steps = np.array(self.increments)
-        return np.array([int(np.argmin(np.abs(steps - d))) for d in self.deflections])
+        return places_of(self.deflections, self.increments)
 
     @property
     def guides(self) -> Mapping[str, tuple[int, ...]]:
@@ -277,11 +276,6 @@ class CylinderModel:
         sideways = ("symmetry_x",) if self._cut("x") else ("top_line", "bottom_line")
         along = "symmetry_z" if self._cut("z") else "mid_span"
         return {**{name: (0,) for name in sideways}, along: (2,)}
-
-    @property
-    def fixed(self) -> NDArray[np.intp]:
-        held = [3 * self.mesh.node_sets[n] + k for n, ks in self.guides.items() for k in ks]
-        return np.unique(np.concatenate(held)).astype(np.intp)
 
     def _cut(self, axis: str) -> bool:
         return f"symmetry_{axis}" in self.mesh.node_sets
@@ -349,13 +343,7 @@ class InflatedModel:
     def fixed(self, bent: bool = False) -> NDArray[np.intp]:
         """Return held unknowns, 3 * node + direction, sorted; fewer once `bent`."""
         released = self.bending.released if bent and self.bending else None
-        dofs = [
-            3 * self.mesh.node_sets[name] + direction
-            for name, directions in self.supports.items()
-            if name != released
-            for direction in directions
-        ]
-        return np.unique(np.concatenate(dofs or [np.empty(0, dtype=np.intp)])).astype(np.intp)
+        return self.mesh.unknowns({n: ks for n, ks in self.supports.items() if n != released})
 
 
 #: mm, unless given; as many layers of fabric lie upon each other in the seam.

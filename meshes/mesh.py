@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -31,6 +31,16 @@ class Mesh:
     node_sets: Mapping[str, NDArray[np.intp]]
     element_sets: Mapping[str, NDArray[np.intp]] = field(default_factory=dict)
     warp: NDArray[np.float64] | None = None
+
+    def unknowns(self, held: Mapping[str, Sequence[int]]) -> NDArray[np.intp]:
+        """Return unknowns (3 * node + direction), sorted, of directions by node set, if there."""
+        each = [
+            3 * self.node_sets[name] + direction
+            for name, directions in held.items()
+            if name in self.node_sets
+            for direction in directions
+        ]
+        return np.unique(np.concatenate([*each, np.empty(0, np.intp)])).astype(np.intp)
 
 
 def meshio_of(
@@ -411,6 +421,11 @@ class FacetReading:
             shape=(len(middles), read.shape[0]),
         )
         return sp.csr_matrix(gather @ read), counts.astype(float)
+
+
+def places_of(wanted: Sequence[float], steps: Sequence[float]) -> NDArray[np.intp]:
+    """Return the number of the step nearest to each wanted one."""
+    return np.array([int(np.argmin(np.abs(np.array(steps) - one))) for one in wanted])
 
 
 def are_levels(levels: NDArray[np.float64], unloaded: bool) -> bool:

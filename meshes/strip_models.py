@@ -112,12 +112,12 @@ class UniaxialModel(OfThickness):
 
     @property
     def driven(self) -> NDArray[np.intp]:
-        return np.sort(3 * self.mesh.node_sets[self.pulled] + 1).astype(np.intp)
+        return self.mesh.unknowns({self.pulled: (1,)})
 
     @property
     def fixed(self) -> NDArray[np.intp]:
-        held = [3 * self.mesh.node_sets[n] + k for n, ks in self.supports.items() for k in ks]
-        return np.unique(np.concatenate([*held, 3 * np.arange(len(self.mesh.points)) + 2]))
+        flat = 3 * np.arange(len(self.mesh.points)) + 2
+        return np.union1d(self.mesh.unknowns(self.supports), flat)
 
 
 def straight_strip(

@@ -49,6 +49,15 @@ def difference(stresses: tuple[float, ...]) -> float:
     return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
 
 
+def checked_stresses(stresses: tuple[float, ...], who: str, solver: str) -> tuple[float, ...]:
+    """Return end stresses (MPa) of BARS; SolverFailure beyond TOLERANCE, of `who` ran them."""
+    for bar, stress in zip(BARS, stresses, strict=True):
+        if not abs(stress / bar.stress - 1) < TOLERANCE:
+            problem = f"{bar.model} {bar.direction} bar: {stress:.4g} MPa, not {bar.stress}"
+            raise SolverFailure(f"{who} does not carry the law ({problem})", solver)
+    return stresses
+
+
 def bar_model(bar: Bar) -> UniaxialModel:
     """Return a strip of one element (half of its width), free to contract; thickness 1 mm."""
     return straight_strip(

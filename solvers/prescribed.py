@@ -9,7 +9,7 @@ contact needs faces.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..errors import SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.cylinder_model import Collar, RigidSupports
 from ..meshes.strip_models import UniaxialModel
+from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver
 
 log = logging.getLogger(__name__)
@@ -113,6 +114,34 @@ def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: s
     from scipy.interpolate import CubicSpline  # heavy: where it is used
 
     return np.asarray(CubicSpline(gauge, whole)(levels))
+
+
+def gauge_opened(model: UniaxialModel, u: Array) -> Array:
+    """Return the elongation (increments,) mm of the gauge by displacements (increments, n, 3)."""
+    lower, upper = (model.mesh.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
+    return np.asarray(np.linalg.norm(upper - lower, axis=1) - model.gauge_length)
+
+
+def strip_history(
+    model: UniaxialModel, u: Array, forces: Array, sets: Mapping[str, Numbers], solver: str,
+    iterations: int, driven: bool = False,
+) -> History:  # fmt: skip
+    """Return load, displacement, reactions at the gauge's elongations; else SolverFailure.
+
+    u : (increments, nodes of the mesh, 3) mm; forces : (increments, nodes, 3) N of the supports, by
+    the node sets of the solver's own mesh. driven : the grips are the gauge.
+    """
+    gauge = gauge_opened(model, u)
+
+    def at_levels(values: Array) -> Array:
+        return values if driven else at_elongations(gauge, model, values, solver)
+
+    corners = np.ascontiguousarray(at_levels(u))
+    low, high = extremes(log_strain(model.mesh, corners, model.warp))
+    held = (*model.supports, model.pulled)
+    sums = {name: at_levels(forces[:, sets[name]].sum(axis=1)) for name in held}
+    load = -model.load_factor * sums[model.pulled][:, 1]
+    return History(load, corners, low, high, sums, iterations=iterations, path=corners)
 
 
 def _onward(pulls: Array) -> Array:

@@ -16,7 +16,7 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -82,6 +82,16 @@ def run_folder(
         log.info("run kept in %s", folder)
     else:
         remove(folder)
+
+
+def write_deck(folder: Path, files: Mapping[str, str | None]) -> None:
+    """Write a run's input files, those that there are; SolverFailure where that cannot be."""
+    try:
+        for name, text in files.items():
+            if text is not None:
+                (folder / name).write_text(text, encoding="ascii", errors="replace")
+    except OSError as error:
+        raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
 
 
 def default_parent() -> Path:

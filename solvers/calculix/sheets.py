@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from ...meshes.strip_models import (
     elongations,
 )
 from ..base import History, extremes, log_strain
-from ..prescribed import at_elongations, grip_pulls, held_dofs
+from ..prescribed import gauge_opened, grip_pulls, held_dofs, strip_history
 from .deck import (
     FIRST_OF_STEP,
     Run,
@@ -142,16 +142,6 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
     )
 
 
-@dataclass(frozen=True, eq=False)
-class StripRun:
-    """A pull: elongation of the gauge (increments,) mm, displacement and nodal force of the shells
-    (increments, nodes, 3) mm and N."""
-
-    gauge: Array
-    displacement: Array
-    force: Array
-
-
 def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
     """Pull a strip to the gauge's elongations; SolverFailure: no good end, or not so far."""
     shells = setup.shells(model.mesh)
@@ -160,12 +150,16 @@ def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: 
         return strip_decks(model, law, shells, setup.element, pulls, setup.templates)
 
     def opened(pulls: Array) -> Array:
-        return run(decks(pulls), lambda frd, _: strip_run(frd, model, shells, len(pulls))).gauge
+        u, _ = run(decks(pulls), lambda frd, _: whole_times(frd, len(pulls), len(shells.points)))
+        return gauge_opened(model, u)
 
     pulls, _ = grip_pulls(model, law, opened, "calculix")
 
     def read(frd: Path, iterations: int) -> History:
-        return strip_history(strip_run(frd, model, shells, len(pulls)), model, shells, iterations)
+        # What a support gives is what CalculiX calls the force of its nodes: the inner one.
+        u, force = whole_times(frd, len(pulls), len(shells.points))
+        corners = u[:, : shells.corners]
+        return strip_history(model, corners, force, shells.node_sets, "calculix", iterations)
 
     return run(decks(pulls), read)
 
@@ -187,32 +181,6 @@ def strip_decks(
         "most_increments": 4 * len(pulls) + 200,
     }
     return deck_files("strip.inp.j2", "Strip", shells, element, TOLERANCES_STRIP, context, folder)
-
-
-def strip_run(path: Path, model: UniaxialModel, shells: ShellMesh, count: int) -> StripRun:
-    """Read the `count` increments of a .frd file; SolverFailure as `whole_times`."""
-    u, force = whole_times(path, count, len(shells.points))
-    lower, upper = (shells.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
-    return StripRun(np.linalg.norm(upper - lower, axis=1) - model.gauge_length, u, force)
-
-
-def strip_history(
-    run: StripRun, model: UniaxialModel, shells: ShellMesh, iterations: int
-) -> History:
-    """Return load, displacement, reactions at the gauge's elongations; else SolverFailure."""
-
-    def at_levels(values: Array) -> Array:
-        return at_elongations(run.gauge, model, values, "calculix")
-
-    corners = np.ascontiguousarray(at_levels(run.displacement[:, : shells.corners]))
-    low, high = extremes(log_strain(model.mesh, corners, model.warp))
-    # What a support gives is what CalculiX calls the force of its nodes: the inner one.
-    sums = {
-        name: at_levels(run.force[:, shells.node_sets[name]].sum(axis=1))
-        for name in (*model.supports, model.pulled)
-    }
-    load = -model.load_factor * sums[model.pulled][:, 1]
-    return History(load, corners, low, high, sums, iterations=iterations, path=corners)
 
 
 def analyse_patch(model: PatchModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:

@@ -18,11 +18,11 @@ from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import PatchModel, UniaxialModel
-from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
+from ..bars import BARS, INCREMENTS, bar_law, checked_stresses, difference
 from ..base import Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
-from ..scratch import run_folder
+from ..scratch import run_folder, write_deck
 from . import cylinder, sheets
 from .deck import ELEMENTS, Reader, Rescue, Run, Setup, ShellMesh, shell_mesh
 from .executable import (
@@ -128,11 +128,7 @@ class CalculixSolver:
         """Run in a fresh scratch folder; return what `read`, or `rescue` of a bad end, makes."""
         program, library = self.executable().path, material_library()
         with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
-            try:
-                for name, text in files.items():
-                    (folder / name).write_text(text, encoding="ascii", errors="replace")
-            except OSError as error:
-                raise SolverFailure(f"the deck cannot be written: {error.strerror}") from None
+            write_deck(folder, files)
             log_file, sta, frd = (folder / f"{JOB}.{end}" for end in ("log", "sta", "frd"))
             counts = ("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "CCX_NPROC_EQUATION_SOLVER")
             environment = dict.fromkeys(counts, str(self.threads))
@@ -193,11 +189,7 @@ def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> t
     except OSError as error:
         problem = f"cannot be used: {error.strerror}; choose another TMPDIR"
         raise OutputError(f"{tempfile.gettempdir()}: {problem}") from None
-    for bar, stress in zip(BARS, stresses, strict=True):
-        if not abs(stress / bar.stress - 1) < TOLERANCE:
-            problem = f"{bar.model} {bar.direction} bar: {stress:.4g} MPa, not {bar.stress}"
-            raise SolverFailure(f"{ccx} does not carry the law ({problem})", "calculix")
-    return stresses
+    return checked_stresses(stresses, str(ccx), "calculix")
 
 
 def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float, ...]:

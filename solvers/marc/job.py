@@ -17,7 +17,7 @@ from typing import TypeVar
 from ...errors import InputError, LicenceDenied, SolverFailure
 from ..base import Progress
 from ..process import WORDS, Outcome, Watch, disk_full, log_tail, run_process
-from ..scratch import run_folder
+from ..scratch import run_folder, write_deck
 from .deck import JOB, Reader
 from .settings import VARIABLE, MarcSettings
 
@@ -271,13 +271,7 @@ def run_job(
     seconds = timeout or settings.timeout
     subroutine = None if job.subroutine is None else SUBROUTINE
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-        sources = {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine}
-        try:
-            for name, text in sources.items():
-                if text is not None:
-                    (folder / name).write_text(text, encoding="ascii", errors="replace")
-        except OSError as error:
-            raise SolverFailure(f"the deck cannot be written: {error.strerror}", NAME) from None
+        write_deck(folder, {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine})
         sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
         watch = None if tell is None else Watch(lambda: increments(sts), tell)
         command, screen = run_command(settings, JOB, subroutine), folder / SCREEN

@@ -14,7 +14,7 @@ from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import UniaxialModel
 from ..base import History, extremes, log_strain
-from ..prescribed import at_elongations, grip_pulls
+from ..prescribed import gauge_opened, grip_pulls, strip_history
 from .deck import (
     MEMBRANE,
     Run,
@@ -81,11 +81,21 @@ def analyse_strip(
 
     def gauge(pulls: Array) -> Array:
         deck, count = strip_deck(model, law, settings, pulls), len(pulls)
-        return run(deck, count, lambda t19, _: opened(t19, model, count))
+        frames = run(deck, count, lambda t19, _: whole_times(t19, model.mesh, count))
+        return gauge_opened(model, displacements(frames))
 
     pulls, driven = grip_pulls(model, law, gauge, "marc")
     deck, count = strip_deck(model, law, settings, pulls), len(pulls)
-    return run(deck, count, lambda t19, n: strip_history(t19, model, count, driven, n))
+
+    def read(t19: Path, iterations: int) -> History:
+        frames = whole_times(t19, model.mesh, count)
+        forces, sets = reactions(frames), model.mesh.node_sets
+        if forces is None:
+            raise SolverFailure(NO_FORCES, "marc")
+        u = displacements(frames)
+        return strip_history(model, u, forces, sets, "marc", iterations, driven)
+
+    return run(deck, count, read)
 
 
 def strip_deck(
@@ -163,38 +173,3 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
         *extremes(log_strain(model.mesh, u, model.mesh.warp)), sums, iterations=iterations, path=u,
         remarks=() if forces is not None else (Note(NO_REACTIONS, NO_FORCES),),
     )  # fmt: skip
-
-
-def opened(path: Path, model: UniaxialModel, count: int) -> Array:
-    """Return the elongation of the gauge (mm) at the `count` increments of a pull."""
-    return _opened(displacements(whole_times(path, model.mesh, count)), model)
-
-
-def strip_history(
-    path: Path, model: UniaxialModel, count: int, driven: bool, iterations: int
-) -> History:
-    """Return load, displacement, reactions at the gauge's elongations; driven: grips are gauge."""
-    frames = whole_times(path, model.mesh, count)
-    u, forces = displacements(frames), reactions(frames)
-    if forces is None:
-        raise SolverFailure(NO_FORCES, "marc")
-    gauge = _opened(u, model)
-
-    def at_levels(values: Array) -> Array:
-        return values if driven else at_elongations(gauge, model, values, "marc")
-
-    corners = np.ascontiguousarray(at_levels(u))
-    sums = {
-        name: at_levels(forces[:, model.mesh.node_sets[name]].sum(axis=1))
-        for name in (*model.supports, model.pulled)
-    }
-    return History(
-        -model.load_factor * sums[model.pulled][:, 1], corners,
-        *extremes(log_strain(model.mesh, corners, model.warp)), sums, iterations=iterations,
-        path=corners,
-    )  # fmt: skip
-
-
-def _opened(u: Array, model: UniaxialModel) -> Array:
-    lower, upper = (model.mesh.points[n] + u[:, n] for n in model.mesh.node_sets["gauge"])
-    return np.asarray(np.linalg.norm(upper - lower, axis=1) - model.gauge_length)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.cylinder_model import Cord, ForceTable
+from ...meshes.cylinder_model import Cord
 from ...meshes.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -110,11 +110,8 @@ def _mirrored(cord: Cord, other: Cord) -> bool:
         other.initial_force, other.prestrain, other.tension_only
     )  # fmt: skip
     turned = abs((cord.angle + other.angle) % 360) < NEAR
-    return turned and same and _same_table(cord.table, other.table)
-
-
-def _same_table(one: ForceTable, other: ForceTable) -> bool:
-    return np.array_equal(one.strain, other.strain) and np.array_equal(one.force, other.force)
+    one, two = ([own.table.strain, own.table.force] for own in (cord, other))
+    return turned and same and np.array_equal(one, two)
 
 
 def _crossed(p: Array, quads: Numbers, tube: Numbers, angle: float) -> tuple[Numbers, Array]:

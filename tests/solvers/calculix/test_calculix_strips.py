@@ -16,10 +16,9 @@ from bubblefit.meshes.strip_models import (
 )
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import shell_mesh
-from bubblefit.solvers.calculix.sheets import StripRun, strip_history
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.prescribed import corrected
+from bubblefit.solvers.prescribed import at_elongations, corrected
 
 from ...fortran_build import LAWS
 from ...published_laws import TABLE_3_2
@@ -152,13 +151,11 @@ def test_a_gauge_that_is_not_reached_is_a_failure(ccx, monkeypatch, tmp_path):
 
 def test_a_gauge_that_turns_back_is_a_failure():
     coarse = model("bias", 2, **COARSE)
-    shells = shell_mesh(coarse.mesh, "S4")
-    nothing = np.zeros((3, len(shells.points), 3))
-    run = StripRun(np.array([6.0, 5.0, 12.0]), nothing, nothing)
+    gauge = np.array([6.0, 5.0, 12.0])
     with pytest.raises(SolverFailure, match="gets shorter"):
-        strip_history(run, coarse, shells, 0)
+        at_elongations(gauge, coarse, np.zeros(3), "calculix")
     with pytest.raises(SolverFailure, match="gets shorter"):
-        corrected(coarse, np.array([1.0, 2.0, 3.0]), run.gauge, "calculix")
+        corrected(coarse, np.array([1.0, 2.0, 3.0]), gauge, "calculix")
     # A correction reaches beyond the first run.
     half = np.array(coarse.elongations) / 2
     pulls = corrected(coarse, 3 * half, half, "calculix")
