@@ -17,6 +17,15 @@ from .forms.base import EVEN, Array
 from .memory import PLAIN, recalled_modulus
 from .pieces import increment_modulus
 
+#: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`); four
+#: from AHEAD and from BEHIND, a matrix each.
+SLOPES = 25
+(
+    D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU,
+    RATIO1, RATIO2, TAKEN1, TAKEN2, AHEAD,
+) = range(18)  # fmt: skip
+BEHIND = AHEAD + 4
+
 # The load ratio of one increment at one integration point, compiled.
 #
 # Stresses along warp and fill have the normalised load ratios gamma1 = s1 / sqrt(s1^2 + s2^2) =
@@ -55,14 +64,15 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 
 @compiled()
 def mean_ratio(
-    warp: float, fill: float, coupling: Array, old0: float, old1: float, dh0: float, dh1: float
-) -> tuple[float, float, float, float, float, float]:
-    """Return the load ratio of an increment's mean stress, and how the stress depends on itself.
+    warp: float, fill: float, coupling: Array, old0: float, old1: float, dh0: float, dh1: float,
+    slopes: Array,
+) -> bool:  # fmt: skip
+    """Write the load ratio of an increment's mean stress, and how the stress depends on itself.
 
     warp, fill : E1, E2 at 1:1, MPa; old0, old1 : stress at the start; dh0, dh1 : strain increment.
-    Returns gamma1 and gamma2 less those at 1:1; u (2), half the derivative of the stress by the
-    angle; w (2), such that a change r of the stress at a fixed ratio is a change r + u (w . r) of
-    it altogether. gamma1 is NaN where a modulus, or 1 - nu12 nu21, is not positive on the way.
+    Writes RATIO1.., AHEAD.. and BEHIND.. of `slopes`: with u half the derivative of the stress by
+    the angle, a change r of the stress at a fixed ratio is a change r + u (w . r) of it altogether.
+    False where a modulus, or 1 - nu12 nu21, is not positive on the way.
     """
     nu = coupling[0]
     angle = load_angle(old0, old1)[0]
@@ -72,10 +82,10 @@ def mean_ratio(
         cosine, sine = math.cos(angle), math.sin(angle)
         e1, e2 = warp + coupling[1] * (cosine - EVEN), fill + coupling[2] * (sine - EVEN)
         if not (e1 > 0.0 and e2 > 0.0):
-            return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
+            return False
         nu_nu = nu * nu * e2 / e1
         if not 1.0 - nu_nu > 1e-3:
-            return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
+            return False
         inv = 1.0 / (1.0 - nu_nu)
         d11, d22 = e1 * inv, e2 * inv
         d12 = nu * d22
@@ -105,16 +115,15 @@ def mean_ratio(
             break
         angle = ahead
     if not turn > 0.0:
-        return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0
-    return cosine - EVEN, sine - EVEN, u0, u1, w0 / turn, w1 / turn
+        return False
+    slopes[RATIO1], slopes[RATIO2] = cosine - EVEN, sine - EVEN
+    for i, by in ((0, w0 / turn), (1, w1 / turn)):
+        slopes[BEHIND + i], slopes[BEHIND + 2 + i] = u0 * by, u1 * by
+        slopes[AHEAD + i] += slopes[BEHIND + i]
+        slopes[AHEAD + 2 + i] += slopes[BEHIND + 2 + i]
+    return True
 
 
-#: Entries of the vector that `stress_update` leaves for the sensitivities.
-SLOPES = 19
-(
-    D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU,
-    RATIO1, RATIO2, TURN1, TURN2, BY1, BY2,
-) = range(SLOPES)  # fmt: skip
 # NaN must stay visible (a failed iterate is recognised by it), so no "nnan"/"ninf".
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 
@@ -213,8 +222,10 @@ def stress_update(
     load ratios; h, h_old (3,) strain, s_old (3,) stress at the start. Of a law that remembers,
     coupling is (15,), h and h_old are (9,) as in `memory.py`, and h[3:] is written. Writes s_new
     (3,), tangent = d s_new/d h (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the
-    moduli by h_old, RATIO.. the load ratios less those at 1:1, TURN.. and BY.. u and w of
-    `mean_ratio`. False when a modulus, or 1 - nu12 nu21, is not positive.
+    moduli by h_old, RATIO.. the load ratios less those at 1:1, TAKEN.. the strain increment,
+    AHEAD.. and BEHIND.. A and B (2, 2): a change r of the stress along the yarns at fixed ratio
+    is a change A r + B b of it altogether, b the change of s_old. False when a modulus, or 1 -
+    nu12 nu21, is not positive.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
@@ -223,13 +234,12 @@ def stress_update(
         warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, 0, h, h_old)
         fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, 1, h, h_old)
         shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, 2, h, h_old)
+    dh0, dh1, dh2 = h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]
     slopes[RATIO1:] = 0.0
+    slopes[TAKEN1], slopes[TAKEN2], slopes[AHEAD], slopes[AHEAD + 3] = dh0, dh1, 1.0, 1.0
     if coupling[1] != 0.0 or coupling[2] != 0.0:
-        (
-            slopes[RATIO1], slopes[RATIO2], slopes[TURN1], slopes[TURN2], slopes[BY1], slopes[BY2],
-        ) = mean_ratio(
-            warp, fill, coupling, s_old[0], s_old[1], h[0] - h_old[0], h[1] - h_old[1]
-        )  # fmt: skip
+        if not mean_ratio(warp, fill, coupling, s_old[0], s_old[1], dh0, dh1, slopes):
+            return False
         warp += coupling[1] * slopes[RATIO1]
         fill += coupling[2] * slopes[RATIO2]
     if not (shear > 0.0 and fill > 0.0 and warp > 0.0):
@@ -248,7 +258,6 @@ def stress_update(
     d11_e2 = -warp * den_fill * inv2
     d22_e1 = -fill * den_warp * inv2
     d22_e2 = inv - fill * den_fill * inv2
-    dh0, dh1, dh2 = h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]
     s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
     s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
     s_new[2] = s_old[2] + shear * dh2
@@ -259,9 +268,9 @@ def stress_update(
     tangent[2, 2] = shear + shear_slope * dh2
     if coupling[1] != 0.0 or coupling[2] != 0.0:
         for j in range(2):
-            more = slopes[BY1] * tangent[0, j] + slopes[BY2] * tangent[1, j]
-            tangent[0, j] += slopes[TURN1] * more
-            tangent[1, j] += slopes[TURN2] * more
+            first, second = tangent[0, j], tangent[1, j]
+            tangent[0, j] = slopes[AHEAD] * first + slopes[AHEAD + 1] * second
+            tangent[1, j] = slopes[AHEAD + 2] * first + slopes[AHEAD + 3] * second
     tangent[0, 2] = tangent[1, 2] = tangent[2, 0] = tangent[2, 1] = 0.0
     slopes[D11], slopes[D12], slopes[D22], slopes[G12] = d11, d12, d22, shear
     slopes[D11_E1], slopes[D11_E2] = d11_e1, d11_e2
@@ -270,6 +279,31 @@ def stress_update(
     den_nu = 2.0 * nu * fill / warp * inv2
     slopes[D11_NU], slopes[D22_NU] = warp * den_nu, fill * den_nu
     return True
+
+
+@compiled(inline="always")
+def stress_rate(
+    slopes: Array, nu: float, own: Array, by_coupling: Array, j: int, old: Array, before: Array,
+    after: Array,
+) -> None:  # fmt: skip
+    """Write after[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
+
+    slopes : of `stress_update`. own (3, np) : of the moduli at 1:1 by themselves; by_coupling of
+    `law_slopes`; old, before (3, np) : rates of strain and stress at the start.
+    """
+    o0, o1, by_nu = old[0, j], old[1, j], by_coupling[0, j]
+    warp = own[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
+    fill = own[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
+    d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu * slopes[D11_NU]
+    d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu * slopes[D22_NU]
+    d12 = nu * d22 + by_nu * slopes[D22]
+    dh0, dh1, b0, b1 = slopes[TAKEN1], slopes[TAKEN2], before[0, j], before[1, j]
+    a0 = b0 + d11 * dh0 + d12 * dh1 - slopes[D11] * o0 - slopes[D12] * o1
+    a1 = b1 + d12 * dh0 + d22 * dh1 - slopes[D12] * o0 - slopes[D22] * o1
+    after[0, j] = slopes[AHEAD] * a0 + slopes[AHEAD + 1] * a1
+    after[1, j] = slopes[AHEAD + 2] * a0 + slopes[AHEAD + 3] * a1
+    after[0, j] += slopes[BEHIND] * b0 + slopes[BEHIND + 1] * b1
+    after[1, j] += slopes[BEHIND + 2] * b0 + slopes[BEHIND + 3] * b1
 
 
 @compiled()

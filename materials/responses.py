@@ -19,27 +19,7 @@ from ..files import compiled
 from .forms.base import COMPONENTS, UNLIMITED, Array
 from .law import HypoelasticLaw, law_slopes
 from .pieces import by_pieces
-from .point_law import (
-    BEFORE1,
-    BEFORE2,
-    BY1,
-    BY2,
-    D11,
-    D11_E1,
-    D11_E2,
-    D11_NU,
-    D12,
-    D22,
-    D22_E1,
-    D22_E2,
-    D22_NU,
-    RATIO1,
-    RATIO2,
-    SLOPES,
-    TURN1,
-    TURN2,
-    stress_update,
-)
+from .point_law import SLOPES, stress_rate, stress_update
 
 #: "true": log strain and Cauchy stress. "nominal": change of length (or of angle, radians) and
 #: force per reference area (trellis: stress that does work on the angle). "green": Green-Lagrange
@@ -208,7 +188,7 @@ def _path(  # type: ignore[no-untyped-def]
     pieces, coupling, power, thickness, loads, rows, by_coupling, strain, stress, slope, stable
 ):
     """Solve load by load; return how many have an equilibrium."""
-    nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
+    nu, count = coupling[0], by_coupling.shape[1]
     h, h_old, trial, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     tangent, slopes = np.empty((3, 3)), np.empty(SLOPES)
     rest, k, step = np.empty(2), np.empty((2, 2)), np.empty(2)
@@ -256,21 +236,11 @@ def _path(  # type: ignore[no-untyped-def]
                     for power_of in range(4):
                         for j in range(count):
                             own[i, j] += weights[piece, power_of] * rows[i, piece, power_of, j]
-            w, f = h[0] - h_old[0], h[1] - h_old[1]
             arm0 = thickness * math.exp(power * (h[0] + h[1]) - h[0])
             arm1 = thickness * math.exp(power * (h[0] + h[1]) - h[1])
             for j in range(count):
-                o0, o1 = dh[0, j], dh[1, j]
-                warp = own[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
-                fill = own[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
-                d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu[j] * slopes[D11_NU]
-                d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu[j] * slopes[D22_NU]
-                d12 = nu * d22 + by_nu[j] * slopes[D22]
-                a0 = ds[0, j] + d11 * w + d12 * f - slopes[D11] * o0 - slopes[D12] * o1
-                a1 = ds[1, j] + d12 * w + d22 * f - slopes[D12] * o0 - slopes[D22] * o1
-                turn = slopes[BY1] * (a0 + ds[0, j]) + slopes[BY2] * (a1 + ds[1, j])
-                a0 += turn * slopes[TURN1]
-                a1 += turn * slopes[TURN2]
+                stress_rate(slopes, nu, own, by_coupling, j, dh, ds, ds)
+                a0, a1 = ds[0, j], ds[1, j]
                 r0, r1 = arm0 * a0, arm1 * a1
                 dh[0, j] = (k[0, 1] * r1 - k[1, 1] * r0) / det
                 dh[1, j] = (k[1, 0] * r0 - k[0, 0] * r1) / det

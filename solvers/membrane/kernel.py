@@ -17,30 +17,7 @@ from ...errors import InputError
 from ...files import compiled
 from ...materials.memory import BY_X, ON, PLAIN, RECALLED, remember
 from ...materials.pieces import by_pieces
-from ...materials.point_law import (
-    BEFORE1,
-    BEFORE2,
-    BEFORE3,
-    BY1,
-    BY2,
-    D11,
-    D11_E1,
-    D11_E2,
-    D11_NU,
-    D12,
-    D22,
-    D22_E1,
-    D22_E2,
-    D22_NU,
-    FAST,
-    G12,
-    RATIO1,
-    RATIO2,
-    SLOPES,
-    TURN1,
-    TURN2,
-    membrane_stress,
-)  # fmt: skip
+from ...materials.point_law import BEFORE3, FAST, G12, SLOPES, membrane_stress, stress_rate
 from ...materials.wrinkles import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
@@ -262,7 +239,7 @@ def explicit(  # type: ignore[no-untyped-def]
     is a pressure, or -1; dh_old, ds_old (elements, 4, 3, np) at the start of the increment. Writes
     ds_new (the part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
     """
-    nu, by_nu, count = coupling[0], by_coupling[0], by_coupling.shape[1]
+    nu, count = coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
     remembers, memory = coupling.shape[0] > PLAIN, np.empty(RECALLED)
     h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
@@ -304,7 +281,7 @@ def explicit(  # type: ignore[no-untyped-def]
                         weights, own[i], memory,
                     )  # fmt: skip
                     point[e, g, POINT + i], point[e, g, POINT + 3 + i] = memory[ON], memory[BY_X]
-            dh0, dh1, dh2 = h[0] - h_old[e, g, 0], h[1] - h_old[e, g, 1], h[2] - h_old[e, g, 2]
+            dh2 = h[2] - h_old[e, g, 2]
             wt = area[e, g] * thickness[e]
             for i in range(3):
                 for k in range(3):
@@ -312,20 +289,11 @@ def explicit(  # type: ignore[no-untyped-def]
             old, before = dh_old[e, g], ds_old[e, g]
             after = ds_new[e, g]
             for j in range(count):
-                o0, o1, o2 = old[0, j], old[1, j], old[2, j]
-                warp = own[0, j] + o0 * steep[BEFORE1] + by_coupling[1, j] * steep[RATIO1]
-                fill = own[1, j] + o1 * steep[BEFORE2] + by_coupling[2, j] * steep[RATIO2]
-                shear = own[2, j] + o2 * steep[BEFORE3]
-                d11 = steep[D11_E1] * warp + steep[D11_E2] * fill + by_nu[j] * steep[D11_NU]
-                d22 = steep[D22_E1] * warp + steep[D22_E2] * fill + by_nu[j] * steep[D22_NU]
-                d12 = nu * d22 + by_nu[j] * steep[D22]
-                a0 = before[0, j] + d11 * dh0 + d12 * dh1 - steep[D11] * o0 - steep[D12] * o1
-                a1 = before[1, j] + d12 * dh0 + d22 * dh1 - steep[D12] * o0 - steep[D22] * o1
-                a2 = before[2, j] + shear * dh2 - steep[G12] * o2
-                turn = steep[BY1] * (a0 + before[0, j]) + steep[BY2] * (a1 + before[1, j])
-                a0 += turn * steep[TURN1]
-                a1 += turn * steep[TURN2]
-                after[0, j], after[1, j], after[2, j] = a0, a1, a2
+                stress_rate(steep, nu, own, by_coupling, j, old, before, after)
+                shear = own[2, j] + old[2, j] * steep[BEFORE3]
+                a0, a1 = after[0, j], after[1, j]
+                a2 = before[2, j] + shear * dh2 - steep[G12] * old[2, j]
+                after[2, j] = a2
                 t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
                 t1[j] = pull[1, 0] * a0 + pull[1, 1] * a1 + pull[1, 2] * a2
                 t2[j] = pull[2, 0] * a0 + pull[2, 1] * a1 + pull[2, 2] * a2
