@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from ..errors import InputError
-from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid
+from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
 from .comparison import Comparison, NuisanceOf
 
@@ -53,6 +53,12 @@ class LawBounds:
             problem = f"expected lower <= upper, got {low.tolist()} and {high.tolist()}"
             raise InputError(None, "bounds", problem)
         return cls(dict(margins), None, low, high)
+
+    def beside(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
+        """Return the bounds with those of a form's own constants."""
+        least, largest = ({name: pair[k] for name, pair in ranges.items()} for k in range(2))
+        most = None if self.largest is None else {**largest, **self.largest}
+        return replace(self, least={**least, **self.least}, largest=most)
 
     def check(self, form: Form) -> None:
         """Raise InputError for a modulus without bounds, or a wrong number of bounds."""
@@ -102,6 +108,7 @@ class Unknowns:
         comparisons: Iterable[Comparison] = (),
     ) -> Unknowns:  # fmt: skip
         """Return the unknowns of a law and its comparisons; raises as `LawBounds.check`."""
+        bounds = bounds.beside(own_bounds(form))
         bounds.check(form)
         several = tuple(comparisons)
         nuisance = NuisanceOf({c.name: c.nuisance for c in several})

@@ -28,6 +28,7 @@ from .forms.base import (
     UNLIMITED,
     Array,
     Form,
+    crimp_map,
     held_strain,
     map_in_range,
     modulus_rows,
@@ -83,6 +84,8 @@ class HypoelasticLaw:
         if self.thickness_change not in ("constant", "incompressible"):
             problem = f"expected 'constant' or 'incompressible', got {self.thickness_change!r}"
             raise InputError(None, "thickness_change", problem)
+        if self.memory is not None and len(crimp_map(form)):
+            raise InputError(None, "memory", f"a {form.name} law has none")
         pieces = pieces_of(form, beta, ends.tolist())
         beta.flags.writeable = ends.flags.writeable = False
         for name, value in (("beta", beta), ("strain_range", ends), ("pieces", pieces)):
@@ -123,9 +126,11 @@ class HypoelasticLaw:
 
     @cached_property
     def coupling(self) -> Array:
-        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, the memory; read-only."""
+        """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, then T1, T2 and S (MPa)
+        of crimp or the memory; read-only."""
         remembered = () if self.memory is None else self.memory.constants
-        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta, *remembered])
+        more = (*crimp_map(self.form) @ self.beta, *remembered)
+        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta, *more])
 
     @property
     def state(self) -> int:
@@ -158,8 +163,8 @@ class HypoelasticLaw:
 
     @property
     def of_load_ratio(self) -> bool:
-        """Return whether E1 or E2 may depend on the ratio of the loads along warp and fill."""
-        return bool(ratio_map(self.form).any())
+        """Return whether stiffness may depend on the ratio of the loads along warp and fill."""
+        return bool(ratio_map(self.form).any() or len(crimp_map(self.form)))
 
     def E1(self, strain: ArrayLike) -> Array:
         return self.modulus("E1", strain)
@@ -271,11 +276,14 @@ def law_slopes(
     they are zero."""
     of_beta = map_in_range(law.form, law.strain_range.tolist())
     rows = np.zeros((*of_beta.shape[:3], len(parameters)))
-    coupling, gains = np.zeros((len(law.coupling), len(parameters))), ratio_map(law.form)
+    coupling = np.zeros((len(law.coupling), len(parameters)))
+    # What is in MPa beside the moduli: gains, and constants of crimp.
+    gains = np.vstack([ratio_map(law.form), crimp_map(law.form)])
+    own = slice(1, 1 + len(gains))
     for j, name in enumerate(parameters):
         if name.startswith("beta_"):
             place = int(name.removeprefix("beta_"))
-            rows[..., j], coupling[1:PLAIN, j] = of_beta[..., place], gains[:, place]
+            rows[..., j], coupling[own, j] = of_beta[..., place], gains[:, place]
         elif name == "nu12":
             coupling[0, j] = 1.0
         elif name in NAMES and law.memory is not None:
@@ -284,7 +292,7 @@ def law_slopes(
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
             # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
-            coupling[1:PLAIN, j] = law.coupling[1:PLAIN] / thickness
+            coupling[own, j] = law.coupling[own] / thickness
     return rows, coupling
 
 

@@ -14,17 +14,19 @@ import math
 
 from ..files import compiled
 from .forms.base import EVEN, Array
-from .memory import PLAIN, recalled_modulus
+from .memory import recalled_modulus
 from .pieces import increment_modulus
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`); four
-#: from AHEAD and from BEHIND, a matrix each.
-SLOPES = 25
+#: from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
+SLOPES = 31
 (
     D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU,
     RATIO1, RATIO2, TAKEN1, TAKEN2, AHEAD,
 ) = range(18)  # fmt: skip
-BEHIND = AHEAD + 4
+BEHIND, CRIMP = AHEAD + 4, AHEAD + 8
+#: Entries of the coupling of a law with crimp: those of any law, then T1, T2 and S.
+CRIMPED = 6
 
 # The load ratio of one increment at one integration point, compiled.
 #
@@ -211,6 +213,111 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
         )
 
 
+# Crimp that two yarn families exchange, at one integration point, compiled (`forms/ratio.py`).
+#
+# With r = T/S, the exchange of stresses s is w = (r1 s1 - r2 s2) / (S + s1 + s2), its strain c(w) =
+# (2 r1 w - w^2, -2 r2 w - w^2). An increment ends where s = s_old + D (dh - c(w) + c(w_old)), whose
+# only unknown is w: the root of w (S + s1 + s2) - r1 s1 + r2 s2, which rises with w in tension.
+# Where the yarns are pressed together the sum is held at S/2, and w between -r2 and r1, where one
+# of them is straight.
+
+
+@compiled()
+def _exchanged(
+    s0: float, s1: float, first: float, second: float, bed: float, slopes: Array
+) -> tuple[float, float, float]:
+    """Return w of a stress and its derivatives by it; write those by T1, T2, S to CRIMP.."""
+    whole = bed + s0 + s1
+    held = whole < 0.5 * bed
+    pull = 0.5 * bed if held else whole
+    w, free = (first * s0 - second * s1) / pull, 0.0 if held else 1.0
+    by0, by1 = (first - free * w) / pull, -(second + free * w) / pull
+    by_first, by_second, by_bed = s0 / pull, -s1 / pull, -w / (bed if held else pull)
+    if w >= first or w <= -second:
+        by0, by1, by_first, by_second, by_bed = 0.0, 0.0, 0.0, 0.0, 0.0
+        if w >= first:
+            w, by_first = first, 1.0
+        else:
+            w, by_second = -second, -1.0
+    slopes[CRIMP], slopes[CRIMP + 1] = by_first / bed, by_second / bed
+    slopes[CRIMP + 2] = by_bed - (first * by_first + second * by_second) / bed
+    return w, by0, by1
+
+
+@compiled()
+def exchange(
+    d11: float, d12: float, d22: float, coupling: Array, s_old: Array, s_new: Array, slopes: Array
+) -> bool:
+    """Write the stress along the yarns s_new[:2] after an increment with crimp.
+
+    TAKEN.. of slopes is the strain increment and becomes that of the yarns; AHEAD.., BEHIND.. and
+    CRIMP.. are written as in `stress_update`. False without a root.
+    """
+    bed = coupling[5]
+    if not bed > 0.0:
+        return False
+    first, second = coupling[3] / bed, coupling[4] / bed
+    dh0, dh1 = slopes[TAKEN1], slopes[TAKEN2]
+    w_old, old0, old1 = _exchanged(s_old[0], s_old[1], first, second, bed, slopes)
+    by_old = slopes[CRIMP], slopes[CRIMP + 1], slopes[CRIMP + 2]
+    w, low, high = w_old, -second, first
+    e0 = e1 = off = 0.0
+    for _ in range(ROUNDS):
+        e0 = dh0 - (2.0 * first - w) * w + (2.0 * first - w_old) * w_old
+        e1 = dh1 + (2.0 * second + w) * w - (2.0 * second + w_old) * w_old
+        s_new[0] = s_old[0] + d11 * e0 + d12 * e1
+        s_new[1] = s_old[1] + d12 * e0 + d22 * e1
+        whole = bed + s_new[0] + s_new[1]
+        free = 1.0 if whole >= 0.5 * bed else 0.0
+        pull = max(whole, 0.5 * bed)
+        off = w * pull - first * s_new[0] + second * s_new[1]
+        if not off == off:
+            return False
+        if (w == first and off <= 0.0) or (w == -second and off >= 0.0):
+            break
+        if off > 0.0:
+            high = w
+        else:
+            low = w
+        dg0 = d11 * (first - w) - d12 * (second + w)
+        dg1 = d12 * (first - w) - d22 * (second + w)
+        steep = pull + 2.0 * ((first - free * w) * dg0 - (second + free * w) * dg1)
+        ahead = w - off / steep if steep > 0.0 else math.inf
+        if not (low < ahead < high):
+            # The ends are exchanges of their own, where one yarn is straight.
+            beyond = first if ahead >= high else -second
+            ahead = beyond if beyond in (low, high) else 0.5 * (low + high)
+        if abs(ahead - w) <= ROUNDING:
+            break
+        w = ahead
+    slopes[TAKEN1], slopes[TAKEN2] = e0, e1
+    _, by0, by1 = _exchanged(s_new[0], s_new[1], first, second, bed, slopes)
+    if w == first or w == -second:
+        by0 = by1 = 0.0
+    g0, g1 = 2.0 * (first - w), -2.0 * (second + w)
+    dg0, dg1 = d11 * g0 + d12 * g1, d12 * g0 + d22 * g1
+    whole = 1.0 + by0 * dg0 + by1 * dg1
+    if not whole > 0.0:
+        return False
+    # A = 1 - D g v' / (1 + v' D g), v the derivative of w by the stress; B = A D g_old v_old'.
+    slopes[AHEAD], slopes[AHEAD + 1] = 1.0 - dg0 * by0 / whole, -dg0 * by1 / whole
+    slopes[AHEAD + 2], slopes[AHEAD + 3] = -dg1 * by0 / whole, 1.0 - dg1 * by1 / whole
+    g0_old, g1_old = 2.0 * (first - w_old), -2.0 * (second + w_old)
+    was0, was1 = d11 * g0_old + d12 * g1_old, d12 * g0_old + d22 * g1_old
+    for i in range(2):
+        turned = slopes[AHEAD + 2 * i] * was0 + slopes[AHEAD + 2 * i + 1] * was1
+        slopes[BEHIND + 2 * i], slopes[BEHIND + 2 * i + 1] = turned * old0, turned * old1
+    # - D dc/d(T1, T2, S) at a fixed stress, of the end less that of the start.
+    by_r1 = (2.0 / bed, 0.0, -2.0 * first / bed)
+    by_r2 = (0.0, -2.0 / bed, 2.0 * second / bed)
+    for k in range(3):
+        c0 = g0 * slopes[CRIMP + k] - g0_old * by_old[k] + by_r1[k] * (w - w_old)
+        c1 = g1 * slopes[CRIMP + k] - g1_old * by_old[k] + by_r2[k] * (w - w_old)
+        slopes[CRIMP + k] = -(d11 * c0 + d12 * c1)
+        slopes[CRIMP + 3 + k] = -(d12 * c0 + d22 * c1)
+    return True
+
+
 @compiled()
 def stress_update(
     pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array, s_new: Array,
@@ -219,18 +326,19 @@ def stress_update(
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
     pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
-    load ratios; h, h_old (3,) strain, s_old (3,) stress at the start. Of a law that remembers,
-    coupling is (15,), h and h_old are (9,) as in `memory.py`, and h[3:] is written. Writes s_new
-    (3,), tangent = d s_new/d h (3, 3) and slopes (SLOPES,); BEFORE1.. are the derivatives of the
-    moduli by h_old, RATIO.. the load ratios less those at 1:1, TAKEN.. the strain increment,
-    AHEAD.. and BEHIND.. A and B (2, 2): a change r of the stress along the yarns at fixed ratio
-    is a change A r + B b of it altogether, b the change of s_old. False when a modulus, or 1 -
-    nu12 nu21, is not positive.
+    load ratios, and of crimp (6,): T1, T2, S of `exchange`; h, h_old (3,) strain, s_old (3,)
+    stress at the start. Of a law that remembers, coupling is (15,), h and h_old are (9,) as in
+    `memory.py`, and h[3:] is written. Writes s_new (3,), tangent = d s_new/d h (3, 3) and slopes
+    (SLOPES,): BEFORE1.. are the derivatives of the moduli by h_old, RATIO.. the load ratios less
+    those at 1:1, TAKEN.. the strain increment that the moduli take, AHEAD.. and BEHIND.. A and B
+    (2, 2): a change r of the stress along the yarns at fixed ratio and exchange is a change A r +
+    B b of it altogether, b the change of s_old; CRIMP.. (2, 3) what r is by T1, T2 and S. False
+    when a modulus, or 1 - nu12 nu21, is not positive, and as `exchange`.
     """
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
-    if coupling.shape[0] > PLAIN:
+    if coupling.shape[0] > CRIMPED:
         warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, 0, h, h_old)
         fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, 1, h, h_old)
         shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, 2, h, h_old)
@@ -258,15 +366,22 @@ def stress_update(
     d11_e2 = -warp * den_fill * inv2
     d22_e1 = -fill * den_warp * inv2
     d22_e2 = inv - fill * den_fill * inv2
-    s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
-    s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
+    turned = coupling[1] != 0.0 or coupling[2] != 0.0
+    if coupling.shape[0] == CRIMPED:
+        turned = True
+        if not exchange(d11, d12, d22, coupling, s_old, s_new, slopes):
+            return False
+        dh0, dh1 = slopes[TAKEN1], slopes[TAKEN2]
+    else:
+        s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
+        s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
     s_new[2] = s_old[2] + shear * dh2
     tangent[0, 0] = d11 + warp_slope * (d11_e1 * dh0 + nu * d22_e1 * dh1)
     tangent[0, 1] = d12 + fill_slope * (d11_e2 * dh0 + nu * d22_e2 * dh1)
     tangent[1, 0] = d12 + warp_slope * (nu * d22_e1 * dh0 + d22_e1 * dh1)
     tangent[1, 1] = d22 + fill_slope * (nu * d22_e2 * dh0 + d22_e2 * dh1)
     tangent[2, 2] = shear + shear_slope * dh2
-    if coupling[1] != 0.0 or coupling[2] != 0.0:
+    if turned:
         for j in range(2):
             first, second = tangent[0, j], tangent[1, j]
             tangent[0, j] = slopes[AHEAD] * first + slopes[AHEAD + 1] * second
@@ -300,6 +415,9 @@ def stress_rate(
     dh0, dh1, b0, b1 = slopes[TAKEN1], slopes[TAKEN2], before[0, j], before[1, j]
     a0 = b0 + d11 * dh0 + d12 * dh1 - slopes[D11] * o0 - slopes[D12] * o1
     a1 = b1 + d12 * dh0 + d22 * dh1 - slopes[D12] * o0 - slopes[D22] * o1
+    for k in range(CRIMPED - 3 if by_coupling.shape[0] == CRIMPED else 0):
+        a0 += slopes[CRIMP + k] * by_coupling[3 + k, j]
+        a1 += slopes[CRIMP + 3 + k] * by_coupling[3 + k, j]
     after[0, j] = slopes[AHEAD] * a0 + slopes[AHEAD + 1] * a1
     after[1, j] = slopes[AHEAD + 2] * a0 + slopes[AHEAD + 3] * a1
     after[0, j] += slopes[BEHIND] * b0 + slopes[BEHIND + 1] * b1

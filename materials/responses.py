@@ -279,12 +279,13 @@ def largest_load(
     return low
 
 
-def curve_pieces(law: HypoelasticLaw, name: str) -> Array:
-    """Return (n, 5) pieces of a modulus, MPa: upper end, then coefficients, highest power first."""
-    if law.of_load_ratio:
+def curve_pieces(law: HypoelasticLaw, name: str, coupled: bool = False) -> Array:
+    """Return (n, 5) pieces of a modulus, MPa: upper end, then coefficients, highest power first.
+    InputError for a law that depends on the loads' ratio, unless `coupled`: it is known, too."""
+    if law.of_load_ratio and not coupled:
         problem = (
-            f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
-            "the loads, and here they are moduli of strain"
+            f"a {law.form.name} law is for the solvers membrane and calculix: its stiffness "
+            "depends on the ratio of the loads, and here moduli are of strain"
         )
         raise InputError(None, "form", problem)
     rows = law.pieces[COMPONENTS[name]]
@@ -292,9 +293,9 @@ def curve_pieces(law: HypoelasticLaw, name: str) -> Array:
     return np.asarray(rows[: 1 + int((np.diff(rows[:, 0]) > 0).sum())])
 
 
-def piece_constants(law: HypoelasticLaw) -> tuple[float, ...]:
+def piece_constants(law: HypoelasticLaw, coupled: bool = False) -> tuple[float, ...]:
     """Return the numbers of pieces of E1, E2 and G12 (3), then the pieces of each, row by row."""
-    curves = [curve_pieces(law, name) for name in ("E1", "E2", "G12")]
+    curves = [curve_pieces(law, name, coupled) for name in ("E1", "E2", "G12")]
     numbers = np.concatenate([curve.ravel() for curve in curves])
     return (*(float(len(curve)) for curve in curves), *numbers.tolist())
 

@@ -285,8 +285,8 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
     """Raise InputError for a law of the load ratio where the solver takes moduli of strain."""
     if law.of_load_ratio and not carries_load_ratios(solver):
         problem = (
-            f"a {law.form.name} law is for the solver membrane: its moduli depend on the ratio of "
-            f"the loads, and {solver.name} takes moduli of strain"
+            f"a {law.form.name} law is for the solvers membrane and calculix: its stiffness "
+            f"depends on the ratio of the loads, and {solver.name} takes moduli of strain"
         )
         raise InputError(None, "form", problem)
     if law.memory is not None and not getattr(solver, "remembers", False):

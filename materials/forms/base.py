@@ -2,7 +2,8 @@
 
 Whatever the form, a modulus is a PIECEWISE CUBIC of its own logarithmic strain, its coefficients
 linear in beta. A form may also have `by_load_ratio`: its E1 and E2 are those at equal loads, and
-gain, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`).
+gain, linear in beta, by the normalised load ratio of their own yarn (`ratio_map`). One with
+`by_crimp` has yarns that exchange crimp (`crimp_map`), and bounds of its constants (`own_bounds`).
 
 A strain component is 0 (eps1, of which E1 depends), 1 (eps2, E2) or 2 (gamma12, G12, which depends
 on its size). A piece holds for strains up to its upper end, which belongs to it. Beyond the strain
@@ -99,6 +100,18 @@ def ratio_map(form: Form) -> Array:
     return np.zeros((2, form.size)) if own is None else np.asarray(own(), dtype=float)
 
 
+def crimp_map(form: Form) -> Array:
+    """Return (3, size), d (T1, T2, S of crimp interchange) / d beta, or (0, size) without."""
+    own = getattr(form, "by_crimp", None)
+    return np.zeros((0, form.size)) if own is None else np.asarray(own(), dtype=float)
+
+
+def own_bounds(form: Form) -> Mapping[str, tuple[float, float]]:
+    """Return least and largest, MPa, of entries of beta that are no moduli, by `modulus_of`."""
+    found: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
+    return found
+
+
 def ratios_of(form: Form, name: str) -> tuple[float, ...]:
     """Return load ratios at which positivity is checked: equal loads, then the ends."""
     component = COMPONENTS[name]
@@ -157,7 +170,8 @@ def modulus_rows(
 
 
 def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
-    """Return rows (n, size) by modulus on the form's own grids; equal loads come first."""
+    """Return rows (n, size) by modulus on the form's own grids, equal loads first; then what else
+    has bounds."""
     found = {}
     for name in ORDER:
         strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
@@ -165,6 +179,8 @@ def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array
         found[name] = np.vstack(
             [modulus_rows(form, name, strain, strain_range, ratio) for ratio in several]
         )
+    for name in own_bounds(form):
+        found[name] = np.asarray(form.own_rows(name))  # type: ignore[attr-defined]
     return found
 
 

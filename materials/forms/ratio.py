@@ -1,10 +1,24 @@
-"""Moduli of strain AND load ratio: splines of the own strain that gain by the load ratio.
+"""Splines of the own strain, of yarns that also know the other family's load.
 
-    E1 = E1(eps1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2),
+`spline-ratio`: moduli gain by the load ratio, after Galliot and Luchsinger (2009), of whose form
+`LoadRatio` this is the one with moduli of strain:
 
-and E2 alike: yarns that both carry exchange crimp, a yarn that carries all straightens freely. The
-gains are constants, as those of `LoadRatio` are (Galliot and Luchsinger, 2009), of which this is
-the form with moduli of strain.
+    E1 = E1(eps1) + dE1 (gamma1 - 1/sqrt 2),    gamma1 = n1 / sqrt(n1^2 + n2^2), and E2 alike.
+
+`spline-crimp`: two families that exchange crimp. Yarn axes are zigzags (Kawabata, Niwa and Kawai,
+J. Textile Inst. 64 (1973) 21; the geometry is Peirce's, ibid. 28 (1937) T45) of small slopes r1,
+r2 without load. The crossings move by w: the slopes become r1 - w and r2 + w, and the yarns
+lengthen, in log strain, by
+
+    c1 = r1^2 - (r1 - w)^2,    c2 = r2^2 - (r2 + w)^2   (r^2 is what a yarn gains when straight).
+
+The forces at a crossing balance, s1 (r1 - w) = s2 (r2 + w) + S w, S the bed of the coating:
+
+    w = (r1 s1 - r2 s2) / (S + s1 + s2),    deps = D(eps)^-1 ds + dc(s).
+
+So E1 and E2 are moduli without exchange. c has a potential, (r1 s1 - r2 s2)^2 / (S + s1 + s2),
+convex in tension: its compliance is symmetric, not negative, and does no work along a closed path
+of stress. beta ends with T1 = r1 S, T2 = r2 S and S, all in MPa.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,47 +30,60 @@ import numpy as np
 from .base import EVEN, Array, Offer, register_form
 from .spline import Spline, spline_named
 
-GAINS = ("dE2", "dE1")
+GAINS, CRIMP = ("dE2", "dE1"), ("T1", "T2", "S")
+#: The steepest slope of a yarn without load: 45 degrees would be 0.7 in this measure.
+STEEPEST = 0.5
 
 
 @dataclass(frozen=True)
-class SplineRatio:
-    """A spline at equal loads, followed by the gains of E2 and E1 by their load ratios."""
+class _MoreThanSpline:
+    """A spline, followed by what `more` names."""
 
     spline: Spline
 
-    name = "spline-ratio"
+    more = ("", "")
 
     @property
     def size(self) -> int:
-        return self.spline.size + 2
+        return self.spline.size + len(self.more)
 
     @property
     def free(self) -> tuple[int, ...]:
         return tuple(range(self.size))
 
     @property
-    def modulus_of(self) -> tuple[str, ...]:
-        return (*self.spline.modulus_of, "E2", "E1")
-
-    @property
     def labels(self) -> tuple[str, ...]:
-        return (*self.spline.labels, *GAINS)
+        return (*self.spline.labels, *self.more)
 
     def piece_map(self) -> Array:
         whole = self.spline.piece_map()
-        return np.concatenate([whole, np.zeros((*whole.shape[:-1], 2))], axis=-1)
-
-    def by_load_ratio(self) -> Array:
-        whole = np.zeros((2, self.size))
-        whole[1, -2] = whole[0, -1] = 1.0
-        return whole
+        return np.concatenate([whole, np.zeros((*whole.shape[:-1], len(self.more)))], axis=-1)
 
     def uppers(self) -> Array:
         return self.spline.uppers()
 
     def grid(self, component: int, end: float) -> Array:
         return self.spline.grid(component, end)
+
+    def to_card(self) -> dict[str, Any]:
+        return self.spline.to_card()
+
+
+@dataclass(frozen=True)
+class SplineRatio(_MoreThanSpline):
+    """A spline at equal loads, followed by the gains of E2 and E1 by their load ratios."""
+
+    name = "spline-ratio"
+    more = GAINS
+
+    @property
+    def modulus_of(self) -> tuple[str, ...]:
+        return (*self.spline.modulus_of, "E2", "E1")
+
+    def by_load_ratio(self) -> Array:
+        whole = np.zeros((2, self.size))
+        whole[1, -2] = whole[0, -1] = 1.0
+        return whole
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from moduli at the knots, and at rest where one yarn carries all."""
@@ -66,9 +93,6 @@ class SplineRatio:
             whole[place, first(name)], whole[place, place] = -share, share
         return whole
 
-    def to_card(self) -> dict[str, Any]:
-        return self.spline.to_card()
-
     def describe(self) -> str:
         return (
             f"{self.spline.describe()} E2 and E1 are those at equal loads; dE2 and dE1 are what "
@@ -76,8 +100,45 @@ class SplineRatio:
         )
 
 
-def _named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> SplineRatio:
-    return SplineRatio(spline_named(name, settings, strain_range))
+@dataclass(frozen=True)
+class SplineCrimp(_MoreThanSpline):
+    """A spline of yarns without exchange, followed by T1, T2 and S of their crimp interchange."""
+
+    name = "spline-crimp"
+    more = CRIMP
+    #: Least and largest, MPa: of slopes times S, and of S.
+    own_bounds = {"T": (0.01, 30.0), "S": (0.5, 200.0)}  # noqa: RUF012
+
+    @property
+    def modulus_of(self) -> tuple[str, ...]:
+        return (*self.spline.modulus_of, "T", "T", "S")
+
+    def by_crimp(self) -> Array:
+        return np.eye(self.size)[-3:]
+
+    def own_rows(self, name: str) -> Array:
+        """Return rows (n, size) of what the bounds hold: T, or S and how far slopes may grow."""
+        first, second, bed = self.by_crimp()
+        if name == "T":
+            return np.array([first, second])
+        return np.array([bed, bed - first / STEEPEST, bed - second / STEEPEST])
+
+    def from_values(self, strain_range: Sequence[float]) -> Array:
+        return np.eye(self.size)
+
+    def describe(self) -> str:
+        return (
+            f"{self.spline.describe()} E2 and E1 are those without exchange of crimp; then T1 and "
+            "T2, slopes of the yarns times S, and S, the stress of the bed of the crossings."
+        )
 
 
-register_form(Offer("spline-ratio", _named, ("knots",), of_load_ratio=True))
+for _form in (SplineRatio, SplineCrimp):
+
+    def _named(
+        name: str, settings: Mapping[str, Any], strain_range: Sequence[float],
+        made: type[_MoreThanSpline] = _form,
+    ) -> _MoreThanSpline:  # fmt: skip
+        return made(spline_named(name, settings, strain_range))
+
+    register_form(Offer(_form.name, _named, ("knots",), of_load_ratio=True))  # type: ignore[arg-type]

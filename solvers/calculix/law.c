@@ -136,10 +136,14 @@ typedef struct {
     int count, even;
 } Curve;
 
-/* E1 of eps1, E2 of eps2, G12 of gamma12. */
+/* Of E1 and E2 by their load ratios; then T1, T2 and S of crimp, without it zero; MPa. */
+enum { GAIN1, GAIN2, CRIMP1, CRIMP2, BED, COUPLINGS };
+
+/* E1 of eps1, E2 of eps2, G12 of gamma12, and how the yarns act on each other. */
 typedef struct Law {
     double number;
     Curve curve[3];
+    double coupling[COUPLINGS];
     struct Law *next;
 } Law;
 
@@ -158,6 +162,8 @@ static Law *read_law(const char *name, double number) {
     double(*rows)[A_PIECE] = good ? malloc(sizeof *rows * (size_t)all) : 0;
     for (int i = 0; rows && i < A_PIECE * all; i++)
         good = good && fscanf(file, "%lf", rows[0] + i) == 1;
+    double coupling[COUPLINGS] = {0};
+    for (int i = 0; i < COUPLINGS && fscanf(file, "%lf", coupling + i) == 1;) i++;
     fclose(file);
     if (good && rows) law = malloc(sizeof *law);
     if (!law) {
@@ -165,6 +171,7 @@ static Law *read_law(const char *name, double number) {
         return 0;
     }
     law->number = number, law->next = 0;
+    memcpy(law->coupling, coupling, sizeof coupling);
     for (int i = 0; i < 3; rows += counts[i++]) {
         Curve c = {rows, counts[i], i == 2};
         law->curve[i] = c;
@@ -261,29 +268,151 @@ static Modulus modulus(Curve c, double x, double x_old) {
     return m;
 }
 
+/* The stiffness along the yarns, its derivatives by E1 and E2, and how the stress depends on
+ * itself: a change r at fixed ratio and exchange is a change `ahead` r of it altogether. */
+typedef struct {
+    double d11, d12, d22, d11_warp, d11_fill, d22_warp, d22_fill, dh[2], ahead[2][2];
+} Plane;
+
+/* 0 when a modulus or 1 - nu12 nu21 is not positive. */
+static int stiffness_of(double warp, double fill, double nu, Plane *p) {
+    if (!(fill > 0 && warp > 0)) return 0;
+    double ratio = nu * nu / warp, den = 1 - ratio * fill;
+    if (!(den > 1e-3)) return 0;
+    p->d11 = warp / den, p->d22 = fill / den, p->d12 = nu * p->d22;
+    p->d11_warp = (1 - 2 * ratio * fill) / (den * den), p->d11_fill = nu * nu / (den * den);
+    p->d22_warp = -ratio * fill * fill / warp / (den * den), p->d22_fill = 1 / (den * den);
+    return 1;
+}
+
+/* Angle of the load ratio of two stresses and its derivatives, point_law.py `load_angle`. */
+static double load_angle(double warp, double fill, double by[2]) {
+    double square = warp * warp + fill * fill, right = 0.5 * acos(-1.0);
+    by[0] = by[1] = 0;
+    if (warp > 0 || fill > 0) {
+        if (warp <= 0) return right;
+        if (fill <= 0) return 0;
+        if (square > 0) by[0] = -fill / square, by[1] = warp / square;
+        return atan2(fill, warp);
+    }
+    if (square == 0) return 0.5 * right;
+    by[0] = fill / square, by[1] = -warp / square;
+    return atan2(-warp, -fill);
+}
+
+/* Moduli at the load ratio of the increment's mean stress; point_law.py `mean_ratio`. */
+static int at_mean_ratio(const double *k, double *warp, double *fill, double nu,
+                         const double *old, Plane *p) {
+    const double even = sqrt(0.5), right = 0.5 * acos(-1.0), *dh = p->dh;
+    double unused[2], angle = load_angle(old[0], old[1], unused), low = 0, high = right;
+    double e1 = 0, e2 = 0, turn = 0, u[2] = {0}, w[2] = {0};
+    for (int i = 0; i < 60; i++) {
+        double c = cos(angle), s = sin(angle);
+        e1 = *warp + k[GAIN1] * (c - even), e2 = *fill + k[GAIN2] * (s - even);
+        if (!stiffness_of(e1, e2, nu, p)) return 0;
+        double by1 = -k[GAIN1] * s, by2 = k[GAIN2] * c;
+        double d11_by = p->d11_warp * by1 + p->d11_fill * by2;
+        double d22_by = p->d22_warp * by1 + p->d22_fill * by2;
+        u[0] = 0.5 * (d11_by * dh[0] + nu * d22_by * dh[1]);
+        u[1] = 0.5 * (nu * d22_by * dh[0] + d22_by * dh[1]);
+        double at = load_angle(old[0] + 0.5 * (p->d11 * dh[0] + p->d12 * dh[1]),
+                               old[1] + 0.5 * (p->d12 * dh[0] + p->d22 * dh[1]), w);
+        turn = 1 - (w[0] * u[0] + w[1] * u[1]);
+        double off = at - angle;
+        if (fabs(off) <= 1e-15 || off != off) break;
+        *(off > 0 ? &low : &high) = angle;
+        double next = turn > 0 ? angle + off / turn : -1;
+        if (!(low < next && next < high)) {
+            int end = (at == 0 || at == right) && low <= at && at <= high;
+            next = end ? at : 0.5 * (low + high);
+        }
+        if (fabs(next - angle) <= 1e-15) break;
+        angle = next;
+    }
+    if (!(turn > 0)) return 0;
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) p->ahead[i][j] = (i == j) + u[i] * w[j] / turn;
+    *warp = e1, *fill = e2;
+    return 1;
+}
+
+/* Exchange of crimp w at two stresses, and its derivatives; point_law.py `_exchanged`. */
+static double exchanged(const double *s, double r1, double r2, double bed, double by[2]) {
+    double whole = bed + s[0] + s[1], pull = fmax(whole, 0.5 * bed), free = whole >= 0.5 * bed;
+    double w = (r1 * s[0] - r2 * s[1]) / pull;
+    by[0] = (r1 - free * w) / pull, by[1] = -(r2 + free * w) / pull;
+    if (w < r1 && w > -r2) return w;
+    by[0] = by[1] = 0;
+    return w >= r1 ? r1 : -r2;
+}
+
+/* Stress after an increment with crimp, and the yarns' part of it; point_law.py `exchange`. */
+static int exchange(const double *k, const double *old, double *s, Plane *p) {
+    double bed = k[BED], r1 = k[CRIMP1] / bed, r2 = k[CRIMP2] / bed, by[2], e[2] = {0};
+    if (!(bed > 0)) return 0;
+    double before = exchanged(old, r1, r2, bed, by), w = before, low = -r2, high = r1;
+    for (int i = 0; i < 60; i++) {
+        e[0] = p->dh[0] - (2 * r1 - w) * w + (2 * r1 - before) * before;
+        e[1] = p->dh[1] + (2 * r2 + w) * w - (2 * r2 + before) * before;
+        s[0] = old[0] + p->d11 * e[0] + p->d12 * e[1];
+        s[1] = old[1] + p->d12 * e[0] + p->d22 * e[1];
+        double whole = bed + s[0] + s[1], pull = fmax(whole, 0.5 * bed);
+        double free = whole >= 0.5 * bed, off = w * pull - r1 * s[0] + r2 * s[1];
+        if (off != off) return 0;
+        if ((w == r1 && off <= 0) || (w == -r2 && off >= 0)) break;
+        *(off > 0 ? &high : &low) = w;
+        double dg0 = p->d11 * (r1 - w) - p->d12 * (r2 + w);
+        double dg1 = p->d12 * (r1 - w) - p->d22 * (r2 + w);
+        double steep = pull + 2 * ((r1 - free * w) * dg0 - (r2 + free * w) * dg1);
+        double next = steep > 0 ? w - off / steep : INFINITY;
+        if (!(low < next && next < high)) {
+            double beyond = next >= high ? r1 : -r2;
+            next = beyond == low || beyond == high ? beyond : 0.5 * (low + high);
+        }
+        if (fabs(next - w) <= 1e-15) break;
+        w = next;
+    }
+    exchanged(s, r1, r2, bed, by);
+    if (w == r1 || w == -r2) by[0] = by[1] = 0;
+    double g[2] = {2 * (r1 - w), -2 * (r2 + w)}, dg[2];
+    dg[0] = p->d11 * g[0] + p->d12 * g[1], dg[1] = p->d12 * g[0] + p->d22 * g[1];
+    double whole = 1 + by[0] * dg[0] + by[1] * dg[1];
+    if (!(whole > 0)) return 0;
+    for (int i = 0; i < 2; i++) {
+        p->dh[i] = e[i];
+        for (int j = 0; j < 2; j++) p->ahead[i][j] = (i == j) - dg[i] * by[j] / whole;
+    }
+    return 1;
+}
+
 /* s = s_old + D (h - h_old) and d = ds/dh; 0 when a modulus or 1 - nu12 nu21 is not positive. */
-static int stress_update(const Curve *curve, double nu, const double *h, const double *h_old,
+static int stress_update(const Law *law, double nu, const double *h, const double *h_old,
                          const double *s_old, double *s, double d[3][3]) {
+    const Curve *curve = law->curve;
+    const double *k = law->coupling;
     Modulus e1 = modulus(curve[0], h[0], h_old[0]), e2 = modulus(curve[1], h[1], h_old[1]);
     Modulus g12 = modulus(curve[2], h[2], h_old[2]);
     double warp = e1.value, fill = e2.value, shear = g12.value;
     double slope1 = e1.slope, slope2 = e2.slope, slope3 = g12.slope;
-    if (!(shear > 0 && fill > 0 && warp > 0)) return 0;
-    double ratio = nu * nu / warp, den = 1 - ratio * fill;
-    if (!(den > 1e-3)) return 0;
-    double d11 = warp / den, d22 = fill / den, d12 = nu * d22;
-    /* Derivatives of d11 and d22 (and d12 = nu d22) with respect to the moduli. */
-    double d11_warp = (1 - 2 * ratio * fill) / (den * den), d11_fill = nu * nu / (den * den);
-    double d22_warp = -ratio * fill * fill / warp / (den * den), d22_fill = 1 / (den * den);
-    double dh[3] = {h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]};
-    s[0] = s_old[0] + d11 * dh[0] + d12 * dh[1];
-    s[1] = s_old[1] + d12 * dh[0] + d22 * dh[1];
-    s[2] = s_old[2] + shear * dh[2];
-    d[0][0] = d11 + slope1 * (d11_warp * dh[0] + nu * d22_warp * dh[1]);
-    d[0][1] = d12 + slope2 * (d11_fill * dh[0] + nu * d22_fill * dh[1]);
-    d[1][0] = d12 + slope1 * (nu * d22_warp * dh[0] + d22_warp * dh[1]);
-    d[1][1] = d22 + slope2 * (nu * d22_fill * dh[0] + d22_fill * dh[1]);
-    d[2][2] = shear + slope3 * dh[2];
+    Plane p = {.dh = {h[0] - h_old[0], h[1] - h_old[1]}, .ahead = {{1, 0}, {0, 1}}};
+    if (!(shear > 0)) return 0;
+    if ((k[GAIN1] != 0 || k[GAIN2] != 0) && !at_mean_ratio(k, &warp, &fill, nu, s_old, &p))
+        return 0;
+    if (!stiffness_of(warp, fill, nu, &p)) return 0;
+    s[0] = s_old[0] + p.d11 * p.dh[0] + p.d12 * p.dh[1];
+    s[1] = s_old[1] + p.d12 * p.dh[0] + p.d22 * p.dh[1];
+    if (k[BED] != 0 && !exchange(k, s_old, s, &p)) return 0;
+    const double *dh = p.dh;
+    s[2] = s_old[2] + shear * (h[2] - h_old[2]);
+    d[0][0] = p.d11 + slope1 * (p.d11_warp * dh[0] + nu * p.d22_warp * dh[1]);
+    d[0][1] = p.d12 + slope2 * (p.d11_fill * dh[0] + nu * p.d22_fill * dh[1]);
+    d[1][0] = p.d12 + slope1 * (nu * p.d22_warp * dh[0] + p.d22_warp * dh[1]);
+    d[1][1] = p.d22 + slope2 * (nu * p.d22_fill * dh[0] + p.d22_fill * dh[1]);
+    for (int j = 0; j < 2; j++) {
+        double first = d[0][j], second = d[1][j];
+        for (int i = 0; i < 2; i++) d[i][j] = p.ahead[i][0] * first + p.ahead[i][1] * second;
+    }
+    d[2][2] = shear + slope3 * (h[2] - h_old[2]);
     d[0][2] = d[1][2] = d[2][0] = d[2][1] = 0;
     return 1;
 }
@@ -311,12 +440,12 @@ static void pull_back(double m, double q, double c, const double *t, double *s, 
 }
 
 /* In-plane S = (S11, S22, S12), g = dS/dE with engineering shear, and the new state. */
-static int membrane_stress(const Curve *curve, const double *k, double c11, double c22, double c12,
+static int membrane_stress(const Law *law, const double *k, double c11, double c22, double c12,
                            const double *old, double *state, double *s, double g[3][3]) {
     double m = 0.5 * (c11 + c22), q = 0.5 * (c11 - c22), p[3][3], d[3][3], w[3][3], t[3];
     double *h = state, *sigma = state + 3;
     if (!log_strain(m, q, c12, h, p)) return 0;
-    if (!stress_update(curve, k[NU12], h, old, old + 3, sigma, d)) return 0;
+    if (!stress_update(law, k[NU12], h, old, old + 3, sigma, d)) return 0;
     double power = k[AREA_POWER], ratio = exp(power * (h[0] + h[1]));
     for (int i = 0; i < 3; i++) t[i] = ratio * sigma[i];
     pull_back(m, q, c12, t, s, w, g);
@@ -368,7 +497,7 @@ void HYPOELASTIC(const char *amat, const int *iel, const int *iint, const int *k
         for (int i = 0; i < 3; i++)
             f[n][i] = xkl[i] * a[n][0] + xkl[i + 3] * a[n][1] + xkl[i + 6] * a[n][2];
     double c11 = dot(f[0], f[0]), c22 = dot(f[1], f[1]), c12 = dot(f[0], f[1]);
-    int good = membrane_stress(law->curve, k, c11, c22, c12, old, state, plane, g);
+    int good = membrane_stress(law, k, c11, c22, c12, old, state, plane, g);
     double normal = 0.5 * (dot(f[2], f[2]) - 1);
     double shear1 = dot(f[0], f[2]), shear2 = dot(f[1], f[2]);
     good = good && isfinite(normal) && isfinite(shear1) && isfinite(shear2);

@@ -33,7 +33,8 @@ def law_number(law: HypoelasticLaw) -> int:
 
 
 def law_text(law: HypoelasticLaw) -> str:
-    """Return the file: title, number, counts of pieces; a line a piece: its end, coefficients."""
+    """Return the file: title, number, counts of pieces; a line a piece: its end, coefficients; one
+    of gains by load ratios and constants of crimp, if any."""
     return f"{TITLE} {law_number(law)}\n{_numbers(law)}"
 
 
@@ -43,10 +44,12 @@ def law_files(law: HypoelasticLaw) -> dict[str, str]:
 
 
 def _numbers(law: HypoelasticLaw) -> str:
-    constants = piece_constants(law)
-    counts, pieces = constants[:3], constants[3:]
+    constants = piece_constants(law, coupled=True)
+    counts, numbers = constants[:3], list(constants[3:])
+    if law.of_load_ratio:  # gains of E1 and E2, then T1, T2 and S
+        numbers += [*law.coupling[1:], *[0.0] * 3][:5]
     rows = [[f"{count:.0f}" for count in counts]]
-    rows += [[repr(value) for value in pieces[i : i + 5]] for i in range(0, len(pieces), 5)]
+    rows += [[repr(float(x)) for x in numbers[i : i + 5]] for i in range(0, len(numbers), 5)]
     return "".join(" ".join(row) + "\n" for row in rows)
 
 
@@ -81,7 +84,7 @@ def constants(
     transverse_shear = max(float(law.G12(0.0)), LEAST)
     whole = -float(whole_until) if whole_until else float(whole_times)
     shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), whole)
-    moduli = (float(law_number(law)), sum(piece_constants(law)[:3]))
+    moduli = (float(law_number(law)), sum(piece_constants(law, coupled=True)[:3]))
     return (law.nu12, law.area_power, *shape, *moduli)
 
 
@@ -154,4 +157,4 @@ def calculix(card: MaterialCard, options: NoOptions) -> Export:
     return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
 
 
-FORMAT = Format("calculix", calculix)
+FORMAT = Format("calculix", calculix, load_ratios=True)

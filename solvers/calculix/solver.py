@@ -59,7 +59,7 @@ class CalculixSolver:
     """
 
     name = "calculix"
-    external = True
+    external = load_ratios = True
 
     def __init__(
         self, ccx: Path | str | None = None, templates: Path | None = None, element: str = "S8R",

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import compiled
-from ...materials.memory import BY_X, ON, PLAIN, RECALLED, remember
+from ...materials.memory import BY_X, ON, RECALLED, remember
 from ...materials.pieces import by_pieces
-from ...materials.point_law import BEFORE3, FAST, G12, SLOPES, membrane_stress, stress_rate
+from ...materials.point_law import BEFORE3, CRIMPED, FAST, G12, SLOPES, membrane_stress, stress_rate
 from ...materials.wrinkles import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
@@ -241,7 +241,7 @@ def explicit(  # type: ignore[no-untyped-def]
     """
     nu, count = coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
-    remembers, memory = coupling.shape[0] > PLAIN, np.empty(RECALLED)
+    remembers, memory = coupling.shape[0] > CRIMPED, np.empty(RECALLED)
     h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
     weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

@@ -404,7 +404,7 @@ THING = Offer("acme", make, ("knee",))
 
 
 def test_ours_are_there_and_say_their_settings():
-    ours = (*DEGREES, "load-ratio", "spline-ratio", "spline", "trilinear")
+    ours = (*DEGREES, "load-ratio", "spline-ratio", "spline-crimp", "spline", "trilinear")
     assert form_names()[: len(ours)] == ours
     assert form_settings("cubic") == () and form_settings("spline") == ("knots",)
     assert form_settings("nothere") == ()

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.errors import OutputError, SolverFailure
+from bubblefit.materials.forms.polynomial import LoadRatio
+from bubblefit.materials.forms.ratio import SplineCrimp, SplineRatio
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.calculix import library
@@ -22,7 +24,19 @@ from bubblefit.solvers.calculix.library import (
 )
 
 from ... import needs
-from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere
+from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere, spline
+
+KNOTTED, ENDS = spline(), np.full(3, 0.13)
+#: Laws of strain, and those that also know the loads of both yarns.
+LAWS = LAWS | {
+    "load ratio": HypoelasticLaw(np.array([30.0, 800.0, 400.0, 1000.0, -300.0]), form=LoadRatio()),
+    "spline, load ratio": HypoelasticLaw(
+        np.array([*KNOTTED.beta, 40.0, -30.0]), 0.24, ENDS, form=SplineRatio(KNOTTED.form)
+    ),
+    "spline, crimp": HypoelasticLaw(
+        np.array([*KNOTTED.beta, 1.5, 2.5, 12.0]), 0.24, ENDS, form=SplineCrimp(KNOTTED.form)
+    ),
+}
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
