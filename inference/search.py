@@ -18,6 +18,7 @@ from .unknowns import MOST_DRAWS, LawBounds, Unknowns
 NOT_WORTH_A_RUN = 0.1  # relative decrease of e by one run
 SHORTER, MOST_SHORTER = 0.5, 3  # of a step that worsened e; such steps in a row
 MOST_ANALYSES = 50  # of a start, at random points
+LEADING = 0.3  # of the analyses of a start, each stage that leads in
 #: MPa: the law is given and not looked for; bounds only size the unknowns.
 ANY = {"E1": (1e-3, 1e6), "E2": (1e-3, 1e6), "G12": (1e-3, 1e6)}
 #: Analyses in which what is no law (offsets, the sheet's surface) is fitted to the tests.
@@ -28,14 +29,16 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     """Return unknowns at the optimum of the comparisons that lead in; `start` without any.
     Those of the lowest stage are matched first, then those of the lowest two, and so on: from a
     random start nearly every step can end without an equilibrium of one that is hard to run (bias
-    strips). `start` also where a comparison fails at the optimum of the others."""
+    strips). `start` also where a comparison fails at the optimum of the others. A stage takes
+    `LEADING` of the analyses at most: what it leaves undecided, the others may decide."""
     stages = sorted({c.stage for c in problem.comparisons})
     if len(stages) < 2:
         return start
     y = start
     for last in stages[:-1]:
         part = problem.part([k for k, c in enumerate(problem.comparisons) if c.stage <= last])
-        optimum = method.minimise(part, y, options)
+        most = problem.analyses + int(LEADING * options.max_analyses)
+        optimum = method.minimise(part, y, replace(options, max_analyses=most))
         problem.analyses = part.analyses
         if problem.analyses >= options.max_analyses:
             return start

@@ -23,7 +23,7 @@ of stress. beta ends with T1 = r1 S, T2 = r2 S and S, all in MPa.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class _MoreThanSpline:
 
     spline: Spline
 
-    more = ("", "")
+    more: ClassVar[tuple[str, ...]] = ()
 
     @property
     def size(self) -> int:
@@ -107,7 +107,9 @@ class SplineCrimp(_MoreThanSpline):
     name = "spline-crimp"
     more = CRIMP
     #: Least and largest, MPa: of slopes times S, and of S.
-    own_bounds = {"T": (0.01, 30.0), "S": (0.5, 200.0)}  # noqa: RUF012
+    own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "T": (0.01, 30.0), "S": (0.5, 200.0)
+    }  # fmt: skip
 
     @property
     def modulus_of(self) -> tuple[str, ...]:
