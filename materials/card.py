@@ -27,6 +27,7 @@ from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
 from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
+from .responses import ClosedPath, closed_path
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
@@ -168,6 +169,12 @@ class MaterialCard:
     certainty: CardCertainty | None = None
     state: State = ""
 
+    @property
+    def closed_path(self) -> ClosedPath:
+        """Return the work of a closed path of strain to the ends of the range, which is none of a
+        law that has an energy: hypoelastic ones have it only in part."""
+        return closed_path(self.law)
+
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         write_card(self, Path(path), unit)
 
@@ -188,7 +195,8 @@ class MaterialCard:
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
         sure = self.certainty
         band = None if sure is None else functools.partial(sure.band, self.law)
-        return moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
+        table = moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
+        return f"{table}<p>{self.closed_path.words}</p>"
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
@@ -225,6 +233,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}
     words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
+    words = (*words, card.closed_path.words)
     header = "".join(f"# {line}\n" for line in words)
     text = header + tomli_w.dumps(content) + _bands_text(sure, scale) + _pieces_text(pieces)
     write_text(path, text)

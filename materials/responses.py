@@ -8,7 +8,8 @@ Biaxial: a patch without shear, loads per width before the test, an increment a 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -252,6 +253,54 @@ def _path(  # type: ignore[no-untyped-def]
         h_old[:] = h
         s_old[:] = s
     return len(loads)
+
+
+#: Increments of each side of a closed path; strain to which it goes along yarns without a range.
+SIDE, REACH_CLOSED = 40, 0.05
+
+
+@dataclass(frozen=True)
+class ClosedPath:
+    """The work of a law along strains 0, (a, 0), (a, b), (0, b), 0 of warp and fill.
+
+    ends : a and b, log strain. work : MPa, of the whole path; NaN where the law ends before.
+    share : of the work from rest to (a, b). A law that has an energy does none.
+    """
+
+    ends: tuple[float, float]
+    work: float
+    share: float
+
+    @property
+    def words(self) -> str:
+        corners = "0, (a, 0), (a, b), (0, b), 0"
+        words = f"Work of the path of log strains {corners} with a, b = {self.ends[0]:.4g}, "
+        words += f"{self.ends[1]:.4g}"
+        if not np.isfinite(self.work):
+            return f"{words} is not known: the law ends on the way."
+        return f"{words}: {self.work:.3g} MPa, {100 * self.share:.2g} % of that to (a, b)."
+
+
+def closed_path(
+    law: HypoelasticLaw, ends: Sequence[float] | None = None, side: int = SIDE
+) -> ClosedPath:
+    """Return the work of first loading along a closed path; ends : those of the law's range, or
+    5 % where it has none, unless given. side : increments of each of its four sides."""
+    range_ = [float(end) for end in law.strain_range[:2]]
+    a, b = ends or [end if end < UNLIMITED else REACH_CLOSED for end in range_]
+    plain = law if law.memory is None else replace(law, memory=None)
+    shares = np.arange(1, side + 1) / side
+    corners = np.array([(0.0, 0.0), (a, 0.0), (a, b), (0.0, b), (0.0, 0.0)])
+    strain, stress, work = np.zeros((1, 3)), np.zeros((1, 3)), [0.0]
+    for start, end in pairwise(corners):
+        for share in shares:
+            new = np.array([[*(start + share * (end - start)), 0.0]])
+            after, _ = plain.increment(strain, new, stress)
+            work.append(float(0.5 * ((after + stress) * (new - strain)).sum()))
+            strain, stress = new, after
+    return ClosedPath(
+        (a, b), float(np.sum(work)), float(np.sum(work) / np.sum(work[: 2 * side + 1]))
+    )
 
 
 #: kN/m: no fabric carries more. Halvings by which the end is found; increments of the law.

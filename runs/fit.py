@@ -27,7 +27,7 @@ from ..experiments.kinds import (
 from ..experiments.own import OwnTest
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
-from ..inference.problem import FitProblem
+from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.objects import Definition, Law, plain
 from ..project.project import Project, settings_of
@@ -116,7 +116,7 @@ AS_GOOD = 1e-4
 
 
 def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> str:
-    """Describe whether starts end in one optimum, or that more are wanted; "" for one start."""
+    """Describe in how many optima starts end, and whether more are wanted; "" for one start."""
     ended = [record for record in ranking(records) if record.objective is not None]
     if len(ended) < 2:
         return ""
@@ -130,12 +130,15 @@ def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Proj
     said = f"starts{first if project.fit.starts_from == 'estimate' else ''} end in"
     if best == len(ended):
         return f"all {best} {said} the same optimum"
+    optima = f"{len(groups)} distinct optima"
+    if unfinished := sum(one.status == ANALYSES_USED_UP for one in ended):
+        optima += f", {unfinished} starts not converged"
     if best > 1:
-        return f"{best} of {len(ended)} {said} the best optimum, the others in worse ones"
+        return f"{best} of {len(ended)} {said} the best of {optima}"
     return (
-        f"only one of {len(ended)} {said} the best optimum (objective {ended[0].objective:.4g}, "
-        f"the next {ended[1].objective:.4g}): there may be a better one, and more starts are "
-        f"wanted (--starts {MORE * len(ended)} --starts-from random)"
+        f"only one of {len(ended)} {said} the best of {optima} (objective "
+        f"{ended[0].objective:.4g}, the next {ended[1].objective:.4g}): there may be a better one, "
+        f"and more starts are wanted (--starts {MORE * len(ended)} --starts-from random)"
     )
 
 

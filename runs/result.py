@@ -30,7 +30,7 @@ from ..files import __version__, html_table
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
 from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import LEVEL, Posterior
-from ..inference.problem import FitProblem
+from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..materials.card import MaterialCard
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 #: Kinds of notes that are made here.
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
+NOT_CONVERGED = NoteKind("not converged", weight=9)
 
 
 Array = NDArray[np.float64]
@@ -520,7 +521,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         ],
         "coarse_to_fine": None if fit.coarse_to_fine is None else fit.coarse_to_fine.to_json(),
         **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
-        "warnings": [], "notes": [], "wall_s": fit.wall_s, "versions": versions(),
+        "optima": fit.agreement, "warnings": [], "notes": [], "wall_s": fit.wall_s,
+        "versions": versions(),
     }  # fmt: skip
     result["misfit"] = {name: {**asdict(m), "times_noise": m.ratio if m.noise > 0 else None}
                         for name, m in fit.misfits.items()}  # fmt: skip
@@ -613,6 +615,10 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
         said = f"{len(cut)} of {len(best.records)} starts ended because {fit.project.fit.solver} "
         said += f"failed ({cut[0].failure}): --resume tries them again"
         notes.append(Note(STARTS, said))
+    first = best.ranked[0]
+    if first.status == ANALYSES_USED_UP:
+        said = f"the best start used up its {first.analyses} analyses while its steps still gained:"
+        notes.append(Note(NOT_CONVERGED, f"{said} not converged, raise fit.max_analyses"))
     notes += [note for judgement in fit.judgements for note in judgement.notes]
     ends = np.asarray(fit.law.strain_range)
     # What the solver that counts does not look at, the one that leads may have.

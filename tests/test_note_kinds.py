@@ -47,7 +47,7 @@ from bubblefit.runs.poisson import vary_nu12
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED
 from bubblefit.runs.refinement import refine
-from bubblefit.runs.result import ALONE, STARTS
+from bubblefit.runs.result import ALONE, NOT_CONVERGED, STARTS
 from bubblefit.runs.simulation import FAILED, simulate_cards
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import EARLY, SNAP
@@ -107,6 +107,7 @@ CASES = (
      r"one: warp: warp strain reached 13\.\d %, beyond law\.strain_range of 12 %"),
     (STARTS, fits.notes_of_fit,
      r"1 of 2 starts ended because membrane failed \(one: warp: too tired\)"),
+    (NOT_CONVERGED, fits.notes_of_fit, r"used up its \d+ analyses while its steps still gained"),
     (UNCERTAIN, fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),
     (MESH, fits.notes_of_mesh, r"on a fine mesh E1 would be \+4 % at 5 % of strain"),
     (UNKNOWN, fits.notes_of_no_mesh, "the error of the mesh is not known: membrane: it breaks"),
