@@ -232,8 +232,10 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     if sure is not None:
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}
-    words = "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD
-    words = (*words, card.closed_path.words)
+    words = [
+        "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD,
+        card.closed_path.words,
+    ]  # fmt: skip
     header = "".join(f"# {line}\n" for line in words)
     text = header + tomli_w.dumps(content) + _bands_text(sure, scale) + _pieces_text(pieces)
     write_text(path, text)
