@@ -55,6 +55,8 @@ LAWS = {
     "spline, incompressible": spline(thickness_change="incompressible"),
     "jumps and kinks": piecewise_law(*MIXED),
 }
+#: E1 is gone at 5 % of strain along the warp.
+GONE = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
 
 
 def build(folder, source, *flags, beside=""):

@@ -41,6 +41,7 @@ from .. import needs
 from ..complaints import complaint
 from ..fortran_build import (
     BETA,
+    GONE,
     KNOTS,
     LAWS,
     SIZES,
@@ -50,8 +51,8 @@ from ..fortran_build import (
     increments_everywhere,
     reals,
     strain_path,
+    trilinear,
 )
-from ..published_laws import TABLE_4_2
 from ..solvers.calculix.test_calculix_law import check_patch, patch_deck
 
 CARD = MaterialCard(LAWS["cubic"], 0.8, "Valmex 7318", "Table 4.2")
@@ -92,9 +93,6 @@ def test_curves_of_every_measure_do_the_same_work(name):
     np.testing.assert_allclose(cumulative_trapezoid(stress, angles), work, rtol=1e-4, atol=1e-9)
     gamma, _, _ = trellis_curve(law, angles[1:], "true")
     assert [trellis_angle(g) for g in gamma] == pytest.approx(list(angles[1:]), rel=1e-9)
-
-
-GONE = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
 
 
 def test_a_law_that_fails_on_the_way_has_no_curve():
@@ -394,11 +392,8 @@ def test_json_points_and_a_missing_card(folder):
             assert entry.metadata["option"].help.endswith(".")
 
 
-TABLE = 1e3 * np.array(TABLE_4_2)
-CUBIC = HypoelasticLaw(TABLE, strain_range=np.array([0.13, 0.12, 0.14]))
-MODULI_3 = ((800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0))
-BREAKS = [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]]
-TRILINEAR = HypoelasticLaw.trilinear(*MODULI_3, BREAKS, strain_range=[0.13, 0.05, 0.008])
+CUBIC = HypoelasticLaw(BETA, strain_range=np.array([0.13, 0.12, 0.14]))
+TRILINEAR = LAWS["tri-linear, held"]
 
 
 def test_the_published_cubic_to_the_stated_error():
@@ -418,9 +413,9 @@ def test_the_published_cubic_to_the_stated_error():
     assert np.array_equal(shear.strain, -shear.strain[::-1]) and tables["E1"].strain[0] == 0
     coarse, fine = (modulus_table(CUBIC, "E1", points).error for points in (61, 121))
     assert coarse / fine == pytest.approx(4.0, rel=0.1)
-    table = modulus_table(HypoelasticLaw(TABLE), "E1")
+    table = modulus_table(HypoelasticLaw(BETA), "E1")
     assert not table.reaches and table.strain[-1] == REACH
-    assert modulus_table(HypoelasticLaw(TABLE), "E1", reach=0.1).strain[-1] == 0.1
+    assert modulus_table(HypoelasticLaw(BETA), "E1", reach=0.1).strain[-1] == 0.1
     assert "points" in complaint(modulus_table, CUBIC, "E1", 1)
     assert "reach" in complaint(modulus_table, CUBIC, "E1", reach=0.0)
 
@@ -457,7 +452,7 @@ def test_a_spline_to_the_stated_error_with_a_point_at_every_knot():
 
 @pytest.mark.parametrize("left", [1e-9, 5e-7, 1e-6, 2e-6, 1e-5])
 def test_a_jump_just_before_the_end_of_the_range_is_in_the_table(left):
-    short = HypoelasticLaw.trilinear(*MODULI_3, BREAKS, strain_range=[0.01 + left, 0.2, 0.2])
+    short = trilinear(strain_range=[0.01 + left, 0.2, 0.2])
     table = modulus_table(short, "E1")
     assert table.strain[-1] == 0.01 + left and table.error == 0
     assert table.at(0.01) == 800 and table.at(0.02) == 450
@@ -580,9 +575,7 @@ def test_increments_of_any_size_from_anywhere(library, name, size):
 
 
 def test_a_modulus_that_runs_out_asks_for_half_the_increment(library):
-    # E1 is gone at 5 % strain.
-    law = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
-    point = Point(library, properties(exported(law)))
+    point = Point(library, properties(exported(GONE)))
     before = point.commit(reals(0.04, 0.0, 0.0))[0].copy()
     for increment in (reals(0.04, 0.0, 0.0), reals(np.nan, 0.0, 0.0)):
         stress, stiffness, request, _ = point.call(increment)

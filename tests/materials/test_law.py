@@ -13,16 +13,13 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import logm, polar, sqrtm
 
 from ..complaints import complaint
-from ..published_laws import TABLE_4_2
+from ..fortran_build import BETA, BREAKS, MODULI
 from .forms.test_forms import follow
 
-BETA = 1e3 * np.array(TABLE_4_2)
 RANGE = [0.13, 0.13, 0.13]
 E1, E2, G12, NU = 300.0, 220.0, 5.0, 0.24
 CONSTANT = HypoelasticLaw.linear(E1, E2, G12, NU)
-MODULI_3 = ((800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0))
-BREAKS = np.array([[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]])
-LAW = HypoelasticLaw.trilinear(*MODULI_3, BREAKS, NU)
+LAW = HypoelasticLaw.trilinear(*MODULI, BREAKS, NU)
 BOTH = pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
 
 
@@ -221,7 +218,7 @@ def test_bad_constants_name_their_field(field, value):
     assert field in complaint(HypoelasticLaw, **{"beta": BETA, field: value})
 
 
-VALUES = dict(zip(("E1", "E2", "G12"), MODULI_3, strict=True))
+VALUES = dict(zip(("E1", "E2", "G12"), MODULI, strict=True))
 
 
 def test_layout_and_form():
@@ -243,7 +240,7 @@ def test_layout_and_form():
         assert (LAW.modulus(name, -strains) == (expected if name == "G12" else low)).all()
     stress, tangent = LAW.increment(np.zeros(3), [0.01, np.nan, 0.0], np.zeros(3))
     assert np.isnan(stress).all() and np.isnan(tangent).all()
-    law = HypoelasticLaw.trilinear(MODULI_3[0], (140.0, -300.0, 240.0), MODULI_3[2], BREAKS, NU)
+    law = HypoelasticLaw.trilinear(MODULI[0], (140.0, -300.0, 240.0), MODULI[2], BREAKS, NU)
     assert np.isfinite(law.increment(np.zeros(3), [0.0, 0.02, 0.0], np.zeros(3))[0]).all()
     assert np.isnan(law.increment(np.zeros(3), [0.0, 0.05, 0.0], np.zeros(3))[0]).all()
 
@@ -257,11 +254,11 @@ BAD_BREAKS = [
 
 @pytest.mark.parametrize("breaks", BAD_BREAKS)
 def test_bad_breaks_are_named(breaks):
-    assert "breaks" in complaint(HypoelasticLaw.trilinear, *MODULI_3, breaks)
+    assert "breaks" in complaint(HypoelasticLaw.trilinear, *MODULI, breaks)
 
 
 @pytest.mark.parametrize("place", [0, 4, 8])
 def test_a_coefficient_that_the_law_does_not_have_is_named(place):
     beta = LAW.beta + (np.arange(12) == place)
     assert f"beta_{place}" in complaint(LAW.with_beta, beta)
-    assert "E2" in complaint(HypoelasticLaw.trilinear, MODULI_3[0], (1.0, 2.0), MODULI_3[2], BREAKS)
+    assert "E2" in complaint(HypoelasticLaw.trilinear, MODULI[0], (1.0, 2.0), MODULI[2], BREAKS)

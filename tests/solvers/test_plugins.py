@@ -20,7 +20,7 @@ from bubblefit.solvers.registry import checked, solver_named
 from click.testing import CliRunner
 
 from ..commands import in_process
-from ..fortran_build import BETA, LAWS
+from ..fortran_build import BETA, GONE, LAWS
 from ..places import EXAMPLES, ROOT
 from ..plug_ins import install
 
@@ -110,10 +110,9 @@ def test_the_examples_failures_have_their_reasons(example, tmp_path):
     warp, bias = straight_strip("warp", 20.0, 22.0, 0.81), bias_strip(20.0, 25.0, 0.81)
     with pytest.raises(SolverFailure, match="homogeneous: takes strips along warp or fill only"):
         solver.run(bias, LAW)
-    gone = HypoelasticLaw(np.r_[0, 0, 0, 20.0, 0, 0, 0, 100.0, 0, 0, -1e4, 500.0])
     words = r"a modulus is not positive \(exit number 3\)"
     with pytest.raises(SolverFailure, match=words) as found:
-        solver.run(warp, gone, tmp_path)
+        solver.run(warp, GONE, tmp_path)
     assert (found.value.scratch / "job.json").is_file()
     broken = tmp_path / "broken.py"
     for text, words in (

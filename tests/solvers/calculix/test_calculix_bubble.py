@@ -26,12 +26,9 @@ from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
 
-from ...fortran_build import LAWS
+from ...fortran_build import BETA, LAWS
 from ...projects import BUBBLE
-from ...published_laws import TABLE_4_2
 
-# MPa.
-BETA = 1e3 * np.array(TABLE_4_2)
 CUBIC = HypoelasticLaw(BETA, strain_range=np.full(3, 0.13))
 LINEAR = HypoelasticLaw.linear(800.0, 400.0, 20.0)
 TRILINEAR = HypoelasticLaw.trilinear(

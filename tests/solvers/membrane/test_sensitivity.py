@@ -15,10 +15,9 @@ from bubblefit.solvers.membrane.newton import named
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
+from ...fortran_build import BETA, LAWS
 from ...inference.cases import MODEL as CASE_MODEL
-from ...published_laws import TABLE_4_2
 
-BETA = 1e3 * np.array(TABLE_4_2)
 PRESSURES = 1e-3 * np.array([22.0, 59.0, 97.0, 132.0, 186.0, 251.0, 300.0])
 MODEL = BubbleModel(
     disk_mesh(100.0, 192, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
@@ -50,10 +49,7 @@ def differences(model, law, name, step, tolerance=TIGHT):
 
 
 #: Nine increments: points pass breaks and knots inside of them.
-TRILINEAR = HypoelasticLaw.trilinear(
-    (800.0, 450.0, 900.0), (140.0, 110.0, 240.0), (20.0, 14.0, 40.0),
-    [[0.01, 0.03], [0.02, 0.06], [0.01, 0.04]],
-)  # fmt: skip
+TRILINEAR = LAWS["tri-linear"]
 KNOTS = [[0.0, 0.01, 0.03, 0.06, 0.13], [0.0, 0.04, 0.08, 0.13], [0.0, 0.05, 0.13]]
 SPLINE = HypoelasticLaw(
     np.array([20.0, 10.0, 12.0, 140.0, 110.0, 130.0, 190.0, 800, 650, 450, 420, 600]), 0.24,
