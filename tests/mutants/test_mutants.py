@@ -46,7 +46,8 @@ def test_survivors_are_listed_and_it_ends(test, tried, tmp_path: Path, monkeypat
     monkeypatch.setattr(mutants, "ROOT", root)
     mutants.git("init")
     begun = time.monotonic()
-    options = ["--minutes", "0.5" if tried else "0.1", "--out", str(tmp_path), "runs/a.py"]
+    limit = "120" if tried else "3"
+    options = ["--minutes", "0.5", "--limit", limit, "--out", str(tmp_path), "runs/a.py"]
     done = CliRunner().invoke(mutants.main, options, catch_exceptions=False)
     assert done.exit_code == 0 and time.monotonic() - begun < 45
     survivors, caught = (tmp_path / f"{n}.txt" for n in ("survivors", "caught"))
