@@ -4,16 +4,21 @@ import pytest
 from bubblefit.errors import InputError
 
 
-def complaint(call, *arguments, **options):
-    """What `call` complains of; it has to, in one line."""
+def refused(call, *arguments, **options):
+    """Return the InputError of a call, which has to raise one that is one line."""
     with pytest.raises(InputError) as caught:
         call(*arguments, **options)
     assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return caught.value
+
+
+def complaint(call, *arguments, **options):
+    """Return the message of the InputError that a call has to raise."""
+    return str(refused(call, *arguments, **options))
 
 
 def complaint_with(words, call, *arguments, **options):
-    """The same; it has to have every one of the words."""
+    """Return the same message, which has to hold every one of the words."""
     message = complaint(call, *arguments, **options)
     for word in words:
         assert word in message, message

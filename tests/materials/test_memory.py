@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw, law_slopes
 from bubblefit.materials.memory import NAMES, QUANTITIES, Memory, own_stress
 from bubblefit.materials.pieces import integral_of
@@ -14,6 +14,8 @@ from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
 from bubblefit.solvers.base import check_carries
 from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..complaints import complaint, refused
 
 MEMORY = Memory((0.4, 0.5, 0.3), (1.6, 1.7, 1.5), (1.2, 1.1, 1.05), (3.0, 5.0, 1.0))
 BETA = np.zeros(12)
@@ -145,9 +147,7 @@ def test_reloading_ends_where_unloading_began_wherever_it_turns():
      ({"saturation": (-1.0, 0, 0)}, "memory.saturation")],
 )  # fmt: skip
 def test_constants_that_make_no_memory_are_named(changed, field):
-    with pytest.raises(InputError) as failed:
-        replace(MEMORY, **changed)
-    assert failed.value.field == field
+    assert refused(replace, MEMORY, **changed).field == field
 
 
 def strips():
@@ -204,8 +204,7 @@ def test_a_bubble_without_unloading_is_bit_by_bit_that_of_the_law_without_a_memo
 
 
 def test_what_takes_no_memory_refuses():
-    with pytest.raises(InputError, match="memory"):
-        check_carries(CalculixSolver(), LAW)
+    assert "memory" in complaint(check_carries, CalculixSolver(), LAW)
     check_carries(MembraneSolver(), LAW)
     with pytest.raises(SolverFailure, match="memory"):
         MembraneSolver().run(PatchModel(np.array([[1.0, 1.0]]), 0.8), LAW)

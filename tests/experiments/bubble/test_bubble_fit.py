@@ -188,8 +188,7 @@ def test_e_against_a_direct_evaluation():
     assert plain.mean_absolute(moved) == pytest.approx(0.5)
     fields = reference().displacement.copy()
     fields[2, :, 1] = 0.0
-    with pytest.raises(InputError, match="97 kPa: dy"):
-        FieldObjective(targets(fields))
+    assert "97 kPa: dy" in complaint(FieldObjective, targets(fields))
 
 
 def test_e_between_the_nodes_and_with_an_offset():
@@ -241,8 +240,7 @@ def test_places_beyond_the_polygon_are_looked_for_farther_and_farther_in():
     every = [100.0, 99.99, 99.9, 99.0, 95.0, 100 * INWARD[-1]]
     for within, count in ((101.0, 1), (99.95, 3), (99.5, 4), (97.0, 5), (91.0, 6)):
         assert tried(within) == pytest.approx(every[:count])
-    with pytest.raises(InputError, match="1 places"):
-        tried(90.0)
+    assert "1 places" in complaint(tried, 90.0)
 
 
 @pytest.mark.parametrize("factor", [2.0, 1.6])

@@ -3,11 +3,12 @@
 import bubblefit as bf
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ...complaints import complaint
 
 TRUE = {"E1": 600.0, "E2": 300.0, "G12": 14.0}
 PRESSURES = (0.03, 0.09, 0.15, 0.2)
@@ -57,5 +58,4 @@ def test_a_quarter_cannot_be_turned():
     bubble = bf.Bubble(
         points, seen, PRESSURES, radius=100.0, symmetry="quarter", nuisance={"turn": 5.0}
     )
-    with pytest.raises(InputError, match=r"nuisance\.turn"):
-        bf.fit([bubble], LAW, fabric=bf.Fabric("turned", 0.81))
+    assert "nuisance.turn" in complaint(bf.fit, [bubble], LAW, fabric=bf.Fabric("turned", 0.81))

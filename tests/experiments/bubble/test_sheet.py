@@ -33,6 +33,7 @@ from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ...complaints import complaint
 from ...projects import small
 from ...scripts import script
 
@@ -71,8 +72,7 @@ def test_the_surface_the_rim_and_modes_follow_the_measurement(outline):
     with pytest.raises(InputError, match="points go out to"):
         measured_sheet(sheet, Outline(200.0, 160.0, 30.0), fields)
     metres = [replace(f, points=f.points / 1e3) for f in fields]
-    with pytest.raises(InputError, match='length_unit = "m"'):
-        measured_sheet(sheet, outline, metres)
+    assert 'length_unit = "m"' in complaint(measured_sheet, sheet, outline, metres)
 
 
 UNEVEN = script("benchmarks/bench_sheet.py")
@@ -176,8 +176,7 @@ def test_displacements_counted_from_a_loaded_frame():
     half = -(-count // 2)
     (found,) = counted_from([some[0], origin(half)], 1)
     assert len(found.displacement) == half
-    with pytest.raises(InputError, match=f"share {half - 1} of {count}"):
-        counted_from([some[0], origin(half - 1)], 1)
+    assert f"share {half - 1} of {count}" in complaint(counted_from, [some[0], origin(half - 1)], 1)
 
 
 def loaded(folder: Path, pressures: Sequence[float]) -> Path:

@@ -26,6 +26,7 @@ from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
 
+from ...complaints import complaint
 from ...fortran_build import BETA, LAWS
 from ...projects import BUBBLE
 
@@ -258,8 +259,7 @@ def test_a_template_error_names_template_line_and_variable(tmp_path, text, where
 
 def test_own_templates_can_build_on_ours(tmp_path):
     (tmp_path / "other.inp.j2").write_text("")
-    with pytest.raises(InputError, match=r"bubble\.inp\.j2"):
-        render("calculix", "bubble.inp.j2", context(), tmp_path)
+    assert "bubble.inp.j2" in complaint(render, "calculix", "bubble.inp.j2", context(), tmp_path)
     (tmp_path / "bubble.inp.j2").write_text("** mine\n*INCLUDE, INPUT={{ mesh_file }}\n")
     text = render("calculix", "bubble.inp.j2", context(), tmp_path)
     assert text == "** mine\n*INCLUDE, INPUT=m\n"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import Gas, RigidSupports, inflated_cylinder
 from bubblefit.meshes.mesh import enclosed_volume
@@ -35,6 +35,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve
 
+from ...complaints import complaint
 from ...fortran_build import BETA
 
 THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
@@ -322,8 +323,7 @@ def test_the_collar_s_flat_faces_touch_where_its_way_begins_to_count(diameter, s
     assert 0 < centre[1] + radius - met[:, 1].max() - ABOVE <= below < 0.05
     whole = inflated_cylinder(diameter, PRESSURE, THICKNESS, size, symmetry="full")
     solids = solid_mesh(whole)
-    with pytest.raises(InputError, match="quarter"):
-        bending_context(whole, solids, np.zeros_like(solids.points))
+    assert "quarter" in complaint(bending_context, whole, solids, np.zeros_like(solids.points))
 
 
 # Solids
@@ -367,5 +367,4 @@ def test_sections_that_solids_cannot_have_are_refused():
     model = case(25.0, 40.0)
     count = len(model.thickness)
     for thickness in (np.linspace(0.8, 0.9, count), np.ones(count)):
-        with pytest.raises(InputError, match="thickness"):
-            solid_mesh(replace(model, thickness=thickness))
+        assert "thickness" in complaint(solid_mesh, replace(model, thickness=thickness))

@@ -32,6 +32,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ... import needs
+from ...complaints import complaint
 from ...fortran_build import LAWS
 from ...marc_files import sts_text, t19_text
 from ...marc_stand_in.deck import Deck, DeckError, read_deck, set_members
@@ -91,10 +92,8 @@ def test_any_set_comes_back(read, numbers):
 
 @pytest.mark.parametrize("name", ["", "Rim", "a b", "a,b", "x" * 29, "rim$"])
 def test_names_and_sets_that_marc_could_not_read_are_refused(name):
-    with pytest.raises(InputError, match="at most 28"):
-        named_set("node", name, np.array([1]))
-    with pytest.raises(InputError, match="holds nothing"):
-        named_set("node", "rim", np.array([], dtype=int))
+    assert "at most 28" in complaint(named_set, "node", name, np.array([1]))
+    assert "holds nothing" in complaint(named_set, "node", "rim", np.array([], dtype=int))
 
 
 def test_tables_are_the_load_and_the_law(read):
@@ -115,8 +114,7 @@ def test_tables_are_the_load_and_the_law(read):
         wanted = LAW.modulus(modulus, between)
         np.testing.assert_allclose(np.interp(between, strain, value), wanted, rtol=2e-4)
     law = HypoelasticLaw.linear(800, 400, 60, thickness_change="incompressible")
-    with pytest.raises(InputError, match="hypela2"):
-        bubble_deck(model, law, MarcSettings())
+    assert "hypela2" in complaint(bubble_deck, model, law, MarcSettings())
     assert read(bubble_deck(model, law, MarcSettings(law="hypela2"))).law == "hypoelastic"
 
 
@@ -185,8 +183,7 @@ def test_every_facet_of_a_cylinder_has_its_frame_and_thickness(read):
     for layer in context["layers"]:
         np.testing.assert_allclose(thickness[sets[layer["set"]]], layer["thickness"])
     assert set(sets) >= {"fabric", "layer_1", "layer_2"}
-    with pytest.raises(InputError, match="normal to a facet"):
-        fabric_frames(bubble().mesh, np.array([0.0, 0.0, 1.0]))
+    assert "normal to a facet" in complaint(fabric_frames, bubble().mesh, np.array([0.0, 0.0, 1.0]))
 
 
 def test_what_is_not_confirmed_says_so_and_can_be_replaced(tmp_path):

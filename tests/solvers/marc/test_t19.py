@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ... import needs
+from ...complaints import complaint
 from ...marc_files import sts_text, t19_text
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.5]], float)
@@ -70,8 +71,7 @@ def test_meshio_reads_mesh_and_last_frame(tmp_path):
     code = f"import bubblefit, meshio; print(len(meshio.read({str(path)!r}).points))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "6", done.stderr
-    with pytest.raises(InputError, match="of type 999"):
-        meshio.read(written(path, given, element=999))
+    assert "of type 999" in complaint(meshio.read, written(path, given, element=999))
 
 
 NUMBERS = st.floats(-1e120, 1e120, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-120 else x)
@@ -154,8 +154,7 @@ def test_what_is_damaged_is_named(tmp_path, old, new, match):
     with pytest.raises(InputError, match=match) as found:
         read(path)
     assert str(path) in str(found.value)
-    with pytest.raises(InputError, match="cannot be read"):
-        T19File(tmp_path / "none.t19")
+    assert "cannot be read" in complaint(T19File, tmp_path / "none.t19")
 
 
 @settings(

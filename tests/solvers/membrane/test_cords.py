@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from bubblefit.errors import InputError
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import (
     Collar,
@@ -15,6 +14,8 @@ from bubblefit.meshes.cylinder_model import (
 from bubblefit.meshes.tube import cylinder_mesh
 from bubblefit.solvers.membrane.closed import prepare
 from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ...complaints import refused
 
 LINEAR = ForceTable(np.array([0.0, 1.0]), np.array([0.0, 40e3]))
 KINKED = ForceTable(np.array([0.0, 2e-4, 1.0]), np.array([0.0, 20.0, 90e3]))
@@ -128,9 +129,8 @@ def test_given_forces_stand_in_the_inflated_tube_and_stiffen_its_bending():
 
 
 def test_half_a_tube_needs_the_mirror_image_of_a_cord():
-    with pytest.raises(InputError) as raised:
-        prepare(tube([Cord(60.0, LINEAR)]), WALL, 1e-9, None)
-    assert raised.value.field == "cord.angle" and "300" in raised.value.problem
+    raised = refused(prepare, tube([Cord(60.0, LINEAR)]), WALL, 1e-9, None)
+    assert raised.field == "cord.angle" and "300" in raised.problem
 
 
 def test_a_table_is_straight_between_and_beyond_its_points():
@@ -140,6 +140,4 @@ def test_a_table_is_straight_between_and_beyond_its_points():
     assert slope == pytest.approx([0.0, 1e5, steep, steep])
     assert KINKED.pull([-1e-4], tension_only=False)[0] == pytest.approx([-10.0])
     assert KINKED.strain_at(10.0) == pytest.approx(1e-4)
-    with pytest.raises(InputError) as raised:
-        ForceTable(np.array([0.0, 0.0]), np.array([0.0, 1.0]))
-    assert raised.value.field == "strain"
+    assert refused(ForceTable, np.array([0.0, 0.0]), np.array([0.0, 1.0])).field == "strain"

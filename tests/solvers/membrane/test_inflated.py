@@ -291,8 +291,7 @@ def test_a_bending_that_stops_keeps_its_frames(quarter, monkeypatch, limit):
     if not limit:
         with pytest.raises(SolverFailure, match=r"no frame of the bending.*between 0 and 2 mm"):
             bend(model)
-        with pytest.raises(InputError, match="takes no parameters"):
-            MembraneSolver().run_with_sensitivity(model, LAW)
+        assert "takes no parameters" in complaint(MembraneSolver().run_with_sensitivity, model, LAW)
         return
     history = bend(model)
     assert history.load == pytest.approx(whole.load[:2], rel=1e-6)
