@@ -1,4 +1,4 @@
-"""Check what a plan predicts, what a bootstrap costs and how strips count in the certainty."""
+"""Check what a plan predicts and what a bootstrap costs."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -7,7 +7,6 @@ import numpy as np
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.kinds import Planning, Weighting
 from bubblefit.experiments.registry import kinds
-from bubblefit.inference.assessment import certainty
 from bubblefit.inference.comparison import Comparison
 from bubblefit.inference.linear import POINTS, PRIOR, LawQuery, information_of, summary
 from bubblefit.materials.card import MaterialCard
@@ -177,27 +176,5 @@ def bootstrap(samples=100, *, data=str(SHARED / "bubble"), elements=108):
         print(f"  {name} of {few} samples moves by {off.max():.2g} sigma at most when it settles")
 
 
-def strips(*, data=str(SHARED / "uniaxial")):
-    """Compare the certainty of the published strips by specimens with that by every load."""
-    example = EXAMPLES / "uniaxial-valmex7318"
-    projects = {"published polynomials": read_project(example / "project.toml")}
-    if Path(data).is_dir():
-        projects["points"] = read_project(example / "points.toml", Path(data))
-    for name, project in projects.items():
-        found = fit(project, starts=2)
-        problem, best = found.problem, found.best
-        print(f"{name}: objective {found.objective:.4g}")
-        for comparison in problem.comparisons:
-            own = comparison.objective
-            loads, together = sum(own.sizes), own.alike
-            print(f"  {comparison.name}: {loads} loads count as {loads / together:.3g}")
-        for words in ("as specimens", "every load by itself"):
-            sure = certainty(problem, best.differentiated, best.law, best.valid)
-            sigma = ", ".join(f"{n} {100 * np.median(s):.2g} %" for n, s in sure.sigma.items())
-            print(f"  median 1 sigma, {words}: {sigma}")
-            for comparison in problem.comparisons:
-                comparison.objective.alike = 1.0
-
-
 if __name__ == "__main__":
-    start_on(plan, bootstrap, strips)
+    start_on(plan, bootstrap)

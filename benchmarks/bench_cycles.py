@@ -6,7 +6,6 @@ reference load of a file is the first multiple of --step that lies 25 % above th
 which one of its branches begins or ends; the published evaluation has multiples of 20 lbf.
 """
 
-import argparse
 import math
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 from bubblefit.errors import BubblefitError
 from bubblefit.experiments.strips.cycles import SLIP, evaluate_history, lower_end
 from bubblefit.readers.histories import find_cycles, read_history
+from common import SHARED, start_on
 
 #: N in 20 lbf.
 STEP = 20 * 4.4482216152605
@@ -34,18 +34,15 @@ def is_history(path):
     return "load" in head and "strain" in head and "time" in head
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, metavar="FOLDER")
-    parser.add_argument("--step", type=float, default=STEP, help="N, of reference loads [20 lbf].")
-    given = parser.parse_args()
+def main(*, data=str(SHARED / "webbing"), step=STEP):
+    """Evaluate the files of a folder; step: N, of reference loads."""
     slipped, kinds = {}, {}
-    for path in sorted(given.data.rglob("*.csv")):
+    for path in sorted(Path(data).rglob("*.csv")):
         if not is_history(path):
             continue
-        name = path.relative_to(given.data)
+        name = path.relative_to(data)
         try:
-            one = evaluated(path, given.step)
+            one = evaluated(path, step)
         except BubblefitError as error:
             print(f"{name}: not evaluated: {error}")
             continue
@@ -69,4 +66,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    start_on(main)

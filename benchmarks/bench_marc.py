@@ -1,10 +1,9 @@
-"""Compare with Marc: published profiles, decks through the stand-in, bars of a misread law."""
+"""Compare with Marc: decks through the stand-in, bars of a misread law."""
 
 import tempfile
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from bubblefit.inference.methods import FitOptions
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
@@ -18,37 +17,12 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from common import ROOT, known_model_and_law, known_project, known_setup, objectives_of, start_on
 from scipy.integrate import quad
 
-PROFILES = ROOT / "runs" / "verification" / "published" / "marc_bubble_profiles.csv"
 STAND_IN = ROOT / "tests" / "marc_stand_in" / "run_marc"
 MODELS = {
     "bubble": BubbleModel(disk_mesh(100.0, 48, "quarter"), 0.81, (0.006, 0.022, 0.059, 0.097)),
     "bias strip": bias_strip(25, 30, 0.81, increments=8, across=4, along=12),
     "cylinder": inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=(1.0, 2.5, 5.0)),
 }
-
-
-def profiles():
-    """Compare the bubble of Table 4.2 with Marc's profiles, read off a figure to about 5 %."""
-    published = pd.read_csv(PROFILES, comment="#")
-    model, law = known_model_and_law()
-    history, place = MembraneSolver().run(model, law), model.mesh.points
-    print("apex heights in mm; cuts: RMS difference of z over the apex height")
-    print(f"{'kPa':>5s}{'apex':>9s}{'Marc':>9s}{'apex, %':>9s}{'x cut, %':>10s}{'y cut, %':>10s}")
-    for pressure, u in zip(history.load, history.displacement, strict=True):
-        kpa = round(1e3 * pressure)
-        frame = published[published.p_kPa == kpa]
-        apex = float(frame.groupby("copy").z_mm.max().mean())
-        ours = float(u[model.mesh.node_sets["apex"][0], 2])
-        cuts = []
-        for column, (axis, line) in enumerate((("x", "symmetry_y"), ("y", "symmetry_x"))):
-            nodes = model.mesh.node_sets[line]
-            along = place[nodes, column] + u[nodes, column]
-            order = np.argsort(along)
-            cut = frame[frame.axis == axis]
-            z = np.interp(np.abs(cut.coord_mm), along[order], u[nodes, 2][order])
-            cuts.append(float(np.sqrt(np.mean((z - cut.z_mm) ** 2))) / apex)
-        print(f"{kpa:5d}{ours:9.2f}{apex:9.2f}{100 * (ours / apex - 1):9.1f}"
-              f"{100 * cuts[0]:10.1f}{100 * cuts[1]:10.1f}")  # fmt: skip
 
 
 def stand_in(also=""):
@@ -119,4 +93,4 @@ def bars():
 
 
 if __name__ == "__main__":
-    start_on(profiles, stand_in, bars)
+    start_on(stand_in, bars)

@@ -4,7 +4,6 @@ DATA: a folder with beams.csv (geometry, braid, bladder), cords.csv (force by st
 (deflection, load) in the columns of its README; no number here comes from the curves.
 """
 
-import argparse
 import time
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeSection
 from bubblefit.meshes.cylinder_model import Cord, ForceTable, curve_reading
 from bubblefit.readers.bending import BendingCurve
 from bubblefit.solvers.membrane.solver import MembraneSolver
+from common import SHARED, start_on
 
 KEYS = ["beam", "orientation", "pressure_kPa"]
 #: mm: where loads are compared, the window of the slope at the knee, the last and the step.
@@ -65,13 +65,10 @@ def words(ratios):
     return ["-" if ratio is None else f"{ratio:.3f}" for ratio in ratios]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder of the csv files")
-    parser.add_argument("--friction", type=float, default=0.0, help="N added to every load [0]")
-    asked = parser.parse_args()
+def main(*, data=str(SHARED / "beams"), friction=0.0):
+    """Print a line for each curve in the folder of data; friction: N added to every load."""
     beams, cords, curves = (
-        pd.read_csv(asked.data / f"{name}.csv", comment="#")
+        pd.read_csv(Path(data) / f"{name}.csv", comment="#")
         for name in ("beams", "cords", "curves")
     )
     begun, count = time.perf_counter(), 0
@@ -81,21 +78,21 @@ def main():
             continue
         row = own.iloc[0]
         curve = BendingCurve("", rows["deflection_mm"].to_numpy(), rows["load_N"].to_numpy())
-        model = beam_of(row, cords, orientation, friction=asked.friction)
+        model = beam_of(row, cords, orientation, friction=friction)
         load, slope, knee = words(beside(model, curve))
         name = f"{beam} {orientation} {pressure:g} kPa"
         line = f"{name}: load at 100 mm {load} of measured, slope {slope}, knee {knee}"
         if row["braid_angle_deg"] < 58.0:
             ends = []
             for off in (-HALF_A_DEGREE, HALF_A_DEGREE):
-                turned = beam_of(row, cords, orientation, off, asked.friction)
+                turned = beam_of(row, cords, orientation, off, friction)
                 ends.append(words(beside(turned, curve))[0])
             line += f" (load {ends[0]} to {ends[1]} with half a degree of braid angle)"
         print(line, flush=True)
         count += 1
     spent = time.perf_counter() - begun
-    print(f"{count} curves in {spent:.1f} s; friction {asked.friction:g} N")
+    print(f"{count} curves in {spent:.1f} s; friction {friction:g} N")
 
 
 if __name__ == "__main__":
-    main()
+    start_on(main)

@@ -1,10 +1,9 @@
 """List the modules that a bubble test passes, from its project file to the report.
 
 Of the example with a known solution, coarse, one start, one process: each module in which a
-function is called, in the order of their first calls (docs/reference/walk.md). --list: all.
+function is called, in the order of their first calls (docs/reference/walk.md).
 """
 
-import argparse
 import sys
 import tempfile
 from contextlib import contextmanager
@@ -15,9 +14,10 @@ from bubblefit.runs.best import best_fit, with_certainty
 from bubblefit.runs.result import Fit
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import run_start
+from common import EXAMPLES, start_on
 
 ROOT = Path(bf.__file__).resolve().parent
-KNOWN = ROOT / "examples" / "bubble-known-solution" / "project.toml"
+KNOWN = EXAMPLES / "bubble-known-solution" / "project.toml"
 
 
 @contextmanager
@@ -67,20 +67,17 @@ def walk():
     return steps
 
 
-def main():
-    """Print steps with their numbers of modules; with --list their names."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--list", action="store_true")
-    given = parser.parse_args()
+def main(*, names=False):
+    """Print steps with their numbers of modules; with --names their names."""
     walk()  # imports everything: what they run is no part of the walk
     steps = walk()
     for name, modules in steps.items():
         print(f"{name:20s} {len(modules):3d}")
-        if given.list:
+        if names:
             for module in modules:
                 print(f"    {module}")
     print(f"{'modules in all':20s} {sum(map(len, steps.values())):3d}")
 
 
 if __name__ == "__main__":
-    main()
+    start_on(main)

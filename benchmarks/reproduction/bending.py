@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 from math import isclose
 from pathlib import Path
+from types import SimpleNamespace
 
-Point = tuple[float, float]
 #: mm at which the thesis' loads are compared.
 PLACES = (40.0, 100.0, 240.0)
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "bend-valmex7318" / "project.toml"
@@ -42,36 +42,12 @@ KNOWN = ("Inflated", "Stiffer with more", "Stiffer with larger", "Load over", "T
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """A test of the example: mm and MPa."""
-
-    name: str
-    diameter: float
-    pressure: float
-
-
-@dataclass(frozen=True)
-class Run:
-    """What result.json says of a run: strain, N/mm, N at `PLACES`, points (mm, N), kPa, mm, N."""
-
-    strain: float
-    stiffness: float | None
-    loads: tuple[float | None, ...]
-    limit: Point | None
-    knee: Point | None
-    straightness: Point | None
-    pressure_rise: float
-    reached: float
-    mean_error: float | None
-
-
-@dataclass(frozen=True)
 class Study:
     """The example's cylinders and cards, and the runs that ended by names of both."""
 
-    cylinders: tuple[Cylinder, ...]
+    cylinders: tuple[SimpleNamespace, ...]  # name, diameter in mm, pressure in MPa
     cards: tuple[str, ...]
-    runs: Mapping[tuple[str, str], Run]
+    runs: Mapping[tuple[str, str], SimpleNamespace]  # see `_run`
 
     def case(self, diameter, pressure):
         near = {"rel_tol": 1e-6}
@@ -249,7 +225,9 @@ def _order(text, study, groups, need):
 def read_study(folder):
     result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     cylinders = tuple(
-        Cylinder(name, test["diameter_mm"], 1e-3 * test["pressure_kPa"])
+        SimpleNamespace(
+            name=name, diameter=test["diameter_mm"], pressure=1e-3 * test["pressure_kPa"]
+        )
         for name, test in result["tests"].items()
     )
     # The other end of a band is no prediction.
@@ -259,17 +237,20 @@ def read_study(folder):
 
 
 def _run(said):
+    """Return a run: strain, N/mm, loads in N at `PLACES`, points (mm, N), kPa, mm, N."""
+
     def point(name):
         d, load = said[name]["deflection_mm"], said[name]["load_N"]
         return None if d is None else (d, load)
 
     line, error = said["straight_before_buckling"], said["error"]
-    return Run(
-        max(said["inflation_strain"]["body"].values()), said["stiffness_N_per_mm"],
-        tuple(said["load_N"].get(f"{place:g} mm") for place in PLACES),
-        point("limit_point"), point("knee"),
-        line and (line["r_squared"], line["largest_deviation"]),
-        said["pressure_rise_kPa"], said["reached_mm"], error and error["mean"],
+    return SimpleNamespace(
+        strain=max(said["inflation_strain"]["body"].values()),
+        stiffness=said["stiffness_N_per_mm"], limit=point("limit_point"), knee=point("knee"),
+        loads=tuple(said["load_N"].get(f"{place:g} mm") for place in PLACES),
+        straightness=line and (line["r_squared"], line["largest_deviation"]),
+        pressure_rise=said["pressure_rise_kPa"], reached=said["reached_mm"],
+        mean_error=error and error["mean"],
     )  # fmt: skip
 
 

@@ -4,7 +4,6 @@ Prints the first table of docs/validation/published-bubble.md (Table 4.2, 800 qu
 then u_y of other variants of law and load, none of which explains Marc's.
 """
 
-import argparse
 import importlib.util
 import sys
 import tempfile
@@ -139,5 +138,4 @@ def compare(model, displacement, marc):
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__).parse_args()
     main()

@@ -4,7 +4,6 @@ Exits 1 where the ratios are further off than known (`MOST`, `STEEPER`): Marc's 
 follow the surface. Then with dead pressure and incompressible: docs/how-to/studies.md.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -73,5 +72,4 @@ def show(what, values, words=""):
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__).parse_args()
     sys.exit(main())

@@ -4,8 +4,6 @@ Prints the second table of docs/validation/published-bubble.md, both pressures; 
 disk, other degrees and meshes, and what an odd cubic leaves of u_y along the fill axis at 22 kPa.
 """
 
-import argparse
-
 import numpy as np
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
@@ -76,5 +74,4 @@ def main():
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(description=__doc__).parse_args()
     main()
