@@ -159,7 +159,7 @@ def notes_of_certainty(*_: Any) -> Iterable[Note]:
 
 
 def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
-    """Of a bubble at wrong pressures, beside a test from which nothing can be estimated."""
+    """Return notes of a bubble at wrong pressures, beside a test that gives no estimate."""
     project = bf.read_project(KNOWN)
     setup = prepare_fit(project, project.chosen(None, fitted=True))
     (prepared,) = setup.tests

@@ -348,7 +348,7 @@ COMPANIONS = {
 
 
 def companion(path):
-    """What belongs to a key, else to the table that it is in."""
+    """Return what belongs to a key, else to the table that it is in."""
     whole = next((".".join(path[:k]) for k in range(len(path), 0, -1)
                   if ".".join(path[:k]) in COMPANIONS), "")  # fmt: skip
     return COMPANIONS.get(whole, {})

@@ -1,4 +1,4 @@
-"""What one goes on with after a fit or a forward analysis: meshes, strains, laws, drawings."""
+"""Check what a fit or a forward analysis gives: meshes, strains, laws, drawings."""
 
 from dataclasses import replace
 

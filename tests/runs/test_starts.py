@@ -416,7 +416,7 @@ def test_what_the_mesh_leaves_is_no_noise(off):
 
 
 def corrected(fitted):
-    """The same fit by default: what the mesh moves is taken out."""
+    """Return the fit as it is by default: what the mesh moves is taken out."""
     setup = replace(
         fitted.setup, project=fitted.project.with_fit(mesh_error=FitSection().mesh_error)
     )

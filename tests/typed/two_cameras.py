@@ -1,4 +1,4 @@
-"""What a stranger writes: read two vendors' exports, register, fit, plot, export."""
+"""Read two vendors' exports, register, fit, plot and export, as a user would."""
 
 import bubblefit as bf
 

@@ -258,7 +258,7 @@ def heights(height):
 
 
 def force(modulus):
-    """Of a strain of 0.04: force over strain and thickness, times 1 - 0.25."""
+    """Return the load a width (N/mm) at a strain of 0.04 of strips with this modulus."""
     return modulus / 0.75 * 0.8 * 0.04
 
 
