@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import ValidationError
 
-from .. import files as plugins
 from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
+from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
 from ..materials.exports import curves, designers, subroutines
 from ..materials.exports.base import CSV, Format
 from ..readers.sections import first_error
@@ -36,6 +36,7 @@ from .settings import (
     split,
 )  # fmt: skip
 
+GROUP: Group = "bubblefit.solvers"
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
     "calculix": CALCULIX, "marc": MARC, "membrane": MEMBRANE
@@ -54,64 +55,56 @@ NEEDED = ("name", "external", "progress", "identity", "run", "check")
 ANY = "solver-option"
 
 
-class PlugIn(plugins.PlugIn):
-    """A solver of another distribution, named in every `SolverFailure` on its account."""
-
-    def make(self, **options: Any) -> Solver:
-        """Return a new solver of the factory; SolverFailure: it is none or fails; InputError."""
-        factory = self.factory()
-        try:
-            inspect.signature(factory).bind(**options)
-        except TypeError as error:
-            problem = f"{error} (of {self.distribution}); see its documentation"
-            raise InputError(None, f"solver.{self.name}", problem) from None
-        except ValueError:  # compiled code has no signature
-            pass
-        try:
-            solver = factory(**options)
-        except BubblefitError:
-            raise
-        except Exception as error:
-            raise self.solver_failure("fails when it is made", error) from error
-        if not isinstance(solver, Solver):
-            missing = [name for name in NEEDED if not hasattr(solver, name)]
-            what = f"gives no solver: {type(solver).__name__} has no {', '.join(missing)}"
-            raise self.solver_failure(what)
-        return solver
-
-    def solver_failure(self, what: str, error: BaseException | None = None) -> SolverFailure:
-        """Return `failure` as an error of an analysis."""
-        return SolverFailure(str(self.failure(what, error)), self.name)
-
-    def factory(self) -> Callable[..., Any]:
-        """Import the factory; SolverFailure where it cannot be imported or called."""
-        try:
-            factory = self.load()
-        except PlugInFailure as error:
-            raise SolverFailure(str(error), self.name) from error.__cause__
-        if not callable(factory):
-            raise self.solver_failure(f"is no factory: {self.entry.value} cannot be called")
-        return factory
-
-
-def plug_ins() -> list[PlugIn]:
-    """Return every installed solver plug-in by name, both where two have one name."""
-    offers = plugins.plug_ins("bubblefit.solvers")
-    return [PlugIn(one.name, one.distribution, one.entry) for one in offers]
-
-
-def plug_in_named(name: str) -> PlugIn | None:
+def _plug_in_named(name: str) -> PlugIn | None:
     """Return the plug-in of that name, or None; SolverFailure where two distributions offer it."""
     try:
-        one = plugins.plug_in_named("bubblefit.solvers", name)
+        return plug_in_named(GROUP, name)
     except PlugInFailure as error:
         raise SolverFailure(str(error).removeprefix(f"{name}: "), name) from None
-    return None if one is None else PlugIn(one.name, one.distribution, one.entry)
+
+
+def _failed(plug_in: PlugIn, what: str, error: BaseException | None = None) -> SolverFailure:
+    """Return `PlugIn.failure` as an error of an analysis."""
+    return SolverFailure(str(plug_in.failure(what, error)), plug_in.name)
+
+
+def _factory(plug_in: PlugIn) -> Callable[..., Any]:
+    """Import the factory; SolverFailure where it cannot be imported or called."""
+    try:
+        factory = plug_in.load()
+    except PlugInFailure as error:
+        raise SolverFailure(str(error), plug_in.name) from error.__cause__
+    if not callable(factory):
+        raise _failed(plug_in, f"is no factory: {plug_in.entry.value} cannot be called")
+    return cast(Callable[..., Any], factory)
+
+
+def _made(plug_in: PlugIn, options: Mapping[str, Any]) -> Solver:
+    """Return a new solver of the factory; SolverFailure: it is none or fails; InputError."""
+    factory = _factory(plug_in)
+    try:
+        inspect.signature(factory).bind(**options)
+    except TypeError as error:
+        problem = f"{error} (of {plug_in.distribution}); see its documentation"
+        raise InputError(None, f"solver.{plug_in.name}", problem) from None
+    except ValueError:  # compiled code has no signature
+        pass
+    try:
+        solver = factory(**options)
+    except BubblefitError:
+        raise
+    except Exception as error:
+        raise _failed(plug_in, "fails when it is made", error) from error
+    if not isinstance(solver, Solver):
+        missing = [name for name in NEEDED if not hasattr(solver, name)]
+        what = f"gives no solver: {type(solver).__name__} has no {', '.join(missing)}"
+        raise _failed(plug_in, what)
+    return solver
 
 
 def solver_names() -> list[str]:
     """Return the names of all solvers, ours and those of plug-ins."""
-    return sorted({*SOLVERS, *(plug_in.name for plug_in in plug_ins())})
+    return sorted(names_with(GROUP, SOLVERS))
 
 
 def solver_sections() -> dict[str, type[SolverSettings]]:
@@ -152,9 +145,9 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
 def _started(name: str) -> tuple[str, ...]:
     """Return a plug-in's options that name a program: attribute `started` of its factory."""
     with suppress(SolverFailure):  # reported when the solver is made
-        plug_in = plug_in_named(name)
+        plug_in = _plug_in_named(name)
         if plug_in is not None:
-            return tuple(getattr(plug_in.factory(), "started", ()))
+            return tuple(getattr(_factory(plug_in), "started", ()))
     return ()
 
 
@@ -164,16 +157,13 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
     cache : None: everything is run. InputError : none of that name, a wrong option. SolverFailure :
     a plug-in that does not work; names its distribution.
     """
-    make: Callable[..., Solver]
-    if name in SOLVERS:  # a plug-in cannot take the place of one of ours
-        make = SOLVERS[name]
-    else:
-        plug_in = plug_in_named(name)
-        if plug_in is None:
-            raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
-        make = plug_in.make
     licences, own = split(options)
-    made = make(**own)
+    if name in SOLVERS:  # a plug-in cannot take the place of one of ours
+        made = SOLVERS[name](**own)
+    elif (plug_in := _plug_in_named(name)) is not None:
+        made = _made(plug_in, own)
+    else:
+        raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
     # The project's settings override the site's.
     solver = licensed(made, name, {**getattr(made, "site_licences", {}), **licences})
     return solver if cache is None else with_cache(solver, cache, counted(name, own))
@@ -216,10 +206,10 @@ def checked(name: str, solver: Solver) -> SolverCheck:
     except BubblefitError:
         raise
     except Exception as error:
-        plug_in = None if name in SOLVERS else plug_in_named(name)
+        plug_in = None if name in SOLVERS else _plug_in_named(name)
         if plug_in is None:
             raise
-        raise plug_in.solver_failure("fails its check", error) from error
+        raise _failed(plug_in, "fails its check", error) from error
 
 
 def command_line() -> list[Override]:
@@ -276,7 +266,7 @@ def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
     found = []
     for offer in ours:
         found += offer.diagnose(programs.get(offer.program.name) if offer.program else None)
-    return [*found, *(_plug_in(one) for one in plug_ins())]
+    return [*found, *(_plug_in(one) for one in plug_ins(GROUP))]
 
 
 def _plug_in(plug_in: PlugIn) -> Diagnosis:
@@ -306,7 +296,7 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
         # It may be for bubbles only, or have failed: the reader knows which.
         return found(check.version, f"its law was not tried: {str(error).splitlines()[0]}", True)
     except Exception as error:
-        return found(check.version, str(plug_in.solver_failure("fails on a strip", error)))
+        return found(check.version, str(_failed(plug_in, "fails on a strip", error)))
     off = difference(stresses)
     advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
     return found(check.version, advice, off < TOLERANCE, stresses)
