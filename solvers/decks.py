@@ -11,9 +11,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jinja2
-import jinja2.meta
-
 from ..errors import InputError
 from ..files import (
     LARGEST_WRITTEN,
@@ -45,6 +42,8 @@ def render(
     folder : the user's own templates; `name` must be there. instead : files in place of templates
     that `name` includes. InputError : missing, unreadable, or wrong in which line.
     """
+    import jinja2
+
     folders = [TEMPLATES / solver]
     if folder is not None:
         if not is_file(folder / name):
@@ -191,6 +190,8 @@ def code_mark(module: str) -> str:
 
 def _included(template: Path) -> list[Path]:
     """Return the files that a template names in full; its mistakes are left to the run."""
+    import jinja2.meta
+
     with reading(template):
         content = template.read_bytes()
     try:
