@@ -37,7 +37,7 @@ from .forms.base import (
 )
 from .forms.polynomial import CONSTANT, CUBIC
 from .forms.spline import TriLinear
-from .memory import NAMES, PLAIN, Memory
+from .memory import NAMES, PLAIN, Coupling, Memory
 from .point_law import SLOPES, membrane_stress, stress_update
 
 ThicknessChange = Literal["constant", "incompressible"]
@@ -125,12 +125,12 @@ class HypoelasticLaw:
         return bool((np.abs(after - before) > JUMP * size).any())
 
     @cached_property
-    def coupling(self) -> Array:
+    def coupling(self) -> Coupling:
         """Return nu12, the gain (MPa) of E1 and E2 by their load ratios, then T1, T2 and S (MPa)
-        of crimp or the memory; read-only."""
+        of crimp or the memory."""
+        maps = np.concatenate([ratio_map(self.form), crimp_map(self.form)])
         remembered = () if self.memory is None else self.memory.constants
-        more = (*crimp_map(self.form) @ self.beta, *remembered)
-        return _read_only([self.nu12, *ratio_map(self.form) @ self.beta, *more])
+        return (self.nu12, *(maps @ self.beta).tolist(), *remembered)
 
     @property
     def state(self) -> int:
@@ -151,7 +151,7 @@ class HypoelasticLaw:
         held = held_strain(COMPONENTS[name], strain, pieces[-1, 0])
         c = pieces[np.searchsorted(pieces[:-1, 0], held), 1:]
         own = ((c[..., 0] * held + c[..., 1]) * held + c[..., 2]) * held + c[..., 3]
-        gain = 0.0 if name == SHEAR else float(self.coupling[1 + COMPONENTS[name]])
+        gain = 0.0 if name == SHEAR else self.coupling[1 + COMPONENTS[name]]
         return np.asarray(own + (ratio - EVEN) * gain)
 
     def modulus_rows(self, name: str, strain: ArrayLike, ratio: float = EVEN) -> Array:
@@ -292,7 +292,7 @@ def law_slopes(
             # Loads are moduli times thickness: a thicker sheet is strained as a stiffer one is
             # (its stress is another, but nothing that takes this derivative uses the stress).
             rows[..., j] = of_beta @ law.beta / thickness
-            coupling[own, j] = law.coupling[own] / thickness
+            coupling[own, j] = np.array(law.coupling[own]) / thickness
     return rows, coupling
 
 

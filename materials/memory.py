@@ -29,6 +29,9 @@ from ..files import compiled
 from .forms.base import STRAIN_NAMES, Array
 from .pieces import by_pieces, increment_modulus, integral_of, point_modulus
 
+#: Constants of a law beside its moduli; a tuple, whose length is a type: what a memory needs is
+#: compiled for laws that have one.
+Coupling = tuple[float, ...]
 #: Entries of `coupling`, and of a strain vector, of a law that remembers nothing.
 PLAIN = 3
 #: An increment that is not divided by: f_new - f_old would be rounding.
@@ -114,7 +117,7 @@ def _below(k: int, b: float, m: float, top: float, kept: float, up: float, out: 
 
 @compiled()
 def recall(
-    pieces: Array, coupling: Array, k: int, x: float, x_old: float, largest: float, own: float,
+    pieces: Array, coupling: Coupling, k: int, x: float, x_old: float, largest: float, own: float,
     out: Array,
 ) -> bool:  # fmt: skip
     """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
@@ -188,7 +191,7 @@ def recall(
 
 @compiled()
 def recalled_modulus(
-    pieces: Array, coupling: Array, k: int, h: Array, h_old: Array
+    pieces: Array, coupling: Coupling, k: int, h: Array, h_old: Array
 ) -> tuple[float, float, float]:
     """Return as `increment_modulus`, of a law that remembers; write m and f of h (9,)."""
     out = np.empty(RECALLED)
@@ -206,8 +209,8 @@ def recalled_modulus(
 
 @compiled()
 def remember(
-    pieces: Array, coupling: Array, k: int, h: Array, h_old: Array, rows: Array, by_coupling: Array,
-    dh_old: Array, weights: Array, mean: Array, out: Array,
+    pieces: Array, coupling: Coupling, k: int, h: Array, h_old: Array, rows: Array,
+    by_coupling: Array, dh_old: Array, weights: Array, mean: Array, out: Array,
 ) -> None:  # fmt: skip
     """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
     rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
@@ -236,7 +239,7 @@ def remember(
 
 @compiled()
 def own_stress(
-    pieces: Array, coupling: Array, k: int, strain: Array, rows: Array, by_coupling: Array
+    pieces: Array, coupling: Coupling, k: int, strain: Array, rows: Array, by_coupling: Array
 ) -> tuple[Array, Array]:
     """Return the stress (n,) of a bar along a history of its strain (n,), and slopes (n, np).
     k : 0 warp, 1 fill; the bar is pulled along it and free to contract. rows, by_coupling : of

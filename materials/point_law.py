@@ -14,7 +14,7 @@ import math
 
 from ..files import compiled
 from .forms.base import EVEN, Array
-from .memory import recalled_modulus
+from .memory import Coupling, recalled_modulus
 from .pieces import increment_modulus
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`); four
@@ -66,7 +66,7 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 
 @compiled()
 def mean_ratio(
-    warp: float, fill: float, coupling: Array, old0: float, old1: float, dh0: float, dh1: float,
+    warp: float, fill: float, coupling: Coupling, old0: float, old1: float, dh0: float, dh1: float,
     slopes: Array,
 ) -> bool:  # fmt: skip
     """Write the load ratio of an increment's mean stress, and how the stress depends on itself.
@@ -246,7 +246,13 @@ def _exchanged(
 
 @compiled()
 def exchange(
-    d11: float, d12: float, d22: float, coupling: Array, s_old: Array, s_new: Array, slopes: Array
+    d11: float,
+    d12: float,
+    d22: float,
+    coupling: Coupling,
+    s_old: Array,
+    s_new: Array,
+    slopes: Array,
 ) -> bool:
     """Write the stress along the yarns s_new[:2] after an increment with crimp.
 
@@ -320,7 +326,7 @@ def exchange(
 
 @compiled()
 def stress_update(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array, s_new: Array,
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array, s_new: Array,
     tangent: Array, slopes: Array,
 ) -> bool:  # fmt: skip
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
@@ -338,7 +344,7 @@ def stress_update(
     warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
     fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
     shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
-    if coupling.shape[0] > CRIMPED:
+    if len(coupling) > CRIMPED:
         warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, 0, h, h_old)
         fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, 1, h, h_old)
         shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, 2, h, h_old)
@@ -367,7 +373,7 @@ def stress_update(
     d22_e1 = -fill * den_warp * inv2
     d22_e2 = inv - fill * den_fill * inv2
     turned = coupling[1] != 0.0 or coupling[2] != 0.0
-    if coupling.shape[0] == CRIMPED:
+    if len(coupling) == CRIMPED:
         turned = True
         if not exchange(d11, d12, d22, coupling, s_old, s_new, slopes):
             return False
@@ -458,8 +464,8 @@ def referred_stress(
 
 @compiled()
 def membrane_stress(
-    m: float, q: float, c: float, pieces: Array, coupling: Array, area_power: float, h_old: Array,
-    s_old: Array, h: Array, s_new: Array, pk2: Array, stiffness: Array, p: Array,
+    m: float, q: float, c: float, pieces: Array, coupling: Coupling, area_power: float,
+    h_old: Array, s_old: Array, h: Array, s_new: Array, pk2: Array, stiffness: Array, p: Array,
     law_tangent: Array, slopes: Array, pull: Array, work: Array,
 ) -> bool:  # fmt: skip
     """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy-Green components.

@@ -199,7 +199,7 @@ def _path(  # type: ignore[no-untyped-def]
     for n in range(len(loads)):
         load = loads[n]
         largest = max(largest, max(abs(load[0]), abs(load[1])))
-        h[:] = h_old
+        h = h_old.copy()
         good = _forces(
             pieces, coupling, power, thickness, load, h_old, s_old, h, s, tangent, slopes, rest, k
         )
@@ -220,7 +220,7 @@ def _path(  # type: ignore[no-untyped-def]
                 if good and (_size(rest) < before or before < 1e-9 * largest):
                     break
                 share *= 0.5
-            h[:] = trial
+            h = trial.copy()
             if before < 1e-9 * largest and _size(rest) >= before:
                 break  # rounding
         if not good or not _size(rest) <= 1e-9 * largest:
@@ -250,8 +250,7 @@ def _path(  # type: ignore[no-untyped-def]
                 slope[n, 0, j], slope[n, 1, j] = dh[0, j], dh[1, j]
         for i in range(2):
             strain[n, i], stress[n, i] = h[i], s[i]
-        h_old[:] = h
-        s_old[:] = s
+        h_old, s_old = h.copy(), s.copy()
     return len(loads)
 
 

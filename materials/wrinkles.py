@@ -16,6 +16,7 @@ import numpy as np
 
 from ..files import compiled
 from .forms.base import Array
+from .memory import Coupling
 from .pieces import increment_modulus
 from .point_law import SLOPES, log_strain, referred_stress, stress_update
 
@@ -42,7 +43,7 @@ def _normal(angle: float, n: Array, m: Array) -> None:
 
 @compiled()
 def _across(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
     n: Array, size: float, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> float:  # fmt: skip
     """Return the size of a wrinkle strain along n without stress across it; NaN if not found."""
@@ -73,7 +74,7 @@ def _along(s: Array, m: Array) -> float:
 
 @compiled()
 def _start(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
     n: Array, m: Array, he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Return angle and size between the two normals where the shear along changes its sign."""
@@ -98,7 +99,7 @@ def _start(
 
 @compiled()
 def _wrinkle(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
     angle: float, size: float, n: Array, m: Array,
     he: Array, s: Array, tangent: Array, slopes: Array, inverse: Array,
 ) -> tuple[float, float]:  # fmt: skip
@@ -137,7 +138,7 @@ def _wrinkle(
 
 @compiled()
 def slack(
-    pieces: Array, coupling: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, h_old: Array, s_old: Array,
     he: Array, s: Array, tangent: Array, slopes: Array,
 ) -> bool:  # fmt: skip
     """Write the strain of the fabric without any stress to he."""
@@ -163,7 +164,7 @@ def slack(
 
 @compiled()
 def wrinkled(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
     away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
     strain_slope: Array,
 ) -> bool:  # fmt: skip
@@ -209,7 +210,7 @@ def wrinkled(
 
 @compiled()
 def relaxed_update(
-    pieces: Array, coupling: Array, share: float, h: Array, h_old: Array, s_old: Array,
+    pieces: Array, coupling: Coupling, share: float, h: Array, h_old: Array, s_old: Array,
     he: Array, s_new: Array, carried: Array, tangent: Array, slopes: Array, strain_slope: Array,
 ) -> int:  # fmt: skip
     """Integrate as `stress_update`, for a membrane that wrinkles.
@@ -228,7 +229,8 @@ def relaxed_update(
     if not stress_update(pieces, coupling, h, h_old, s_old, s_new, tangent, slopes):
         return -1
     if least_principal(s_new[0], s_new[1], s_new[2]) >= -ROUNDING * tangent[0, 0]:
-        carried[:] = s_new
+        for i in range(3):
+            carried[i] = s_new[i]
         return 0
     t0, t1, t2 = s_new[0], s_new[1], s_new[2]
     state, away = 1, (0.0, 0.0)
@@ -263,13 +265,15 @@ def relaxed_update(
             for k in range(3):
                 total[i, j] += (tangent[i, k] - rest[i, k]) * strain_slope[k, j]
             total[i, j] += rest[i, j]
-    tangent[:] = total
+    for i in range(3):
+        for j in range(3):
+            tangent[i, j] = total[i, j]
     return state
 
 
 @compiled()
 def relaxed_membrane_stress(
-    m: float, q: float, c: float, pieces: Array, coupling: Array, area_power: float,
+    m: float, q: float, c: float, pieces: Array, coupling: Coupling, area_power: float,
     share: float, h_old: Array, s_old: Array, h: Array, he: Array, s_new: Array, pk2: Array,
     stiffness: Array, p: Array, law_tangent: Array, slopes: Array, pull: Array, work: Array,
 ) -> int:  # fmt: skip
@@ -294,7 +298,7 @@ def relaxed_membrane_stress(
 
 @compiled()
 def relaxed_increments(
-    pieces: Array, coupling: Array, h: Array, h_old: Array, s_old: Array
+    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array
 ) -> tuple[Array, Array]:
     """Return strain and stress (n, 3) of the fabric at total strains h, or NaN; see above."""
     he, s = np.empty(h.shape), np.empty(h.shape)

@@ -309,13 +309,9 @@ def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
     )
     beside = sp.csr_matrix(belongs.T @ belongs)
     further = sp.csr_matrix(beside @ beside)
-    found = []
-    for node in range(count):
-        near = beside[node].indices
-        if len(near) <= ENOUGH:
-            near = further[node].indices
-        found.append(np.sort(near[near != node]).astype(np.intp))
-    return found
+    near, far = (np.split(known.indices, known.indptr[1:-1]) for known in (beside, further))
+    enough = (a if len(a) > ENOUGH else b for a, b in zip(near, far, strict=True))
+    return [np.sort(own[own != node]).astype(np.intp) for node, own in enumerate(enough)]
 
 
 #: Gauss points along a side of a facet: exact for polynomials to the ninth degree.

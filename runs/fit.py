@@ -325,6 +325,7 @@ def fit(
         scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
         files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
         done = files.begin(resume)
+    setup.law.increment(*np.zeros((3, 3)))  # processes that are forked find the kernels loaded
     with failure_page(None if out is None else Path(out), project.title):
         with timed("all starts"):
             records = _records(setup, files, done, tell)

@@ -15,6 +15,7 @@ SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
+ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads
 
 
 class LevenbergMarquardt:
@@ -33,11 +34,12 @@ class LevenbergMarquardt:
         first = problem.evaluate(start, True)
         if first is None:
             return None
-        best, status = _squares_then_norms(problem, first, tolerance, before_last)
+        level, status = descend(problem, first, tolerance, before_last)
+        best, status = _then_norms(problem, level, status, tolerance, before_last)
         for factor in STIFFER:
             if best.value < tolerance or problem.unstable == met:
                 break
-            other, how = _from_stiffer(problem, best, factor, tolerance, before_last)
+            other, how = _from_stiffer(problem, best, level, factor, tolerance, before_last)
             if other.value < best.value:
                 best, status = other, how
         if best.value < tolerance:
@@ -55,26 +57,27 @@ class LevenbergMarquardt:
             return None
         # A fit that used up its analyses with warm starts gets as many as a usual one takes.
         limit = max(most, problem.analyses + FEW)
-        best, status = _squares_then_norms(problem, again, tolerance, limit)
+        level, status = descend(problem, again, tolerance, limit)
+        best, status = _then_norms(problem, level, status, tolerance, limit)
         return Optimum(best, status, problem.analyses)
 
 
-def _squares_then_norms(
-    problem: FitProblem, point: Evaluation, tolerance: float, max_analyses: int
+def _then_norms(
+    problem: FitProblem, point: Evaluation, status: str, tolerance: float, max_analyses: int
 ) -> tuple[Evaluation, str]:
-    best, status = descend(problem, point, tolerance, max_analyses)
-    if status == LEVEL:
-        limit = min(max_analyses, problem.analyses + MOST_OF_NORMS)
-        best, status = descend(problem, best, tolerance, limit, norms=True)
-    return best, status
+    if status != LEVEL:
+        return point, status
+    limit = min(max_analyses, problem.analyses + MOST_OF_NORMS)
+    return descend(problem, point, tolerance, limit, norms=True)
 
 
 def _from_stiffer(
-    problem: FitProblem, best: Evaluation, factor: float, tolerance: float, max_analyses: int
-) -> tuple[Evaluation, str]:
+    problem: FitProblem, best: Evaluation, level: Evaluation, factor: float, tolerance: float,
+    max_analyses: int,
+) -> tuple[Evaluation, str]:  # fmt: skip
     """Fit again from a membrane `factor` times stiffer in shear, which is what keeps it stable.
     At the border of instability G12 usually makes up for others that are still wrong: these go
-    first."""
+    first. Returns `best` as soon as the way back leads to `level`, the least squares behind it."""
     if problem.analyses >= max_analyses:
         return best, ANALYSES_USED_UP
     shear = problem.unknowns.shear
@@ -85,8 +88,15 @@ def _from_stiffer(
     point = None if step is None else problem.evaluate(y + step, True)
     if point is None or not point.stable:
         return best, LEVEL
-    point, _ = descend(problem, point, tolerance, max_analyses, only=~shear)
-    return _squares_then_norms(problem, point, tolerance, max_analyses)
+    for only in (~shear, None):
+        point, _ = descend(problem, point, tolerance, max_analyses, only=only, negligible=ROUGHLY)
+    assert level.jacobian is not None
+    away, squares = level.jacobian @ (point.unknowns - level.unknowns), np.sum(level.residual**2)
+    higher = np.sum(point.residual**2) - squares
+    if max(float(away @ away), abs(higher)) <= NEAR * squares:
+        return best, LEVEL
+    point, status = descend(problem, point, tolerance, max_analyses)
+    return _then_norms(problem, point, status, tolerance, max_analyses)
 
 
 METHOD = LevenbergMarquardt()

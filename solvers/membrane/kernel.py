@@ -72,10 +72,10 @@ def assemble(  # type: ignore[no-untyped-def]
     """Write internal minus pressure forces at `position`, and the tangent.
 
     h_*, s_* (elements, 4, 3) log strain and stress before (old) and here (new, written); slot
-    (elements, 144) place of each element entry in `data` (-1: held); share : left to wrinkles;
-    below 0 the membrane does not wrinkle, otherwise wrinkle (elements, 4, 3), the strain of the
-    fabric less that of the surface, is written. Returns the largest nodal pressure force of an
-    element (N), or -1 without valid stress at a point.
+    (elements, 144) place of each element entry in `data` (-1: held); share : left to wrinkles, and
+    wrinkle (elements, 4, 3), the strain of the fabric less that of the surface, is written; None
+    for a membrane that does not wrinkle, for which no code of wrinkles is compiled. Returns the
+    largest nodal pressure force of an element (N), or -1 without valid stress at a point.
     """
     residual[:] = 0.0
     if with_tangent:
@@ -102,7 +102,7 @@ def assemble(  # type: ignore[no-untyped-def]
             dn = slopes[e, g]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
-            if share >= 0.0:
+            if share is not None:
                 # Only of a law without a memory, see `closed.prepare`.
                 if relaxed_membrane_stress(
                     m, q, c, pieces, coupling, power, share, h_old[e, g], s_old[e, g], total,
@@ -241,7 +241,7 @@ def explicit(  # type: ignore[no-untyped-def]
     """
     nu, count = coupling[0], by_coupling.shape[1]
     rate[:] = 0.0
-    remembers, memory = coupling.shape[0] > CRIMPED, np.empty(RECALLED)
+    memory = np.empty(RECALLED)
     h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
     weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -274,7 +274,7 @@ def explicit(  # type: ignore[no-untyped-def]
                         row[j] += (
                             w0 * third[j] + w1 * second[j] + w2 * first_power[j] + w3 * constant[j]
                         )
-            if remembers:
+            if len(coupling) > CRIMPED:
                 for i in range(3):
                     remember(
                         pieces, coupling, i, h, h_old[e, g], rows, by_coupling, dh_old[e, g],
@@ -366,105 +366,112 @@ def by_sheet(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write the derivative of the residual at fixed displacement and fixed strain at the start.
 
-    surface (k, n, 3), slopes_by (k, elements, 4, 2, 4), area_by (k, elements, 4): derivatives by k
+    surface (n, 3, k), slopes_by (elements, 4, 2, 4, k), area_by (elements, 4, k): derivatives by k
     parameters; writes green (elements, 4, 3, k), of (E11, E22, 2 E12), and rate (3 n, k).
     """
-    count = len(surface)
+    count = surface.shape[2]
     rate[:] = 0.0
     h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
     steep = np.empty(SLOPES)
     p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     work, stiff = np.empty((3, 3)), np.empty((3, 3))
-    x, f, f_by = np.empty((4, 3)), np.empty((2, 3)), np.empty((2, 3))
-    first, second = np.empty(3), np.empty(3)
-    first_by, second_by = np.empty(3), np.empty(3)
-    normal, normal_by = np.empty(3), np.empty(3)
+    x, f, f_by = np.empty((4, 3)), np.empty((2, 3)), np.empty((2, 3, count))
+    force, force_by = np.empty((2, 3)), np.empty((2, 3, count))
+    normal, normal_by = np.empty(3), np.empty((3, count))
+    pk2_by, local = np.empty((3, count)), np.empty((12, count))
     for e in range(quads.shape[0]):
         for n in range(4):
             for k in range(3):
                 x[n, k] = position[quads[e, n], k]
+        local[:] = 0.0
         for g in range(4):
-            dn = slopes[e, g]
+            dn, dn_by = slopes[e, g], slopes_by[e, g]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
                 m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
                 pk2, stiff, p, law, steep, pull, work,
             )  # fmt: skip
-            normal[0] = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
-            normal[1] = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
-            normal[2] = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
+            f_by[:] = 0.0
+            for n in range(4):
+                for k in range(3):
+                    by = surface[quads[e, n], k]
+                    for i in range(2):
+                        for j in range(count):
+                            f_by[i, k, j] += dn_by[i, n, j] * x[n, k] + dn[i, n] * by[j]
+            own = green[e, g]
+            own[:] = 0.0
             for k in range(3):
-                first[k] = pk2[0] * f[0, k] + pk2[2] * f[1, k]
-                second[k] = pk2[1] * f[1, k] + pk2[2] * f[0, k]
-            for j in range(count):
-                dn_by = slopes_by[j, e, g]
-                for i in range(2):
-                    for k in range(3):
-                        total = 0.0
-                        for n in range(4):
-                            total += dn_by[i, n] * x[n, k] + dn[i, n] * surface[j, quads[e, n], k]
-                        f_by[i, k] = total
-                e0, e1, e2 = 0.0, 0.0, 0.0
+                for j in range(count):
+                    own[0, j] += f[0, k] * f_by[0, k, j]
+                    own[1, j] += f[1, k] * f_by[1, k, j]
+                    own[2, j] += f[0, k] * f_by[1, k, j] + f[1, k] * f_by[0, k, j]
+            for i in range(3):
+                d0, d1, d2 = stiff[i, 0], stiff[i, 1], stiff[i, 2]
+                for j in range(count):
+                    pk2_by[i, j] = d0 * own[0, j] + d1 * own[1, j] + d2 * own[2, j]
+            for i in range(2):
                 for k in range(3):
-                    e0 += f[0, k] * f_by[0, k]
-                    e1 += f[1, k] * f_by[1, k]
-                    e2 += f[0, k] * f_by[1, k] + f[1, k] * f_by[0, k]
-                green[e, g, 0, j], green[e, g, 1, j], green[e, g, 2, j] = e0, e1, e2
-                s0 = stiff[0, 0] * e0 + stiff[0, 1] * e1 + stiff[0, 2] * e2
-                s1 = stiff[1, 0] * e0 + stiff[1, 1] * e1 + stiff[1, 2] * e2
-                s2 = stiff[2, 0] * e0 + stiff[2, 1] * e1 + stiff[2, 2] * e2
-                for k in range(3):
-                    first_by[k] = (
-                        s0 * f[0, k] + pk2[0] * f_by[0, k] + s2 * f[1, k] + pk2[2] * f_by[1, k]
-                    )
-                    second_by[k] = (
-                        s1 * f[1, k] + pk2[1] * f_by[1, k] + s2 * f[0, k] + pk2[2] * f_by[0, k]
-                    )
-                    a, b = (k + 1) % 3, (k + 2) % 3
-                    normal_by[k] = (
-                        f_by[0, a] * f[1, b] - f_by[0, b] * f[1, a]
-                        + f[0, a] * f_by[1, b] - f[0, b] * f_by[1, a]
+                    # Along f[i] the stress pk2[i], along the other one the shear.
+                    force[i, k] = pk2[i] * f[i, k] + pk2[2] * f[1 - i, k]
+                    for j in range(count):
+                        force_by[i, k, j] = (
+                            pk2_by[i, j] * f[i, k] + pk2[i] * f_by[i, k, j]
+                            + pk2_by[2, j] * f[1 - i, k] + pk2[2] * f_by[1 - i, k, j]
+                        )  # fmt: skip
+            for k in range(3):
+                a, b = (k + 1) % 3, (k + 2) % 3
+                normal[k] = f[0, a] * f[1, b] - f[0, b] * f[1, a]
+                for j in range(count):
+                    normal_by[k, j] = (
+                        f_by[0, a, j] * f[1, b] - f_by[0, b, j] * f[1, a]
+                        + f[0, a] * f_by[1, b, j] - f[0, b] * f_by[1, a, j]
                     )  # fmt: skip
-                share, share_by = area[e, g], area_by[j, e, g]
-                wall, wall_by = thickness[e] * share, thickness[e] * share_by
-                for n in range(4):
-                    push = pressure * values[g, n]
-                    for k in range(3):
-                        rate[3 * quads[e, n] + k, j] += (
-                            wall_by * (dn[0, n] * first[k] + dn[1, n] * second[k])
-                            + wall * (dn_by[0, n] * first[k] + dn_by[1, n] * second[k])
-                            + wall * (dn[0, n] * first_by[k] + dn[1, n] * second_by[k])
-                            - push * (share_by * normal[k] + share * normal_by[k])
-                        )
+            share, share_by = area[e, g], area_by[e, g]
+            wall = thickness[e] * share
+            for n in range(4):
+                d0, d1, push = wall * dn[0, n], wall * dn[1, n], pressure * values[g, n]
+                for k in range(3):
+                    f0, f1 = wall * force[0, k], wall * force[1, k]
+                    by_area = (d0 * force[0, k] + d1 * force[1, k]) / share - push * normal[k]
+                    for j in range(count):
+                        local[3 * n + k, j] += (
+                            by_area * share_by[j] - push * share * normal_by[k, j]
+                            + dn_by[0, n, j] * f0 + dn_by[1, n, j] * f1
+                            + d0 * force_by[0, k, j] + d1 * force_by[1, k, j]
+                        )  # fmt: skip
+        for n in range(4):
+            for k in range(3):
+                for j in range(count):
+                    rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
 
 
 def element_slopes(
-    points: Array, quads: NDArray[np.intp], direction: Array, yarn: Array, yarn_by: Array
+    points: Array, quads: NDArray[np.intp], ways: Array, yarn: Array, yarn_by: Array
 ) -> tuple[Array, Array]:
-    """Return derivatives of `reference_elements`, slopes and area, along a direction (n, 3).
+    """Return derivatives of `reference_elements`, (elements, 4, 2, 4, k) and (elements, 4, k).
 
-    yarn, yarn_by : (3,) the warp of all facets, and its own derivative.
+    ways (k, n, 3) : directions of the points. yarn (3,), the warp of all facets, and yarn_by (k, 3)
+    its own derivatives.
     """
-    base = np.einsum("pan,mnk->mpak", NATURAL, points[quads])
-    base_by = np.einsum("pan,mnk->mpak", NATURAL, direction[quads])
+    yarn_by = yarn_by[:, None, None]
+    base = NATURAL @ points[quads][:, None]
+    base_by = NATURAL @ ways[:, quads][:, :, None]
     normal = np.cross(base[:, :, 0], base[:, :, 1])
-    normal_by = np.cross(base_by[:, :, 0], base[:, :, 1])
-    normal_by += np.cross(base[:, :, 0], base_by[:, :, 1])
+    normal_by = np.cross(base_by[..., 0, :], base[:, :, 1])
+    normal_by += np.cross(base[:, :, 0], base_by[..., 1, :])
     unit, unit_by, _, area_by = _normalised(normal, normal_by)
     # Along the yarn: its direction less the part along the normal.
-    across, across_by = unit @ yarn[:, None], unit_by @ yarn[:, None] + unit @ yarn_by[:, None]
+    across, across_by = unit @ yarn[:, None], unit_by @ yarn[:, None]
+    across_by += (unit * yarn_by).sum(axis=-1, keepdims=True)
     along = yarn - across * unit
     along, along_by, _, _ = _normalised(along, yarn_by - across_by * unit - across * unit_by)
-    frame = np.stack([along, np.cross(unit, along)], axis=2)
-    frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=2)
-    jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
-    jacobian_by = np.einsum("mpak,mpbk->mpab", base_by, frame)
-    jacobian_by += np.einsum("mpak,mpbk->mpab", base, frame_by)
-    inverse = np.linalg.inv(jacobian)
-    inverse_by = -inverse @ jacobian_by @ inverse
-    slopes_by = np.einsum("mpab,pan->mpbn", inverse_by.transpose(0, 1, 3, 2), NATURAL)
-    return slopes_by, area_by
+    frame = np.stack([along, np.cross(unit, along)], axis=-1)
+    frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=-1)
+    inverse = np.linalg.inv(base @ frame)
+    slopes_by = -inverse @ (base_by @ frame + base @ frame_by) @ (inverse @ NATURAL)
+    slopes_by, area_by = np.moveaxis(slopes_by, 0, -1), np.moveaxis(area_by, 0, -1)
+    return np.ascontiguousarray(slopes_by), np.ascontiguousarray(area_by)
 
 
 def _normalised(vector: Array, by: Array) -> tuple[Array, Array, Array, Array]:

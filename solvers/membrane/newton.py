@@ -14,7 +14,15 @@ from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw, law_slopes
 from ..base import Progress
 from .factorisation import SingularTangent, Tangent
-from .kernel import POINT, ReferenceElements, advance, assemble, by_sheet, element_slopes, explicit
+from .kernel import (
+    POINT,
+    ReferenceElements,
+    advance,
+    assemble,
+    by_sheet,
+    element_slopes,
+    explicit,
+)
 
 Array = NDArray[np.float64]
 MOST_ITERATIONS, MOST_BACKTRACKS = 40, 8
@@ -87,7 +95,7 @@ class Membrane:
             law.pieces, law.coupling, law.area_power, self.strain_old,
             self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
             self.tangent.data, self.residual, with_tangent,
-            -1.0 if self.wrinkle_stiffness is None else self.wrinkle_stiffness, self.wrinkle,
+            self.wrinkle_stiffness, self.wrinkle,
         )  # fmt: skip
         self.iterations += 1
         if force < 0:
@@ -471,13 +479,9 @@ class Sheet:
         yarn: Array,
     ) -> None:  # fmt: skip
         self.membrane, self.columns = membrane, list(columns)
-        self.surface = np.array([surface for surface, _, _ in slopes.values()])
-        pairs = [
-            element_slopes(stress_free, membrane.quads, way, yarn, turn)
-            for _, way, turn in slopes.values()
-        ]
-        self.slopes = np.array([slopes for slopes, _ in pairs])
-        self.area = np.array([area for _, area in pairs])
+        surface, ways, turns = (np.stack(own) for own in zip(*slopes.values(), strict=True))
+        self.surface = np.ascontiguousarray(np.moveaxis(surface, 0, -1))
+        self.slopes, self.area = element_slopes(stress_free, membrane.quads, ways, yarn, turns)
         self.green = np.empty((len(membrane.quads), 4, 3, len(columns)))
         self.rate = np.empty((membrane.reference.size, len(columns)))
 
