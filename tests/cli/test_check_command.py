@@ -19,6 +19,7 @@ from ..experiments.bubble.test_bubble_doubts import OF_OWN_TESTS as BUBBLE_TESTS
 from ..experiments.bubble.test_bubble_doubts import TRAPS as BUBBLE_TRAPS
 from ..experiments.strips.test_strip_doubts import TRAPS as STRIP_TRAPS
 from ..places import ROOT
+from ..projects import EASY
 
 
 @pytest.fixture(scope="module")
@@ -47,17 +48,14 @@ def test_good_data_are_said_to_be_fine(folder, golden):
     assert "fit.trust" in said and "weather" in said and "z-flipped" in said
 
 
-LAB = """
+LAB = f"""
 [fabric]
 name = "lab"
 thickness = 0.8
 [law]
 form = "constant"
 nu12 = 0.2
-[law.bounds]
-E1 = [0.02, 2.0]
-E2 = [0.02, 1.0]
-G12 = [0.001, 0.2]
+{EASY}
 [[strips]]
 width = 25.0
 rate = 100.0

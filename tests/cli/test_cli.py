@@ -51,12 +51,6 @@ def test_a_study_writes_everything_it_promises(study, golden):
     assert not list(out.glob("*.part")) and not list(out.glob(".*"))
 
 
-def test_jobs_and_repetition_change_nothing(study):
-    folder, _ = study
-    in_process("bubble", "project.toml", "--out", "one", "--starts", 4, "--jobs", 1, cwd=folder)
-    assert (folder / "one/history.csv").read_text() == (folder / "out/history.csv").read_text()
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_interrupted_and_resumed_ends_the_same(study, tmp_path, number):
     folder, _ = study

@@ -117,20 +117,6 @@ def test_another_fit_ends_in_one_line(together, tmp_path):
     one_line(quick(*run, "--resume", *other, cwd=tmp_path, code=2), "bubble[0].data")
 
 
-def test_only_some_of_the_tests(together, tmp_path):
-    """By name, or by kind: strips alone from the same file."""
-    shutil.copy(together[0] / "points.csv", tmp_path)
-    project_in(tmp_path, ('form = "cubic"', 'form = "constant"'))
-    run = ("together.toml", "--starts", 1, "--jobs", 1, "--quiet", "--out")
-    quick("fit", *run, "one", "--test", "strips", cwd=tmp_path)
-    quick("uniaxial", *run, "kind", cwd=tmp_path)
-    one, kind = result_in(tmp_path / "one"), result_in(tmp_path / "kind")
-    assert one["beta"] == kind["beta"] and list(one["tests"]) == ["strips"]
-    assert one["e_uniaxial_N"] == kind["e_uniaxial_N"]
-    bad = quick("fit", *run, "two", "--test", "none", cwd=tmp_path, code=2)
-    one_line(bad, "'none'", "bubble, strips")
-
-
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
     """Strips of constant moduli, one start."""

@@ -169,6 +169,10 @@ def test_no_shape_is_known_under_a_first_pressure(tmp_path):
     )
     with pytest.raises(InputError, match="from_pressure"):
         bf.estimate(project)
+    # Then all starts are random.
+    project = project.with_fit(starts_from="estimate")
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    assert with_start(setup) is setup
 
 
 def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
@@ -220,10 +224,3 @@ def test_starts_that_differ_are_said_to_want_more(known):
     # Moduli that nothing determines may differ.
     assert "all 2" in agreement(problem, [record(0, 0.1, one), record(1, 0.1, other)], project)
     assert agreement(problem, records[:1], project) == ""
-
-
-def test_without_an_estimate_all_starts_are_random(tmp_path):
-    sheet = "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
-    project = edited(tmp_path, "[bubble.nuisance]", sheet).with_fit(starts_from="estimate")
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
-    assert with_start(setup) is setup

@@ -208,7 +208,10 @@ def round_trip(project, folder, **how):
 ALONE = sorted(
     str(file.relative_to(EXAMPLES))
     for file in EXAMPLES.glob("*/*.toml")
-    if file.name != "pyproject.toml" and file.parent.name != "plug-in"
+    if file.name != "pyproject.toml"
+    and file.parent.name != "plug-in"
+    # Those of tests 2 and 3 name other files and nothing else.
+    and not file.name.startswith(("test2", "test3"))
 )
 
 

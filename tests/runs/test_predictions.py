@@ -1,7 +1,8 @@
 """Tests with cards from Python: which cards, tables, notes, what is in the folder."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -157,16 +158,14 @@ def test_failures_errors_and_notes(tmp_path, seen):
     assert found.versions == versions()
 
 
-@dataclass(frozen=True)
-class Strut:
+class Strut(NamedTuple):
     """A bar that is pulled by so many mm per mm."""
 
     strain: float
     thickness: float
 
 
-@dataclass(frozen=True)
-class StrutTest:
+class StrutTest(NamedTuple):
     name: str
     kind: str = "strut"
 
