@@ -156,16 +156,6 @@ def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
     assert 'form = "saturating"' in card and "[scale]" in card
     residuals = pd.read_csv(tmp_path / "residuals.csv")
     assert set(residuals.test) == {"strips", "supplier"}
-    # Both are read back by whoever has the plug-in.
-    out = run(plug_in, "-c", f"""if True:
-        import numpy as np
-        import bubblefit as bf
-        card = bf.read_card({str(tmp_path / "material.toml")!r})
-        print(card.law.form.name, *np.round(card.law.beta, 1).tolist())
-        """)  # fmt: skip
-    name, *beta = out.split()
-    assert name == "saturating"
-    np.testing.assert_allclose(np.array(beta, dtype=float), BETA, rtol=0.02)
     # The card in both kinds of test, by the plug-in's solver.
     simulated = tmp_path / "simulated"
     out = run(plug_in, "-m", "bubblefit.cli", "simulate", "test", "project.toml", "--card",
@@ -175,10 +165,13 @@ def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
     tests = json.loads((simulated / "result.json").read_text())["tests"]
     ((_, strips),) = tests["strips"]["cards"].items()
     assert strips["directions"]["fill"]["rms_N"] < 2.0  # of 720: the polynomial is 0.3 off itself
-    # The Python interface fits by its solver, and the doctor pulls bars with it.
-    out = run(plug_in, "-c", """if True:
+    # Python reads the card back and fits by its solver; the doctor pulls bars with it.
+    out = run(plug_in, "-c", f"""if True:
+        import numpy as np
         import bubblefit as bf
         from bubblefit.cli.main import main
+        card = bf.read_card({str(tmp_path / "material.toml")!r})
+        print(card.law.form.name, *np.round(card.law.beta, 1).tolist())
         project = bf.read_project("project.toml").with_fit(solver="bar")
         fit = bf.fit(project, tests="datasheet", starts=1, jobs=1)
         (row,) = fit.residuals().itertuples()
@@ -189,7 +182,10 @@ def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
             assert bf.fit(other, tests="datasheet", starts=1, jobs=1).objective == fit.objective
         main(["doctor"], standalone_mode=False)
         """)  # fmt: skip
-    objective, quantity, measured, modelled = out.splitlines()[0].split()
+    name, *beta = out.splitlines()[0].split()
+    assert name == "saturating"
+    np.testing.assert_allclose(np.array(beta, dtype=float), BETA, rtol=0.02)
+    objective, quantity, measured, modelled = out.splitlines()[1].split()
     assert float(objective) < 1e-6 and quantity == "load"
     assert float(measured) == pytest.approx(611.4)
     assert float(modelled) == pytest.approx(611.4, rel=1e-6)

@@ -17,6 +17,7 @@ PACKAGES = "cli experiments inference materials project readers reports runs sol
 def test_a_killed_fit_ends_as_if_nobody_had_killed_it(tmp_path):
     needs.linux("processes and what they leave")
     kills = script("benchmarks/bench_kills.py")
+    kills.COMMANDS["fit"] = (kills.BUBBLE.replace("{starts}", "2"), ("fit",))
     for module in pkgutil.walk_packages(bubblefit.__path__, "bubblefit."):
         if module.name.split(".")[1] in PACKAGES and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
