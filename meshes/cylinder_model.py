@@ -70,10 +70,6 @@ class Gas:
     temperature: float = 300.0
     density: float = 1.2041
 
-    def mass(self, gauge: float, volume: float) -> float:
-        """Return the mass in kg of gas at a gauge pressure (MPa) in a volume (mm^3)."""
-        return self.density * 1e-9 * volume * (gauge + self.ambient) / self.ambient
-
     def closed_in(self, gauge: float, volume: float) -> ClosedGas:
         """Return the gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
         return ClosedGas((gauge + self.ambient) * volume, self.ambient)

@@ -210,11 +210,6 @@ class LoadPolynomial:
         at = np.asarray(elongation, dtype=float)
         return np.asarray(polynomial.polyval(at, self.coefficients))
 
-    def slope(self, elongation: ArrayLike) -> Array:
-        """Return dP/du in N/mm at elongations in mm, of the same shape."""
-        at = np.asarray(elongation, dtype=float)
-        return np.asarray(polynomial.polyval(at, polynomial.polyder(self.coefficients)))
-
 
 def fit_load_polynomial(
     elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
@@ -236,36 +231,14 @@ def fit_load_polynomial(
     )
 
 
-@dataclass(frozen=True)
-class SpecimenScatter:
-    """Deviations (N) of specimens from one polynomial: rms and mean of each, rmse over all points.
+def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -> float:
+    """Return the deviation (N) of all points from a polynomial, about their own mean (n - 1).
 
-    deviation : of all points about their own mean (n - 1): the published 21.7, 64.1 and 40.3 N.
+    It is the published 21.7, 64.1 and 40.3 N.
     """
-
-    specimens: tuple[str, ...]
-    rms: tuple[float, ...]
-    mean: tuple[float, ...]
-    rmse: float
-    deviation: float
-
-
-def specimen_scatter(
-    curves: LoadCurve | Sequence[LoadCurve], fitted: LoadPolynomial
-) -> SpecimenScatter:
-    """Return the scatter of one or several curves about a polynomial."""
-    each = [curves] if isinstance(curves, LoadCurve) else list(curves)
-    left = [curve.load - fitted(curve.elongation) for curve in each]
-    together = np.concatenate([*left, np.zeros(0)])
-    if len(together) < 2:
-        raise InputError(None, "curves", f"scatter needs two points, there are {len(together)}")
-    return SpecimenScatter(
-        tuple(curve.specimen for curve in each),
-        tuple(float(np.sqrt((one**2).mean())) for one in left),
-        tuple(float(one.mean()) for one in left),
-        float(np.sqrt((together**2).mean())),
-        float(together.std(ddof=1)),
-    )
+    if len(load) < 2:
+        raise InputError(None, "curves", f"scatter needs two points, there are {len(load)}")
+    return float((load - fitted(elongation)).std(ddof=1))
 
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:

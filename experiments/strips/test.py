@@ -33,7 +33,7 @@ from ...readers.curves import (
     fit_load_polynomial,
     read_load_curves,
     read_published_polynomials,
-    specimen_scatter,
+    specimen_deviation,
     split_at_restarts,
 )
 from ...readers.sections import Length, Name, Positive, Section, beside
@@ -387,7 +387,7 @@ def _measured(
         load = np.concatenate([c.load for c in curves])
         try:
             polynomial = fit_load_polynomial(elongation, load, data.order, data.through_origin)
-            scatter = specimen_scatter(curves, polynomial).deviation
+            scatter = specimen_deviation(elongation, load, polynomial)
         except InputError as error:
             problem = f"no load curve through the {direction} points: {error.problem}"
             raise place.error(f"data, {error.field}", problem) from None

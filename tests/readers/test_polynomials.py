@@ -8,12 +8,11 @@ import pytest
 from bubblefit.experiments.bubble.sheet import fit_disk_polynomial
 from bubblefit.experiments.strips.data import compare_orders
 from bubblefit.readers.curves import (
-    LoadCurve,
     LoadPolynomial,
     fit_load_polynomial,
     read_load_curves,
     read_published_polynomials,
-    specimen_scatter,
+    specimen_deviation,
     split_at_restarts,
 )
 from bubblefit.readers.fields import read_fields
@@ -220,9 +219,6 @@ def test_a_polynomial_of_the_order_is_met_exactly(order, through_origin, end, se
     assert (fitted.order, fitted.points, fitted.end) == (order, 40, end)
     assert fitted.r_squared == pytest.approx(1.0) and fitted.rmse < 1e-8
     assert not through_origin or fitted.coefficients[0] == 0.0
-    step, inner = 1e-5 * end, u[1:-1]
-    difference = (fitted(inner + step) - fitted(inner - step)) / (2 * step)
-    np.testing.assert_allclose(fitted.slope(inner), difference, atol=1e-3 * 500 / end)
 
 
 def test_r_squared_and_rmse_are_those_of_numpy():
@@ -234,7 +230,7 @@ def test_r_squared_and_rmse_are_those_of_numpy():
     left = load - fitted(u)
     assert fitted.rmse == pytest.approx(np.sqrt((left**2).mean()))
     assert fitted.r_squared == pytest.approx(np.corrcoef(u, load)[0, 1] ** 2)
-    assert fitted(1.0).shape == () and fitted.slope([[1.0, 2.0]]).shape == (1, 2)
+    assert fitted(1.0).shape == ()
 
 
 @pytest.mark.parametrize(
@@ -253,16 +249,10 @@ def test_points_that_settle_no_polynomial(u, load, order, words):
 
 
 def test_scatter_is_about_the_polynomial():
-    line, u = LoadPolynomial(np.array([0.0, 10.0]), 2.0, np.nan, np.nan, 0), np.array([1.0, 2.0])
-    above = LoadCurve("warp", "A", u, np.array([13.0, 23.0]), None)
-    below = LoadCurve("warp", "B", u, np.array([10.0, 16.0]), None)
-    scatter = specimen_scatter([above, below], line)
-    assert scatter.specimens == ("A", "B")
-    np.testing.assert_allclose([scatter.rms, scatter.mean], [[3, np.sqrt(8)], [3, -2]])
-    assert scatter.rmse == pytest.approx(np.sqrt(34 / 4))
-    assert scatter.deviation == pytest.approx(np.std([3, 3, 0, -4], ddof=1))
-    assert specimen_scatter(above, line).rms == (3.0,)
-    assert "scatter needs two points" in complaint(specimen_scatter, [], line)
+    line = LoadPolynomial(np.array([0.0, 10.0]), 2.0, np.nan, np.nan, 0)
+    u, load = np.array([1.0, 2.0, 1.0, 2.0]), np.array([13.0, 23.0, 10.0, 16.0])
+    assert specimen_deviation(u, load, line) == pytest.approx(np.std([3, 3, 0, -4], ddof=1))
+    assert "scatter needs two points" in complaint(specimen_deviation, u[:1], load[:1], line)
 
 
 def test_scores_are_what_they_say():
@@ -380,21 +370,11 @@ def points(shared_data):
 
 
 def test_the_published_scatter_is_a_standard_deviation(points):
-    """21.7, 64.1, 40.3 N: about their own mean, n - 1; RMSE is 0.2 to 0.8 N less."""
+    """21.7, 64.1, 40.3 N: about their own mean, n - 1."""
     for direction, one in read_published_polynomials(EXAMPLE).items():
-        scatter = specimen_scatter(split_at_restarts(points[direction]), one.polynomial)
-        assert scatter.deviation == pytest.approx(one.scatter, abs=0.05)
-        assert 0.1 < one.scatter - scatter.rmse < 0.9
-    # Warp and bias to the digits printed: no legend marker is among the points.
-    published = read_published_polynomials(EXAMPLE)
-    printed = {"warp": ([2, 2, 2, 3], 0.998), "bias": ([2, 3, 4, 4], 0.987)}
-    for direction, (digits, r_squared) in printed.items():
-        fitted = fit_load_polynomial(points[direction].elongation, points[direction].load)
-        half = 0.5 * 10.0 ** -np.array(digits)
-        # Digitising adds an error of its own: half a unit more of the last digit.
-        off = np.abs(fitted.coefficients - published[direction].polynomial.coefficients)[1:]
-        assert (off < 2 * half).all()
-        assert fitted.r_squared == pytest.approx(r_squared, abs=5e-4)
+        curve = points[direction]
+        found = specimen_deviation(curve.elongation, curve.load, one.polynomial)
+        assert found == pytest.approx(one.scatter, abs=0.05)
 
 
 def test_one_fill_point_was_not_digitised(points):

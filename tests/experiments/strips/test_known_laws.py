@@ -32,7 +32,7 @@ from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.project.project import read_project
-from bubblefit.readers.curves import LoadCurve, fit_load_polynomial, specimen_scatter
+from bubblefit.readers.curves import LoadCurve, fit_load_polynomial, specimen_deviation
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -463,8 +463,9 @@ WHOLE = 100.0 * ELONGATION
 def strip(loads: np.ndarray) -> Strip:
     """Of curves (specimens, n) N."""
     curves = [LoadCurve("warp", str(k), ELONGATION, f, None) for k, f in enumerate(loads)]
-    polynomial = fit_load_polynomial(np.tile(ELONGATION, len(loads)), loads.ravel(), 2, True)
-    scatter = specimen_scatter(curves, polynomial).deviation
+    points = np.tile(ELONGATION, len(loads)), loads.ravel()
+    polynomial = fit_load_polynomial(*points, 2, True)
+    scatter = specimen_deviation(*points, polynomial)
     return Strip("warp", 20.0, 23.0, polynomial, tuple(curves), scatter)
 
 
