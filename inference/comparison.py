@@ -23,7 +23,8 @@ Numbers = NDArray[np.intp]
 class Nuisance:
     """An unknown beside the moduli, of one comparison (an offset, a pressure) or shared by all.
     name : as its objective knows it, or of a parameter of model or law. lower, upper, prior, start
-    : in `unit`; prior is one standard deviation around `start`. weight : residual of a value one
+    : in `unit`; prior is one standard deviation around `start`. begin : where a fit begins, `start`
+    unless given. weight : residual of a value one
     prior away. model_parameter : the one of the model's `parameters` that takes the difference from
     `start`. scale : the model's units in one `unit`. law_parameter : number of the law beside beta:
     "nu12". why : words for data that say nothing of it."""
@@ -37,6 +38,7 @@ class Nuisance:
     prior: float | None = None
     weight: float = 0.0
     start: float = 0.0
+    begin: float | None = None
     law_parameter: str | None = None
     shared: bool = False
     why: str = ""
@@ -74,6 +76,11 @@ class NuisanceOf:
     @property
     def start(self) -> Array:
         return np.array([n.start for n in self.all])
+
+    @property
+    def begin(self) -> Array:
+        """Return where a fit begins."""
+        return np.array([n.start if n.begin is None else n.begin for n in self.all])
 
     @property
     def priors(self) -> tuple[Numbers, Array]:

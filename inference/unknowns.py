@@ -193,9 +193,9 @@ class Unknowns:
         return replace(law, **numbers)
 
     def at(self, coefficients: Array) -> Array:
-        """Return unknowns (count,) of free coefficients (size,) MPa, nuisance at its start."""
+        """Return unknowns (count,) of free coefficients (size,) MPa, nuisance at its beginning."""
         values = np.linalg.solve(self.to_coefficients, coefficients)
-        return np.concatenate([values, self.nuisance.start])
+        return np.concatenate([values, self.nuisance.begin])
 
     @cached_property
     def box(self) -> tuple[Array, Array]:

@@ -195,6 +195,34 @@ class View:
             return None
         return registration.symmetry_axes([field.frame for field in self.fields], self.radius)
 
+    @cached_property
+    def motion(self) -> Array | None:
+        """Return (3,) mm, the mean motion well within the rim; None without points there."""
+        last, first = self.last, self.fields[0]
+        if not (inner := self.inner(last)).any():
+            return None
+        start = first.displacement[self.inner(first)].mean(axis=0) * (len(self.fields) > 1)
+        return np.asarray(last.displacement[inner].mean(axis=0) - start)
+
+    @property
+    def frame_found(self) -> dict[str, float]:
+        """Return what the fields alone say of the frame: turn of the yarns, tilts about x and y
+        (degrees), shifts (mm), as they make up for it; what is not clear is left out."""
+        found, axes, rim = {}, self.axes, self.clamp or self.rim
+        if (
+            axes is not None
+            and axes.error <= registration.UNSURE
+            and (axes.clear >= registration.CLEAR)
+        ):
+            found["turn"] = axes.off
+        if self.motion is not None and self.motion[2] > 0:
+            x, y, z = self.motion
+            found["tilt_x"] = -float(np.degrees(np.arctan2(y, z)))
+            found["tilt_y"] = float(np.degrees(np.arctan2(x, np.hypot(y, z))))
+        if rim is not None:
+            found |= {"shift_x": -rim.x, "shift_y": -rim.y}
+        return found
+
     def inner(self, field: DisplacementField, share: float = 0.9) -> NDArray[np.bool_]:
         """Return which points lie well within the rim."""
         return np.asarray(self.outline.share(field.points) < share)
@@ -445,12 +473,9 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def tilted(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a rise that is not along z: on average the sheet moves sideways."""
-    last, first = view.last, view.fields[0]
-    inner = view.inner(last)
-    if not inner.any():
+    if view.motion is None:
         return
-    start = first.displacement[view.inner(first)].mean(axis=0) * (len(view.fields) > 1)
-    x, y, z = last.displacement[inner].mean(axis=0) - start
+    x, y, z = view.motion
     tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
     if not tilt < TILT:
         text = (

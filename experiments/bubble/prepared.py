@@ -132,13 +132,19 @@ class PreparedBubble:
         nuisance = (
             *nuisance_of(test),
             *sheet_nuisance(sheet, model, objective.scale),
-            *registration_nuisance(test, objective),
+            *registration_nuisance(test, objective, self.frame_found),
         )
         if masks and all(target.frame is not None for target in targets):
             # What lies above the last frame that counts strains nothing.
             last = max(sheet.since or 0, *(target.frame or 0 for target in targets))
             model = model.until(last)
         return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
+
+    @cached_property
+    def frame_found(self) -> Mapping[str, float]:
+        """Return what the fields alone say of the frame, where a fit of it begins."""
+        wanted = self.test.registration and self.known is None
+        return self.view.frame_found if wanted else {}
 
     @cached_property
     def targets(self) -> list[FieldTarget]:
@@ -262,9 +268,12 @@ def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
     return tuple(on)
 
 
-def registration_nuisance(test: BubbleTest, objective: FieldObjective) -> list[Nuisance]:
+def registration_nuisance(
+    test: BubbleTest, objective: FieldObjective, begin: Mapping[str, float]
+) -> list[Nuisance]:
     """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
-    Their priors weigh as the noise does: the field's symmetry tells far more."""
+    begin : where a fit of each begins, by name, if within its bounds. Their priors weigh as the
+    noise does: the field's symmetry tells far more."""
     known, found = test.registration, list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
     for name, prior in known.items():
@@ -278,7 +287,10 @@ def registration_nuisance(test: BubbleTest, objective: FieldObjective) -> list[N
         unit = "deg" if name == "tilt" else "mm"
         own = (one for one in matching.PLACED if one.startswith(name))
         found += [Nuisance(one, -most, most, unit, prior=prior, weight=weight) for one in own]
-    return found
+    return [
+        replace(one, begin=begin[one.name]) if abs(begin.get(one.name, np.inf)) < one.upper else one
+        for one in found
+    ]
 
 
 def resampled(

@@ -6,6 +6,7 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint
@@ -51,6 +52,21 @@ def test_turn_tilt_and_shift_are_found_with_their_sigma():
         assert found.law.modulus(name, 0.0) == pytest.approx(
             value, rel=0.1 if name == "G12" else 0.01
         )
+
+
+def test_a_fit_begins_where_the_fields_are_symmetric_and_rise():
+    points, seen = camera()
+    bubble = bf.Bubble(points, seen, PRESSURES, radius=100.0, elements=300, noise=NOISE,
+                       nuisance={"registration": "fitted"})  # fmt: skip
+    project = bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81))
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    unknowns = setup.problem().unknowns
+    begin = dict(zip(unknowns.nuisance.names, unknowns.nuisance.begin, strict=True))
+    assert begin["turn"] == pytest.approx(TURN, abs=1.5)
+    assert begin["tilt_x"] == pytest.approx(TILT, abs=0.3) and abs(begin["tilt_y"]) < 0.3
+    assert begin["shift_x"] == pytest.approx(-SHIFT[0], abs=0.5)
+    assert begin["shift_y"] == pytest.approx(-SHIFT[1], abs=0.5)
+    assert not unknowns.nuisance.start.any()
 
 
 def test_a_quarter_cannot_be_turned():
