@@ -53,8 +53,6 @@ MOST_TURN = 30.0
 LEAST_QUADS = 48
 #: Quads on which a smoothed shape is balanced, at most: measured fields know no more.
 SHAPED = 150
-#: Number of the increment of a path from which a finer model begins: the sheet is taut there.
-LEAD = 1
 #: A place between the polygons of two rims is looked for so much nearer to the centre, in turn.
 INWARD = (1.0, 1 - 1e-4, 1 - 1e-3, 1 - 1e-2, 0.95, 0.9)
 
@@ -313,14 +311,20 @@ def resampled(
 
 
 def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
-    """Return starts of a finer model from a path (steps, nodes, 3): one, NaN before it.
-    The sheet is taut there; with less pressure a slack one has folds that depend on the mesh."""
+    """Return starts of every increment of a finer model from a path (steps, nodes, 3).
+    Displacements are straight in the cube root of the pressure, also below the first one: a slack
+    sheet has moved far there, and has folds that a finer mesh does not find from above."""
     sample = _sample(SmoothReading.of(own.mesh), finer.mesh.points[:, :2])
-    k = min(LEAD, len(path) - 1)
-    last = int(np.argmin(np.abs(np.array(finer.increments) - own.increments[k])))
-    starts = np.full((last + 1, *finer.mesh.points.shape), np.nan)
-    starts[last] = sample @ path[k]
-    starts.reshape(last + 1, -1)[last, finer.fixed] = 0.0
+    order = np.argsort(own.increments)
+    known, moved = np.cbrt(np.array(own.increments)[order]), path[order]
+    if len(known) == 1:
+        known, moved = np.append(0.0, known), np.concatenate([0.0 * moved, moved])
+    starts = np.empty((len(finer.increments), *finer.mesh.points.shape))
+    for start, level in zip(starts, np.cbrt(np.array(finer.increments)), strict=True):
+        after = min(max(int(np.searchsorted(known, level)), 1), len(known) - 1)
+        share = (level - known[after - 1]) / (known[after] - known[after - 1])
+        start[:] = sample @ ((1.0 - share) * moved[after - 1] + share * moved[after])
+        start.reshape(-1)[finer.fixed] = 0.0
     return starts
 
 
