@@ -202,6 +202,9 @@ class PreparedBubble:
             problem = f"{whole} quads are too few for a disk, of which {LEAST_QUADS} are the least"
             raise InputError(None, "elements", problem)
         steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
+        if factor > 1 and test.sheet.known:
+            # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
+            steps = [p for p in steps if p >= own.model.increments[0] * (1 - 1e-12)]
         model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
         assert isinstance(own.objective, FieldObjective)
         moved = copy.copy(own.objective)
