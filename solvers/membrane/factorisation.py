@@ -135,17 +135,18 @@ class BandedTangent:
         return np.asarray(x[self.rank])
 
     def times(self, columns: Array) -> Array:
-        place, rows, starts = self._pattern
-        matrix = sp.csc_matrix((self.data[place], rows, starts), (self.size, self.size))
+        place, matrix = self._pattern
+        matrix.data[:] = self.data[place]
         return np.asarray((matrix @ columns[self.order])[self.rank])
 
     @cached_property
-    def _pattern(self) -> tuple[Numbers, Numbers, Numbers]:
-        """Return the places of all entries in `data`, their rows, and where columns start."""
+    def _pattern(self) -> tuple[Numbers, sp.csc_matrix]:
+        """Return the places in `data` of all entries of the matrix, and room for it."""
         place = np.unique(self.slot[self.slot >= 0])
         column, row = np.divmod(place, self.depth)
         starts = np.searchsorted(column, np.arange(self.size + 1))
-        return place, row - 2 * self.width + column, starts
+        held = np.zeros(len(place)), row - 2 * self.width + column, starts
+        return place, sp.csc_matrix(held, (self.size, self.size))
 
 
 class SparseTangent:

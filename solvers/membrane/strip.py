@@ -58,8 +58,11 @@ class DrivenTangent:
         self.slot = self.inner.slot.copy()
         self.slot[beside] = inside + np.arange(count)
         self.inner.data = self.data[:inside]
-        self._tail, self._at = self.data[inside:], (rows[beside], columns[beside])
-        self._shape = (size, size)
+        # By rows; entries of one place are not summed, which a product does not need.
+        self._by_row = np.argsort(rows[beside], kind="stable")
+        starts = np.searchsorted(rows[beside][self._by_row], np.arange(size + 1))
+        at = np.zeros(count), columns[beside][self._by_row], starts
+        self._tail, self._edge = self.data[inside:], sp.csr_matrix(at, shape=(size, size))
 
     def factor(self) -> None:
         self.inner.factor()
@@ -75,7 +78,8 @@ class DrivenTangent:
 
     def edge(self) -> sp.csr_matrix:
         """Return (size, size): the driven rows and columns of the tangent as last assembled."""
-        return sp.csr_matrix((self._tail, self._at), shape=self._shape)
+        self._edge.data[:] = self._tail[self._by_row]
+        return self._edge
 
 
 class Pull:
