@@ -1,11 +1,18 @@
-"""Measure estimates by virtual work of noisy fields of the known solution."""
+"""Measure estimates by virtual work, and what answers cost beside an earlier version."""
 
+import os
+import subprocess
+import sys
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
+import bench_valmex
 import numpy as np
+import pandas as pd
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs.estimate import estimate_of
-from common import known_project, known_setup, start_on
+from common import EXAMPLES, ROOT, known_project, known_setup, start_on
 
 #: mm, of one displacement.
 NOISE = 0.0, 0.01, 0.03, 0.1
@@ -54,5 +61,66 @@ def errors(found, truth):
     return np.array(rows).T
 
 
+#: A process that reads a project and fits it; prints its processor time, and its children's.
+FIT = """
+import resource, sys
+import bubblefit as bf
+own = {"starts_from": "estimate"} if sys.argv[3] and hasattr(bf, "estimate") else {}
+found = bf.fit(bf.read_project(sys.argv[1]), jobs=1, starts=int(sys.argv[2]), **own)
+found.card
+own, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+print(sum(r.ru_utime + r.ru_stime for r in (own, others)), found.objective)
+"""
+
+
+def beside(other="../old", repeats=3, *, data=bench_valmex.DATA, long=False):
+    """Fit real tests and the known solution beside the version in the folder OTHER.
+
+    OTHER/bubblefit is a worktree of it (git worktree add). Prints seconds of processor time with
+    all processes and imports, without compiling, the least of REPEATS side by side, their ratio,
+    and objectives. A version without estimates starts at random. --long: 50 starts, and one law of
+    tests 1 to 3 and strips.
+    """
+    known = EXAMPLES / "bubble-known-solution" / "project.toml"
+    with tempfile.TemporaryDirectory() as place:
+        one, all_three = (Path(place) / name for name in ("one.toml", "three.toml"))
+        one.write_text(real_project(data, bench_valmex.ALONE, 1))
+        curves = EXAMPLES / "joint-valmex7318" / "curves.csv"
+        strips = bench_valmex.STRIPS.format(curves=curves, increments=25)
+        all_three.write_text(real_project(data, bench_valmex.JOINT, 1, 2, 3) + strips)
+        works = [("real test 1, one random start", one, 1, ""),
+                 ("real test 1, one start from the estimate", one, 1, "estimate"),
+                 ("known solution, one start from the estimate", known, 1, "estimate")]  # fmt: skip
+        if long:
+            works += [("known solution, 50 random starts", known, 50, ""),
+                      ("tests 1 to 3 and strips, one start", all_three, 1, "estimate")]  # fmt: skip
+        for name, project, starts, begin in works:
+            least, ends = {}, {}
+            for _ in range(int(repeats)):
+                for which in (str(Path(other).absolute()), str(ROOT.parent)):
+                    done = subprocess.run(
+                        [sys.executable, "-c", FIT, str(project), str(starts), begin], cwd=place,
+                        env={**os.environ, "PYTHONPATH": which}, stdout=subprocess.PIPE, text=True,
+                    )  # fmt: skip
+                    seconds, ends[which] = map(float, done.stdout.split())
+                    least[which] = min(seconds, least.get(which, np.inf))
+            before, now = least.values()
+            print(f"{name}: {before:.2f} s, now {now:.2f} s, {now / before:.2f} of it; objectives "
+                  f"{', '.join(f'{e:.7g}' for e in ends.values())}", flush=True)  # fmt: skip
+
+
+def real_project(data, law, *tests):
+    """Return the text of a project of real tests, eleven frames and ten modes of the sheet each."""
+    folder = bench_valmex.measured(data)
+    pressures = pd.read_csv(folder / "grid_pressures.csv")["p_bar"]
+    said = {"frames": list(bench_valmex.FEW), "elements": 112, "modes": 10, "unknowns": "",
+            "pressures": [float(pressures[k]) for k in bench_valmex.FEW]}  # fmt: skip
+    text = bench_valmex.PROJECT.format(law=law, starts=1)
+    for test in tests:
+        bubble = bench_valmex.BUBBLE.format(name=f"test {test}", test=test, **said)
+        text += f'{bubble}folder = "{folder}"\n'
+    return text
+
+
 if __name__ == "__main__":
-    start_on(estimate)
+    start_on(estimate, beside)
