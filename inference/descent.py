@@ -61,7 +61,7 @@ def descend(
             if predicted < negligible * merit:
                 return point, end
             trial = problem.evaluate(point.unknowns + step, True)
-            if trial is not None and not trial.stable:
+            if trial is not None and point.stable and not trial.stable:
                 cut = _cut(problem, point.unknowns, trial.unknowns)
                 if cut is not None:
                     a, c = np.vstack([a, cut[0]]), np.append(c, cut[1])

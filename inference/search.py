@@ -173,5 +173,7 @@ def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> 
     if first is None:
         return None
     free = np.arange(problem.unknowns.count) >= problem.unknowns.size
-    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, only=free)
+    # Squares lead to the optimum of e, the sum of norms, from further away.
+    near, _ = descend(problem, first, TOLERANCE, MOST, only=free)
+    best, _ = descend(problem, near, TOLERANCE, problem.analyses + MOST, norms=True, only=free)
     return best

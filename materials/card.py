@@ -195,8 +195,8 @@ class MaterialCard:
         words = f"{self.name or 'material card'}, {self.thickness:g} mm, nu12 {self.law.nu12:g}"
         sure = self.certainty
         band = None if sure is None else functools.partial(sure.band, self.law)
-        table = moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
-        return f"{table}<p>{self.closed_path.words}</p>"
+        words = f"{words}; {self.closed_path.words}"
+        return moduli_html(self.law, words, band, "" if sure is None else f"{LEVEL:.0%} band")
 
 
 def thickness_difference(card: MaterialCard, thickness: float) -> str | None:

@@ -23,7 +23,7 @@ from bubblefit.inference.likelihood import BOUND, Side
 from bubblefit.inference.linear import Order
 from bubblefit.inference.noise import Discrepancy, Misfit, NoiseTest, notes_of_discrepancies
 from bubblefit.inference.noise import notes_of_noise as notes_of_noise_tests
-from bubblefit.inference.problem import Group, Unit
+from bubblefit.inference.problem import ANALYSES_USED_UP, Group, Unit
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs.bootstrap import Bootstrap
@@ -71,6 +71,12 @@ def fit() -> bf.Fit:
 
 def notes_of_fit(*_: Any) -> list[Note]:
     return fit().notes
+
+
+def notes_of_an_unfinished_fit(*_: Any) -> list[Note]:
+    best = fit().best
+    ranked = [replace(record, status=ANALYSES_USED_UP) for record in best.ranked]
+    return replace(fit(), best=replace(best, ranked=ranked)).notes
 
 
 def comparison(fit: bf.Fit) -> LawComparison:
