@@ -106,13 +106,15 @@ def certainty_of(
 ) -> CardCertainty:  # fmt: skip
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
+    crimp, free = base.crimp_map(law.form), list(law.form.free)
     relative = np.vstack(
         [
-            law.modulus_rows(name, strain, ratio)[:, list(law.form.free)]
+            law.modulus_rows(name, strain, ratio)[:, free]
             / law.modulus(name, strain, ratio)[:, None]
             for name, strain in strains_of(law).items()
             for ratio in base.ratios_of(law.form, name)
         ]
+        + [crimp[:, free] / (crimp @ law.beta)[:, None]]
     )
     _, sizes, turned = np.linalg.svd(relative @ spread.T, full_matrices=False)
     kept = turned[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
@@ -129,8 +131,9 @@ def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
 
 
 def positive(law: HypoelasticLaw) -> bool:
-    """Return whether every modulus is above zero in the law's range, at every load ratio."""
-    return all(
+    """Return whether every modulus is above zero in the law's range, at every load ratio, and
+    what crimp there is."""
+    return bool((base.crimp_map(law.form) @ law.beta > 0).all()) and all(
         (law.modulus(name, strain, ratio) > 0).all()
         for name, strain in strains_of(law).items()
         for ratio in base.ratios_of(law.form, name)

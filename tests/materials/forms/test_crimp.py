@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bubblefit.materials.card import MaterialCard, positive, read_card
+from bubblefit.materials.card import MaterialCard, certainty_of, positive, read_card
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.forms.ratio import SplineCrimp
 from bubblefit.materials.forms.spline import Spline
@@ -116,6 +116,13 @@ def test_cards_bounds_and_what_has_no_crimp(tmp_path):
     card.write(tmp_path / "card.toml", "MPa")
     back = read_card(tmp_path / "card.toml").law
     assert back.form == FORM and positive(back) and back.of_load_ratio
+    assert not positive(law_of([*BETA[:-3], -1.5, 2.5, 12.0]))
+    drawn = BETA + np.random.default_rng(1).normal(0.0, 0.1, (50, 12)) * (np.arange(12) > 8)
+    sure = certainty_of(law_of(), drawn)
+    assert np.sqrt(np.diag(sure.covariance)[9:]) == pytest.approx(0.1, rel=0.3)
+    assert all(
+        min(law.coupling[3:]) > 0 for law in sure.laws(law_of(), 20, np.random.default_rng(1))
+    )
     np.testing.assert_allclose(back.coupling, [0.2, 0.0, 0.0, 1.5, 2.5, 12.0])
     assert form_named("spline-crimp", {"knots": 3}, [0.1] * 3).size == 12
     assert FORM.own_rows("S").shape == (3, 12)
