@@ -195,15 +195,6 @@ class View:
             return None
         return registration.symmetry_axes([field.frame for field in self.fields], self.radius)
 
-    @cached_property
-    def motion(self) -> Array | None:
-        """Return (3,) mm, the mean motion well within the rim; None without points there."""
-        last, first = self.last, self.fields[0]
-        if not (inner := self.inner(last)).any():
-            return None
-        start = first.displacement[self.inner(first)].mean(axis=0) * (len(self.fields) > 1)
-        return np.asarray(last.displacement[inner].mean(axis=0) - start)
-
     @property
     def frame_found(self) -> dict[str, float]:
         """Return what the fields alone say of the frame: turn of the yarns, tilts about x and y
@@ -215,8 +206,9 @@ class View:
             and (axes.clear >= registration.CLEAR)
         ):
             found["turn"] = axes.off
-        if self.motion is not None and self.motion[2] > 0:
-            x, y, z = self.motion
+        motion = _motion(self)
+        if motion is not None and motion[2] > 0:
+            x, y, z = motion
             found["tilt_x"] = -float(np.degrees(np.arctan2(y, z)))
             found["tilt_y"] = float(np.degrees(np.arctan2(x, np.hypot(y, z))))
         if rim is not None:
@@ -471,11 +463,21 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
         yield Doubt("off-centre", off > FAR_OFF * view.radius, text)
 
 
+def _motion(view: View) -> Array | None:
+    """Return (3,) mm, the mean motion well within the rim; None without points there."""
+    last, first = view.last, view.fields[0]
+    if not (inner := view.inner(last)).any():
+        return None
+    start = first.displacement[view.inner(first)].mean(axis=0) * (len(view.fields) > 1)
+    return np.asarray(last.displacement[inner].mean(axis=0) - start)
+
+
 def tilted(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt a rise that is not along z: on average the sheet moves sideways."""
-    if view.motion is None:
+    motion = _motion(view)
+    if motion is None:
         return
-    x, y, z = view.motion
+    x, y, z = motion
     tilt = float(np.degrees(np.arctan2(np.hypot(x, y), abs(z)))) if z else 0.0
     if not tilt < TILT:
         text = (
