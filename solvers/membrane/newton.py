@@ -149,9 +149,7 @@ class Membrane:
                 if not self.keep_tangent:
                     self.unbalance(u, pressure, with_tangent=True)
             try:
-                if not chord:
-                    self.tangent.factor()
-                step = -self.tangent.solve(self.residual[self.free])
+                step = -self.tangent.step(self.residual[self.free], not chord)
             except SingularTangent:
                 return None
             largest = float(np.abs(step).max())

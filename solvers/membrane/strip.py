@@ -42,7 +42,7 @@ GAUGE_TOLERANCE = 1e-10
 LOOK_BACK = 4
 
 
-class DrivenTangent:
+class DrivenTangent(Tangent):
     """The tangent of the free unknowns and, in the same array, every entry of the driven ones."""
 
     def __init__(

@@ -25,7 +25,7 @@ from bubblefit.inference.linear import (
     posteriors_of,
     second_of,
 )
-from bubblefit.inference.methods import FitOptions, method_names
+from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.problem import Optimum
 from bubblefit.inference.search import feasible_start, fit_from
@@ -165,6 +165,23 @@ def test_fits_that_meet_instability_get_past_it(seed, number):
     optimum = levenberg_marquardt(fit, feasible_start(fit, seed, number), 1e-7, 100)
     assert fit.unstable > 0
     assert optimum is not None and optimum.value < 1e-6 and optimum.best.stable
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_restarts_that_lead_back_end_early_and_change_nothing(monkeypatch, number):
+    fit, ends = problem(noise=0.1), []
+    start = feasible_start(fit, 1, number)
+    for near in (lm.NEAR, -1.0):  # the latter is never near enough
+        monkeypatch.setattr(lm, "NEAR", near)
+        fit.reset()
+        ends.append(levenberg_marquardt(fit, start, 1e-7, 200))
+        assert fit.unstable > 0
+    early, late = ends
+    assert early.analyses <= late.analyses - 5
+    assert early.value == pytest.approx(late.value, rel=1e-6)
+    law, other = (LAW.with_beta(end.coefficients) for end in ends)
+    apart = moduli_error(law, other, reference().strain_max)
+    assert max(apart.values()) < 1e-3
 
 
 def test_reweighting_lowers_e_on_noisy_data():
