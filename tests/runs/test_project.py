@@ -143,7 +143,7 @@ def test_each_modulus_has_bounds_of_its_own(example, form):
     of = np.array(own.form.modulus_of)
 
     def constant(e1, e2, g12):
-        moduli = {"E1": e1, "E2": e2, "G12": g12}
+        moduli = {"E1": e1, "E2": e2, "G12": g12, "T": 1.0, "S": 10.0}
         return np.linalg.solve(values, [moduli[name] for name in of])
 
     inside = [(100.1, 20.1, 3.1), (1999, 999, 199)]
