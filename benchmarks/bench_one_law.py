@@ -73,13 +73,12 @@ def words(found, scatter):
 
 
 def criterion(found):
-    """Return Bayes' information criterion: each block by the RMS that is left of it, and as many
-    values as a block has independent ones (`values_that_err_as_one`)."""
-    noise = found.best.certainty
-    alike = max(1.0, float(np.median([*getattr(noise, "alike", {}).values(), 1.0])))
+    """Return Bayes' information criterion: each comparison by the RMS that is left of it, and as
+    many values as it has independent ones (`values_that_err_as_one`)."""
+    alike = getattr(found.best.certainty, "alike", {})
     total, values = 0.0, 0.0
     for comparison, own in zip(found.problem.comparisons, rows_of(found), strict=True):
-        count = len(own) / (alike if comparison.name.startswith("test") else 1.0)
+        count = len(own) / max(1.0, alike.get(comparison.name, 1.0))
         total += count * np.log(np.mean((own * np.median(comparison.objective.scale)) ** 2))
         values += count
     return total + len(found.best.point.unknowns) * np.log(values)
