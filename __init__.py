@@ -25,9 +25,9 @@ import bubblefit.solvers.marc.t19  # noqa: F401
 from .files import __version__ as __version__
 
 if TYPE_CHECKING:
+    from .experiments.cycles.evaluation import cycles
     from .experiments.kinds import Fabric
     from .experiments.own import OwnTest
-    from .experiments.strips.cycles import cycles
     from .materials.card import MaterialCard, read_card
     from .materials.forms.spline import Form
     from .project.measured import read, register
@@ -72,7 +72,7 @@ _PLACES = {
     "bootstrap": "runs.bootstrap",
     "check": "runs.fit",
     "compare": "runs.compare",
-    "cycles": "experiments.strips.cycles",
+    "cycles": "experiments.cycles.evaluation",
     "estimate": "runs.estimate",
     "fit": "runs.fit",
     "plan": "runs.plan",

@@ -22,8 +22,8 @@ from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
 from ..experiments.biaxial.test import BiaxialTest
+from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips import gauge
-from ..experiments.strips.cycles import cycles
 from ..files import __version__, replacing
 from ..materials.designers import Options
 from ..project.project import read_project

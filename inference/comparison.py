@@ -336,7 +336,7 @@ class Comparison:
         self, law: HypoelasticLaw, free: Sequence[int], values: Mapping[str, float]
     ) -> Array:
         """Return the varying parameters in the order in which the solver differentiates by them."""
-        of_law = [float(getattr(law, name)) for name in self._of_law]
+        of_law = [law.number(name) for name in self._of_law]
         return np.concatenate([law.beta[list(free)], list(values.values()), of_law])
 
     def _guess(self, point: Array) -> Array | None:

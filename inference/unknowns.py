@@ -189,8 +189,7 @@ class Unknowns:
 
     def law(self, law: HypoelasticLaw, y: Array) -> HypoelasticLaw:
         """Return a law with the numbers of unknowns y (count,), nu12 where it is one of them."""
-        numbers: dict[str, Any] = {"beta": self.beta(y), **self.nuisance.of_law(y[self.size :])}
-        return replace(law, **numbers)
+        return law.with_numbers(self.beta(y), self.nuisance.of_law(y[self.size :]))
 
     def at(self, coefficients: Array) -> Array:
         """Return unknowns (count,) of free coefficients (size,) MPa, nuisance at its beginning."""
@@ -243,11 +242,15 @@ class Unknowns:
             a.append(definite / np.abs(definite).max(axis=1, keepdims=True))
             c.append(np.zeros(len(definite)))
         law, extra = np.vstack(a), self.count - self.size
-        whole = np.zeros((len(law) + 2 * extra, self.count))
-        whole[: len(law), : self.size] = law
-        whole[len(law) :, self.size :] = np.vstack([np.eye(extra), -np.eye(extra)])
+        # A law reloads along a tangent that is at most that of its unloading.
+        own = [n.law_parameter for n in self.nuisance.shared]
+        pairs = [(own.index(n.replace("re", "un", 1)), k) for k, n in enumerate(own)
+                 if n is not None and n.startswith("reloading_")]  # fmt: skip
+        box = np.vstack([np.eye(extra), -np.eye(extra), np.zeros((len(pairs), extra))])
+        for row, (up, back) in enumerate(pairs, start=2 * extra):
+            box[row, [up, back]] = 1.0, -1.0
         low, high = self.nuisance.bounds
-        return whole, np.concatenate([*c, low, -high])
+        return block_diag(law, box), np.concatenate([*c, low, -high, np.zeros(len(pairs))])
 
     @cached_property
     def stability_rows(self) -> Array:

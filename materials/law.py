@@ -10,7 +10,7 @@ nu21 = nu12 E2/E1; the stress is Cauchy stress in the material frame. One increm
 of each modulus over its own strain increment (`point_moduli`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
@@ -141,6 +141,20 @@ class HypoelasticLaw:
     def area_power(self) -> float:
         """Return the power of the area ratio in J sigma: 1 constant, 0 incompressible thickness."""
         return 1.0 if self.thickness_change == "constant" else 0.0
+
+    def number(self, name: str) -> float:
+        """Return nu12, or a number of the memory by its name in `memory.NAMES`."""
+        if name == "nu12":
+            return self.nu12
+        return float(self.coupling[PLAIN + NAMES.index(name)])
+
+    def with_numbers(self, beta: ArrayLike, numbers: Mapping[str, float]) -> Self:
+        """Return the law with other coefficients and, by name, numbers of `number`."""
+        memory = self.memory
+        if memory is not None:
+            memory = memory.with_constants({n: x for n, x in numbers.items() if n in NAMES})
+        nu12 = numbers.get("nu12", self.nu12)
+        return replace(self, beta=np.asarray(beta, float), nu12=nu12, memory=memory)
 
     def with_beta(self, beta: ArrayLike) -> Self:
         return replace(self, beta=np.asarray(beta, dtype=float))

@@ -19,7 +19,7 @@ saturation of each.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +91,13 @@ class Memory:
     def of(cls, constants: Sequence[float]) -> "Memory":
         """Return the memory of the numbers that `NAMES` lists."""
         return cls(*(constants[k :: len(FIELDS)] for k in range(len(FIELDS))))
+
+    def with_constants(self, numbers: Mapping[str, float]) -> "Memory":
+        """Return the memory with other numbers by name; reloading stays below unloading."""
+        own = dict(zip(NAMES, self.constants, strict=True)) | dict(numbers)
+        for k in range(2, len(NAMES), len(QUANTITIES)):
+            own[NAMES[k]] = min(own[NAMES[k]], own[NAMES[k - 1]])  # of which steps round
+        return Memory.of(list(own.values()))
 
     def kept(self, component: int, largest: float) -> float:
         """Return the permanent set after a largest strain."""

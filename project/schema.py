@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
 from ..experiments.kinds import Place
@@ -73,6 +74,35 @@ class MarginSection(Section):
     G12: Positive
 
 
+class RecalledSection(Section):
+    """[law.memory.warp], fill or shear: unloading and reloading below the largest strain."""
+
+    permanent_set: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    unloading: Annotated[float, Field(ge=1, lt=2)] = 1.0
+    reloading: Annotated[float, Field(ge=1, lt=2)] = 1.0
+    saturation: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+
+
+def _recalled(given: Any) -> Any:
+    # Not checked as a union: complaints then name the key, not the form.
+    if isinstance(given, dict):
+        return RecalledSection.model_validate(given)
+    if given not in (None, "fitted") and not isinstance(given, RecalledSection):
+        raise PydanticCustomError("fitted", "Input should be 'fitted' or a table of numbers")
+    return given
+
+
+Recalled = Annotated[RecalledSection | Literal["fitted"] | None, BeforeValidator(_recalled)]
+
+
+class MemorySection(Section):
+    """[law.memory]: numbers of a memory that is known, or "fitted"; none: no memory there."""
+
+    warp: Recalled = None
+    fill: Recalled = None
+    shear: Recalled = None
+
+
 class LawSection(Section):
     """[law]: the form of the moduli, and between what they are looked for.
     Keys beyond these belong to a form (knots, breaks); it checks them."""
@@ -85,6 +115,7 @@ class LawSection(Section):
     strain_range: StrainTriple | None = None
     bounds: Annotated[BoundsSection | None, Unit("modulus")] = None
     margin: Annotated[MarginSection | None, Unit("modulus")] = None
+    memory: MemorySection | None = None
 
 
 class UnknownSection(Section):

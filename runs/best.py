@@ -36,6 +36,7 @@ from ..inference.search import evaluate_law
 from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
+from ..materials.memory import NAMES
 from ..project.project import Project
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .simulation import GivenCard, card_of, card_words
@@ -353,6 +354,8 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         raise InputError(setup.project.path, "--card", expected)
     start = unknowns.at(material.law.beta[list(unknowns.free)])
     known = {"nu12": material.law.nu12, "thickness": material.thickness}
+    if (memory := material.law.memory) is not None:
+        known |= dict(zip(NAMES, memory.constants, strict=True))
     for place, shared in enumerate(unknowns.nuisance.shared, start=unknowns.size):
         if shared.name in known:
             start[place] = min(max(known[shared.name], shared.lower), shared.upper)

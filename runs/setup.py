@@ -36,9 +36,10 @@ from ..inference.unknowns import (
     Starts,
     Unknowns,
 )
-from ..materials.forms.base import Form, form_named, form_settings, of_strain
+from ..materials.forms.base import STRAIN_NAMES, Form, form_named, form_settings, of_strain
 from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw
+from ..materials.memory import QUANTITIES, Memory
 from ..project.project import Project
 from ..project.schema import UnknownSection
 from ..readers.sections import beside
@@ -71,7 +72,28 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
         field = f"law.{error.field}" if error.field else "law.form"
         raise InputError(path, field, error.problem) from None
     change = project.fabric.thickness_change
-    return HypoelasticLaw(np.zeros(form.size), section.nu12, np.array(ends), change, form)
+    return HypoelasticLaw(
+        np.zeros(form.size), section.nu12, np.array(ends), change, form, _memory(project)
+    )
+
+
+#: A law without memory; where the fit of one begins; its bounds, saturation per unit of strain.
+FORGETS, REMEMBERS = (0.0, 1.0, 1.0, 0.0), (0.3, 1.4, 1.15, 1.0)
+REMEMBERED = {"set": (0.0, 0.99), "unloading": (1.0, 1.99), "reloading": (1.0, 1.99),
+              "saturation": (0.0, 1e3)}  # fmt: skip
+
+
+def _memory(project: Project) -> Memory | None:
+    """Return the memory of [law.memory], what is fitted at its start."""
+    if (section := project.law.memory) is None:
+        return None
+    said = [getattr(section, name) for name in STRAIN_NAMES]
+    rows = [FORGETS if one is None else REMEMBERS if one == "fitted" else
+            tuple(one.model_dump().values()) for one in said]  # fmt: skip
+    try:
+        return Memory.of([x for row in rows for x in row])
+    except InputError as error:
+        raise InputError(project.path, f"law.{error.field}", error.problem) from None
 
 
 def _form_settings(
@@ -175,6 +197,7 @@ NU12, THICKNESS = (0.0, 0.6), (0.5, 1.5)
 #: End of the nu12 of positive definite laws.
 MOST_NU12 = 1.0
 #: Also if incompressible: its load is moduli times thickness times a function of strain.
+UNLOADED = "cycles to several peaks, unloaded to low loads, would tell it"
 PRODUCT = "a membrane under load knows moduli times thickness only"
 
 
@@ -211,6 +234,14 @@ def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
             Nuisance("thickness", low, high, "mm", "thickness", 1.0, prior, start=start,
                      shared=True, why=PRODUCT)
         )  # fmt: skip
+    memory = _memory(project)
+    for name in STRAIN_NAMES if memory is not None else ():
+        for quantity, (low, high) in REMEMBERED.items():
+            if getattr(project.law.memory, name) == "fitted":
+                own = f"{quantity}_{name}"
+                start = REMEMBERS[QUANTITIES.index(quantity)]
+                shared.append(Nuisance(own, low, high, "", start=start, law_parameter=own,
+                                       shared=True, why=UNLOADED))  # fmt: skip
     return tuple(shared)
 
 

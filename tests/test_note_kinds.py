@@ -15,6 +15,7 @@ import pytest
 from bubblefit.cli.fits import lines_of
 from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
+from bubblefit.experiments.cycles.evaluation import CHANGING, DRIFT, GRIPS, SLIP
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import (
     BEYOND_CARD,
@@ -27,7 +28,6 @@ from bubblefit.experiments.kinds import (
     UNSTABLE,
 )
 from bubblefit.experiments.registry import report_of
-from bubblefit.experiments.strips.cycles import CHANGING, DRIFT, GRIPS, SLIP
 from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
 from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN

@@ -24,7 +24,7 @@ from ...inference.comparison import Comparison, NoiseIs
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
-from ...readers.sections import Name, Positive, Section, beside
+from ...readers.sections import Length, Name, Positive, Section, beside
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Predicted, Reach, Studied, Weighting
@@ -46,7 +46,7 @@ class TubeSection(Section):
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
-    diameter: Positive
+    diameter: Length
     file: str
     folder: str = ""
     noise: Positive | None = None

@@ -242,6 +242,8 @@ LEAST = {
     "strips": {"warp": {"gauge_length": 0.02, "final_length": 0.023}, "data": {"files": ["c"]}},
     "biaxial": {"data": {"files": ["d"]}},
     "cylinder": {"diameter": 0.15, "pressure": 100.0},
+    "cycles": {"files": {"warp": ["e"]}},
+    "tube": {"diameter": 0.2, "file": "f"},
 }
 
 
@@ -273,7 +275,7 @@ def value(part):
         low = max(part.get("minimum", part.get("exclusiveMinimum", 0)), -2)
         high = part.get("maximum", part.get("exclusiveMaximum", 1e9))
         chosen = min(low + 1, (low + high) / 2)
-        return int(chosen) if part["type"] == "integer" else chosen / 3
+        return int(chosen) if part["type"] == "integer" else low + (chosen - low) / 3
     return {"boolean": True, "string": "text", "object": {}}[part["type"]]
 
 
@@ -306,6 +308,7 @@ BRAID |= {"pressure": [60.0, 100.0], "yarn": [1e3, 2e3], "across": [0.1, 0.2]}
 KNOWN = {"data": {"points": None, "known_solution": {"beta": [0.1] * 12}}}
 #: What stands beside a key, or in place of its value, so that the whole makes sense.
 COMPANIONS = {
+    "cycles.files.bias": {"gauge_length": 0.02},
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
     "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},
     "bubble.pressures": {"data": {"points": {"files": ["a"]}}},
@@ -372,7 +375,7 @@ def test_every_key_of_a_test_is_the_same_through_objects_and_toml(kind, tmp_path
             (mine, theirs) = (list(one.definitions.values()) for one in (project, other))
             assert mine[0].section == theirs[0].section, path
         count += 1
-    assert count > 20
+    assert count > {"tube": 5, "cycles": 15}.get(kind, 20)
 
 
 #: Settings that go with each other, or name something that is there.

@@ -268,6 +268,14 @@ class FittedCycles:
         return float(self.memory[0] * largest / (1.0 + self.memory[3] * largest))
 
 
+def matched_rows(one: EvaluatedHistory) -> tuple[int, int]:
+    """Return first and last row, from the first passage of the reference load to the last."""
+    h, first, last = one.history, one.values[0].cycle.start, one.values[-1].cycle.peak
+    start = first + passage(h.load[first:], h.strain[first:], one.reference)[0] + 1
+    end = last + passage(h.load[last:], h.strain[last:], one.reference)[0]
+    return start, end if end > last else len(h.load) - 1
+
+
 def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> FittedCycles:
     """Fit a loading curve and a memory to all cycles but `leave`; each branch has one weight.
 
@@ -276,10 +284,8 @@ def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> Fit
     from scipy.optimize import least_squares
 
     h, values, level = one.history, one.values, one.reference
-    first, last = values[0].cycle, values[-1].cycle
-    start = first.start + passage(h.load[first.start :], h.strain[first.start :], level)[0] + 1
-    end = last.peak + (passage(h.load[last.peak :], h.strain[last.peak :], level)[0] or 0)
-    rows = np.arange(start, (end if end > last.peak else len(h.load) - 1) + 1)
+    last, (start, end) = values[-1].cycle, matched_rows(one)
+    rows = np.arange(start, end + 1)
     strain, load = np.maximum(h.strain[rows] - one.zero, 0.0), h.load[rows] - level
     weight, none = np.zeros(len(rows)), [0.0, 1.0]
     for v in values:

@@ -3,15 +3,18 @@
 import csv
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
+import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit import cycles
 from bubblefit.experiments import kinds
-from bubblefit.experiments.strips.cycles import (
+from bubblefit.experiments.cycles import specimen_of
+from bubblefit.experiments.cycles.evaluation import (
     DRIFT,
     SLIP,
     evaluate_history,
@@ -20,13 +23,16 @@ from bubblefit.experiments.strips.cycles import (
 )
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, law_slopes
-from bubblefit.materials.memory import Memory, own_stress
+from bubblefit.materials.memory import NAMES, Memory, own_stress
+from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.readers.histories import LoadHistory, find_cycles, find_holds, read_history
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...commands import in_process
-from ...complaints import complaint, refused
-from ...load_cycles import LOW, MADE, faulty, made, write
-from ...places import ROOT
+from ..commands import in_process
+from ..complaints import complaint, refused
+from ..load_cycles import LOW, MADE, faulty, made, write
+from ..places import ROOT
 
 LBF, INCH = 4.4482216152605, 25.4
 
@@ -278,3 +284,140 @@ def test_a_card_says_the_state_that_its_strips_say():
     assert [state(bubble), state(silent), state(bubble, silent)] == ["", "", ""]
     assert state(bubble, first) == state(first, silent) == "first loading"
     assert (state(third), state(bubble, third)) == ("conditioned", "")
+
+
+PROJECT = """
+[fabric]
+name = "made"
+thickness = 0.8
+[units]
+modulus = "MPa"
+[law]
+form = "spline"
+knots = {{ warp = [0.0, 0.04, 0.08], fill = [0.0, 0.04, 0.08], shear = [0.0, 1.0] }}
+strain_range = [0.08, 0.08, 1.0]
+[law.bounds]
+E1 = [20.0, 2000.0]
+E2 = [20.0, 1000.0]
+G12 = [1.0, 200.0]
+[law.memory]
+warp = "fitted"
+fill = "fitted"
+[[cycles]]
+name = "loops"
+files = {{ warp = ["warp.csv"], fill = ["fill.csv"] }}
+width = 50.0
+reference_load = 5.0
+increments = {increments}
+[fit]
+jobs = 1
+"""
+REMEMBERED = Memory((0.45, 0.55, 0.0), (1.7, 1.6, 1.0), (1.2, 1.3, 1.0), (4.0, 2.0, 0.0))
+BETA = np.array([15.0, 15.0, 300.0, 220.0, 350.0, 900.0, 500.0, 800.0])
+
+
+def loops(folder, increments, points):
+    """A project of strips along warp and fill through three loops, computed by their own model."""
+    form = Spline.at([[0.0, 0.04, 0.08], [0.0, 0.04, 0.08], [0.0, 1.0]])
+    law = HypoelasticLaw(BETA, 0.24, [0.08, 0.08, 1.0], form=form, memory=REMEMBERED)
+    for k, yarn in enumerate(("warp", "fill")):
+        low, last = (REMEMBERED.kept(k, top) - 1e-3 for top in (0.05, 0.075))
+        turns = pairwise([0.0, 0.05, low, 0.05, low, 0.075, last])
+        strain = np.concatenate([np.linspace(a, b, points)[1:] for a, b in turns])
+        one = straight_strip(yarn, 100.0, 200.0, 0.8, 50.0, increments=1, across=1, along=1)
+        path = replace(one, elongations=(100.0 * strain).tolist(), unloaded=True)
+        load = 5.0 + MembraneSolver().run(path, law).load
+        columns = np.r_[0.0, 5.0, load], np.r_[-0.01, 0.0, strain]
+        write(folder / f"{yarn}.csv", ["load_N,strain"], columns)
+    (folder / "project.toml").write_text(PROJECT.format(increments=increments))
+    return bf.read_project(folder / "project.toml")
+
+
+def test_a_fit_of_whole_histories_gives_moduli_and_memory_back(tmp_path):
+    project = loops(tmp_path, 100, 25)
+    found = bf.fit(project, starts=1)
+    assert found.objective < 1e-6
+    memory = np.array(found.law.memory.constants[:8])
+    assert memory == pytest.approx(np.array(REMEMBERED.constants[:8]), rel=2e-6)
+    assert found.law.beta[2:] == pytest.approx(BETA[2:], rel=1e-5)
+    sigma = {one.name: one.sigma for one in found.verdicts if one.shared}
+    assert {*sigma} == {*NAMES[:8]} and all(0 < own < 1 for own in sigma.values())
+    written = found.report(tmp_path / "out")
+    card = bf.read_card(tmp_path / "out" / "material.toml")
+    assert card.law.memory == found.law.memory and "cycles.png" in written.read_text()
+    table = found.residuals()
+    assert {*table["cycle"]} == {1, 2, 3} and table["difference"].abs().max() < 1e-3
+    # Every cycle that the others reach is predicted without it.
+    left = bf.validate(project, leave="cycles", starts=1).table()
+    assert {*left["test"]} == {f"loops: cycle 2 of {yarn} {yarn}" for yarn in ("warp", "fill")}
+    assert left["foretold_relative"].max() < 1e-5
+
+
+def test_slopes_of_a_history_are_differences_and_reloading_stays_below_unloading(tmp_path):
+    problem = prepare_fit(project := loops(tmp_path, 12, 9), list(project.tests.values())).problem()
+    y = np.r_[np.ones(8), 0.4, 1.5, 1.2, 3.0, 0.5, 1.6, 1.3, 2.0]
+    point = problem.evaluate(y, True, warm=False)
+    for k in range(len(y)):
+        step = 1e-5 * np.eye(len(y))[k]
+        ends = [problem.evaluate(y + s * step, False, warm=False).residual for s in (1, -1)]
+        slope = (ends[0] - ends[1]) / 2e-5
+        assert point.jacobian[:, k] == pytest.approx(slope, abs=1e-6 * np.abs(slope).max() + 1e-9)
+    rows, least = problem.unknowns.inequalities
+    crossed = y.copy()
+    crossed[[9, 10]] = 1.2, 1.5
+    assert (rows @ y >= least).all() and not (rows @ crossed >= least).all()
+    law = problem.unknowns.law(problem.law, crossed)
+    assert law.memory.reloading[0] == law.memory.unloading[0] == 1.2
+
+
+def test_readings_are_averaged_over_each_branch_and_turns_stay(plain):
+    one = specimen_of("warp", evaluate_history(read_history(plain), 100.0), 10)
+    assert np.unique(one.branch).tolist() == list(range(6)) and one.leaves == (2,)
+    counts = np.unique(one.branch, return_counts=True)[1]
+    assert (counts <= 10).all() and (counts >= 8).all()
+    for number, (_, top, peak) in enumerate(MADE):
+        last = np.flatnonzero(one.branch == 2 * number)[-1]
+        assert one.strain[last] == pytest.approx(top - one.evaluated.zero)
+        assert one.load[last] == pytest.approx(peak - 100.0)
+    # Straight branches stay straight.
+    own = one.branch == 4
+    assert np.polyfit(one.strain[own], one.load[own], 1, full=True)[1] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ('[law.memory]\nwarp = "fitted"\nfill = "fitted"\n', "", "law.memory"),
+        ('fill = "fitted"', 'fill = "fit"', "law.memory.fill"),
+        ('fill = "fitted"', "fill = { unloading = 0.5 }", "law.memory.fill.unloading"),
+        ('fill = "fitted"', "fill = { reloading = 1.5 }", "law.memory.unloading"),
+        ('["fill.csv"]', '["fill.csv", "fill.csv"]', "files.fill[1]"),
+        ('["fill.csv"]', '["weft.csv"]', "files.fill[0]"),
+        ("reference_load = 5.0", "reference_load = 5000.0", "reference load"),
+        ('fill = ["fill.csv"]', 'bias = ["fill.csv"]', "gauge_length"),
+    ],
+)
+def test_wrong_projects_of_histories_name_the_key(tmp_path, old, new, field):
+    loops(tmp_path, 12, 9)
+    path = tmp_path / "project.toml"
+    path.write_text(path.read_text().replace(old, new))
+
+    def begun():
+        project = bf.read_project(path)
+        prepare_fit(project, list(project.tests.values()))
+
+    assert field in complaint(begun)
+
+
+def test_left_out_cycles_of_cords_are_predicted_by_fits_of_whole_histories(shared_data, tmp_path):
+    text = PROJECT.format(increments=12).replace('fill = "fitted"\n', "").replace(
+        'files = { warp = ["warp.csv"], fill = ["fill.csv"] }',
+        f'files = {{ warp = ["cord_typ_test1.csv"] }}\nfolder = "{shared_data / "webbing"}"',
+    )  # fmt: skip
+    text = text.replace("0.04, 0.08], fill", "0.004, 0.008, 0.0145], fill")
+    text = text.replace("[0.08, 0.08, 1.0]", "[0.0145, 0.08, 1.0]")
+    text = text.replace("[20.0, 2000.0]", "[50.0, 50000.0]").replace("= 5.0", "= 89.0")
+    (tmp_path / "project.toml").write_text(text)
+    table = bf.validate(bf.read_project(tmp_path / "project.toml"), leave="cycles", starts=1)
+    errors = table.table()["foretold_relative"]
+    assert len(errors) == 2 and errors.max() < 0.05

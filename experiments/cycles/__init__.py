@@ -1,0 +1,419 @@
+"""Whole load histories in a fit: section [[cycles]], models, objective.
+
+Every file is one specimen that is loaded, unloaded and loaded again. A strip is driven through the
+measured strains and its loads are compared, each branch with the same weight, so that a law with a
+memory (`materials/memory.py`) is found with its moduli. Strains and loads count from the first
+passage of the reference load, as in `evaluation`.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from ...errors import InputError
+from ...files import is_file
+from ...inference.comparison import Comparison, NoiseIs
+from ...materials.card import State
+from ...materials.law import HypoelasticLaw
+from ...meshes.strip_models import (
+    GRIP_DISTANCE,
+    WIDTH,
+    UniaxialModel,
+    bias_strip,
+    refined_quads,
+    straight_strip,
+)
+from ...readers.curves import DIRECTIONS, LengthUnit
+from ...readers.frames import FrameSource
+from ...readers.histories import read_history
+from ...readers.sections import Length, Name, Positive, Section, beside
+from ...solvers.base import History
+from .. import kinds
+from ..kinds import Kind, MakeSolver, Masks, Place, Predicted, Reach, Studied, Weighting
+from .evaluation import EvaluatedHistory, evaluate_history, matched_rows
+
+Array = NDArray[np.float64]
+FileNames = Annotated[list[str], Field(min_length=1)]
+#: mm of a gauge whose length does not matter; edges of the bias strip's quads over the usual ones.
+GAUGE, COARSER = 100.0, 0.4
+#: Of the largest load: noise of one load unless the project says it. Least strain of a reading.
+NOISE, LEAST = 0.005, 1e-6
+
+
+class HistoryFiles(Section):
+    """[cycles.files]: the files of each direction, one specimen each."""
+
+    warp: FileNames | None = None
+    fill: FileNames | None = None
+    bias: FileNames | None = None
+
+
+class HistoryColumns(Section):
+    """[cycles.columns]: the files' own column names."""
+
+    load: str | None = None
+    strain: str | None = None
+    elongation: str | None = None
+    travel: str | None = None
+    time: str | None = None
+
+
+class CyclesSection(Section):
+    """Section [[cycles]]: strips, straps or cords through loading, unloading and reloading."""
+
+    name: Name | None = None
+    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    files: HistoryFiles
+    folder: str = ""
+    columns: HistoryColumns = HistoryColumns()
+    load_unit: Literal["N", "kN", "lbf"] | None = None
+    length_unit: LengthUnit | None = None
+    strain_unit: Literal["%", "mm/mm"] | None = None
+    width: Length | None = None
+    gauge_length: Length | None = None
+    grip_distance: Length | None = None
+    reference_load: Positive | None = None
+    increments: Annotated[int, Field(ge=4, le=1000)] = 20
+    noise: Positive | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """One history as it is matched: readings averaged over equal parts of each branch.
+
+    strain, load : (n,) from the reference load on, N. branch : (n,) its number from 0, even on
+    loading. cycle : (n,) from 1. leaves : cycles that the others can predict.
+    """
+
+    direction: str
+    evaluated: EvaluatedHistory
+    strain: Array
+    load: Array
+    branch: NDArray[np.intp]
+    cycle: NDArray[np.intp]
+    leaves: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Return direction and file."""
+        return f"{self.direction} {self.evaluated.name}"
+
+
+def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Specimen:
+    """Return a history thinned to so many readings a branch; its turning points stay as read."""
+    history, level = found.history, found.reference
+    strain, load = history.strain - found.zero, history.load - level
+    start, end = matched_rows(found)
+    inside = (np.arange(len(load)) >= start) & (np.arange(len(load)) <= end)
+    rows: list[tuple[float, float, int, int]] = []
+    last = 0.0
+    for v in found.values:
+        up = slice(v.cycle.start, v.cycle.peak + 1)
+        for side, part in enumerate((up, slice(v.cycle.peak, v.cycle.end + 1))):
+            if side and not v.cycle.unloaded:
+                continue
+            keep = inside[part] & (strain[part] > LEAST)
+            x, y = strain[part][keep], load[part][keep]
+            if len(x) < 2:
+                continue
+            place = np.clip((x - x[0]) / (x[-1] - x[0] or 1.0), 0.0, 1.0)
+            number = np.minimum((increments - 1) * place, increments - 1.5).astype(int)
+            number[-1] = increments - 1
+            for k in np.unique(number):
+                own = number == k
+                e, f = float(x[own].mean()), float(y[own].mean())
+                if abs(e - last) > LEAST:
+                    rows.append((e, f, 2 * v.cycle.number - 2 + side, v.cycle.number))
+                    last = e
+    if not rows:
+        problem = f"no reading above the reference load of {level:g} N"
+        raise InputError(history.path, "load", problem)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    tops = [v.top for v in found.values]
+    leaves = tuple(
+        v.cycle.number for k, v in enumerate(found.values)
+        if k and not math.isnan(v.permanent) and v.top <= max(tops[:k] + tops[k + 1 :])
+    )  # fmt: skip
+    branch, cycle = (column.astype(np.intp) for column in columns[2:])
+    return Specimen(direction, found, columns[0], columns[1], branch, cycle, leaves)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CyclesTest:
+    """Specimens by their names; lengths mm, loads N. gauge : of the bias strips."""
+
+    name: str
+    place: Place
+    weight: float
+    width: float
+    gauge: float
+    grip_distance: float
+    specimens: Mapping[str, Specimen]
+    noise: float | None = None
+    kind: str = "cycles"
+    reads_files: bool = True
+    state: State = "first loading"
+
+    @property
+    def reach(self) -> Reach:
+        """Return the largest strains; shear of a strip that keeps its area is twice its own."""
+        ends: dict[str, float] = {}
+        for one in self.specimens.values():
+            end = float(np.log1p(one.strain.max())) * (2 if one.direction == "bias" else 1)
+            ends[one.direction] = max(end, ends.get(one.direction, 0.0))
+        return Reach((ends.get("warp"), ends.get("fill"), ends.get("bias")))
+
+    def models(
+        self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
+    ) -> Mapping[str, UniaxialModel]:
+        """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
+        thick = self.place.fabric.thickness if thickness is None else thickness
+        quads = refined_quads("bias", COARSER * (factor if what == "elements" else 1.0))
+        models = {}
+        for name, one in self.specimens.items():
+            if one.direction == "bias":
+                lengths = self.gauge, 2 * self.gauge, thick, self.width
+                model = bias_strip(*lengths, self.grip_distance, increments=1, **quads)
+            else:
+                yarn: Literal["warp", "fill"] = "warp" if one.direction == "warp" else "fill"
+                lengths = self.gauge, 2 * self.gauge, thick, self.width
+                model = straight_strip(yarn, *lengths, increments=1, across=1, along=1)
+            path = (self.gauge * one.strain).tolist()
+            models[name] = replace(model, elongations=path, unloaded=True)
+        return models
+
+    def settings(self) -> Mapping[str, object]:
+        """Return the settings that a result depends on; data count by themselves."""
+        names = ("weight", "width", "gauge", "grip_distance", "noise")
+        return {name: getattr(self, name) for name in names}
+
+
+def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
+    """Read the section of a test, and its histories."""
+    length, folder = place.scales.length, place.data_folder
+    folder = beside(place.path.parent, section.folder) if folder is None else folder
+    width = WIDTH if section.width is None else section.width * length
+    gauge = GAUGE if section.gauge_length is None else section.gauge_length * length
+    grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
+    if section.files.bias and (section.gauge_length is None or not gauge < grips):
+        problem = f"of bias strips expected a length below the distance of the grips, {grips:g} mm"
+        raise place.error("gauge_length", problem)
+    said = {key: getattr(section, key) for key in ("load_unit", "length_unit", "strain_unit")}
+    of = None if section.gauge_length is None else gauge
+    specimens: dict[str, Specimen] = {}
+    listed = {d: own for d in DIRECTIONS if (own := getattr(section.files, d))}
+    if not listed:
+        raise place.error("files", "expected files of one direction at least: { warp = [...] }")
+    for direction, names in listed.items():
+        for k, file in enumerate(names):
+            path, key = folder / file, f"files.{direction}[{k}]"
+            if not is_file(path):
+                if place.need_data:
+                    problem = f"there is no file {path}; --data DIR names another folder"
+                    raise place.error(key, problem)
+                continue
+            columns = section.columns.model_dump(exclude_none=True)
+            history = read_history(path, columns=columns or None, length=of, **said)
+            found = evaluate_history(history, section.reference_load)
+            one = specimen_of(direction, found, section.increments)
+            if one.name in specimens:
+                raise place.error(key, f"{file!r} is listed twice; its readings would count double")
+            specimens[one.name] = one
+    return CyclesTest(
+        name=name, place=place, weight=section.weight, width=width, gauge=gauge,
+        grip_distance=grips, specimens=specimens, noise=section.noise,
+    )  # fmt: skip
+
+
+class HistoryObjective:
+    """Residuals (model - measured) / peak of the loads of a history; each branch weighs alike.
+
+    kept : (n,) which readings count. The sum of squares is the mean square over the branches.
+    """
+
+    unit, columns = "N", 1
+
+    def __init__(
+        self, one: Specimen, kept: NDArray[np.bool_], weight: float, noise: float | None
+    ) -> None:
+        self.rows = np.flatnonzero(kept)
+        self.strain, self.load = one.strain[self.rows], one.load[self.rows]
+        branch, peak = one.branch[self.rows], float(one.load.max())
+        if not len(self.rows):
+            raise InputError(one.evaluated.history.path, "load", "holds no reading to match")
+        _, number, count = np.unique(branch, return_inverse=True, return_counts=True)
+        self.sizes = (len(self.rows),)
+        self._unit = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
+        self.least_noise = NOISE * peak if noise is None else noise
+        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
+
+    @property
+    def scale(self) -> Array:
+        """Return newtons in one unit of each residual, (n,)."""
+        return self._unit
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured loads, (n,) N."""
+        return self.load
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Return everything measured that the residual depends on."""
+        return self.strain, self.load
+
+    @property
+    def places(self) -> tuple[Array, ...]:
+        """Return the numbers of the readings: neighbours may err as one."""
+        return (self.rows[:, None].astype(float),)
+
+    def of_points(self, values: Array) -> Array:
+        """Return values for each residual from values for each reading."""
+        return values
+
+    def modelled(self, history: History) -> Array:
+        """Return the model's loads, (n,) N."""
+        return np.asarray(history.load[self.rows])
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Return the block, (n,)."""
+        return np.asarray((self.modelled(history) - self.load) / self._unit)
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return (n, parameters) from the history's load slope."""
+        if history.load_slope is None:
+            raise InputError(None, "history", "the solver gives no derivatives of the load")
+        return np.asarray(history.load_slope[self.rows] / self._unit[:, None])
+
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        """Return (n, 0): a history has no nuisance unknowns of its own."""
+        if names:
+            raise InputError(None, "nuisance", f"a load history knows no {', '.join(names)}")
+        return np.empty((len(self.load), 0))
+
+    def shifted(self, here: History, there: History) -> HistoryObjective:
+        """Return the objective of a model that carries `here` where this one carries `there`."""
+        other = copy.copy(self)
+        other.load = self.load - (self.modelled(here) - self.modelled(there))
+        return other
+
+    def rms(self, history: History) -> float:
+        """Return the RMS error, N."""
+        return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedCycles:
+    """Load histories with their data."""
+
+    test: CyclesTest
+    objective_is = "root of the mean square error of each branch's loads over the largest load"
+    known: HypoelasticLaw | None = None
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        """Return the number of the specimen of each reading, by comparison."""
+        every = enumerate(self.test.specimens.items())
+        return {self.part(name): [k] * len(one.load) for k, (name, one) in every}
+
+    @property
+    def parts(self) -> Mapping[str, Mapping[str, Masks]]:
+        """Return masks without each cycle that others can predict, and without each specimen."""
+        every = self.test.specimens.items()
+        whole = {self.part(name): np.ones(len(one.load), dtype=bool) for name, one in every}
+        cycles: dict[str, Masks] = {
+            f"cycle {k} of {name}": {**whole, self.part(name): one.cycle != k}
+            for name, one in every for k in one.leaves
+        }  # fmt: skip
+        specimens: dict[str, Masks] = {
+            name: {**whole, self.part(name): ~whole[self.part(name)]} for name, _ in every
+        }
+        sorts = {"cycles": cycles, "specimens": specimens if len(specimens) > 1 else {}}
+        return {sort: parts for sort, parts in sorts.items() if parts}
+
+    def part(self, name: str) -> str:
+        """Return the name of the comparison of a specimen."""
+        return f"{self.test.name}: {name}"
+
+    def reach(self, masks: Masks) -> Reach:
+        """Return the reach of the readings that are matched."""
+        kept = {}
+        for name, one in self.test.specimens.items():
+            mask = masks.get(self.part(name), np.ones(len(one.load), dtype=bool))
+            if mask.any():
+                kept[name] = replace(one, strain=one.strain[mask])
+        return replace(self.test, specimens=kept).reach
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,
+        models: Mapping[str, UniaxialModel] | None = None,
+    ) -> tuple[Comparison, ...]:  # fmt: skip
+        """Return a comparison a specimen that has readings."""
+        test, chosen, known = self.test, [], masks or {}
+        models = test.models() if models is None else models
+        for name, one in test.specimens.items():
+            mask = known.get(self.part(name), np.ones(len(one.load), dtype=bool))
+            if mask.any():
+                chosen.append((name, one, mask))
+        weight = weighting.weight / max(len(chosen), 1) if weighting.relative else 1.0
+        return tuple(
+            Comparison(
+                self.part(name), models[name], make_solver(),
+                HistoryObjective(one, mask, weight, test.noise), contracts=True,
+                must_be_stable=False,
+            )
+            for name, one, mask in chosen
+        )  # fmt: skip
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """Return the comparisons on other quads of the bias strips."""
+        models = self.test.models(what="elements", factor=factor)
+        return self.comparisons(make_solver, weighting, models=models)
+
+    def data_files(self) -> Sequence[kinds.DataFile]:
+        """Return the files."""
+        files = []
+        for one in self.test.specimens.values():
+            h = one.evaluated.history
+            source = FrameSource("machine table", notes=tuple(h.notes))
+            files.append(kinds.DataFile(Path(h.path), source, len(h.load)))
+        return files
+
+
+class CyclesKind:
+    """Strips, straps or cords through loading, unloading and reloading."""
+
+    name: str = "cycles"
+    title: str = "strips through loading, unloading and reloading"
+    section: type[BaseModel] = CyclesSection
+    folder_key: str = "folder"
+    fitted: bool = True
+    predicted: Predicted | None = None
+    studied: Studied | None = None
+    read = staticmethod(read)
+
+    def prepare(
+        self, test: CyclesTest, law: HypoelasticLaw, make_solver: MakeSolver
+    ) -> PreparedCycles:
+        """Return the test, which was read with its data; raises InputError: no memory."""
+        if law.memory is None:
+            problem = (
+                "load cycles need a law with a memory: say [law.memory] warp = 'fitted' (or fill, "
+                "shear), or numbers"
+            )
+            raise InputError(test.place.path, "law.memory", problem)
+        return PreparedCycles(test)
+
+
+KIND: Kind = CyclesKind()

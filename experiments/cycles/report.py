@@ -1,0 +1,123 @@
+"""Results of load histories in a fit as numbers, a table, figures and a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...errors import SolverFailure
+from ...files import replacing
+from ...materials.card import MaterialCard
+from ...reports.charts import Chart, Charts, dots, line
+from ...reports.content import Exhibit, Table
+from ...reports.vega import save
+from ...solvers.base import History
+from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from . import CyclesTest, PreparedCycles, Specimen
+
+FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
+
+
+def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, History]:
+    pairs = zip(fitted.comparisons, fitted.histories, strict=True)
+    known = {comparison.name: history for comparison, history in pairs}
+    return {name: known[prepared.part(name)] for name in prepared.test.specimens}
+
+
+def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
+    """Return a table of every matched load, N from the reference load on."""
+    parts = []
+    for name, history in _by_specimen(prepared, fitted).items():
+        one = prepared.test.specimens[name]
+        columns = {"part": name, "cycle": one.cycle, "strain": one.strain, "quantity": "load"}
+        columns |= {"measured": one.load, "modelled": history.load}
+        table = pd.DataFrame(columns)
+        parts.append(table.assign(difference=table["modelled"] - table["measured"], unit="N"))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _errors(one: Specimen, history: History) -> dict[str, float]:
+    off = history.load - one.load
+    return {
+        f"cycle {k}": float(np.sqrt(np.mean(off[one.cycle == k] ** 2)))
+        for k in np.unique(one.cycle)
+    }
+
+
+def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, dict[str, float]]:
+    return {name: _errors(test.specimens[name], history) for name, history in histories.items()}
+
+
+def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
+    return [
+        f"{name}: RMS error of load in N: {', '.join(f'{k} {v:.3g}' for k, v in own.items())}"
+        for name, own in numbers.items()
+    ]
+
+
+def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
+    """Return the RMS errors of the best fit, and the doubts about the histories."""
+    histories = _by_specimen(prepared, fitted)
+    numbers = _numbers(prepared.test, histories)
+    notes = [n for one in prepared.test.specimens.values() for n in one.evaluated.notes]
+    shares = [
+        100 * np.sqrt(np.mean((h.load - prepared.test.specimens[n].load) ** 2))
+        / prepared.test.specimens[n].load.max()
+        for n, h in histories.items()
+    ]  # fmt: skip
+    words = f"RMS error of load {max(shares):.2g} % of the largest"
+    return Findings({"rms_N": numbers}, tuple(notes), tuple(_lines(numbers)), words, words)
+
+
+def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+    """Write cycles.csv and the figure."""
+    with replacing(out.path(TABLE)) as path:
+        residuals(prepared, fitted).to_csv(path, index=False, float_format="%.9g")
+    charts = _drawn(prepared.test, {"model": _by_specimen(prepared, fitted)}, out)
+    rows: list[list[object]] = [
+        [name, cycle, error] for name, own in found.numbers["rms_N"].items()
+        for cycle, error in own.items()
+    ]  # fmt: skip
+    table = Table("Misfit of the load cycles", ["specimen", "", "RMS error, N"], rows, text=(1,))
+    files = [(out.name(TABLE), "loads, measured and modelled"), (out.name(FIGURE), CAPTION)]
+    return Exhibit(tables=[table], files=files, parts=[charts])
+
+
+def simulate(
+    test: CyclesTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
+    out: Output, within_range: bool = False,
+) -> Simulation:  # fmt: skip
+    """Draw the loads with every card; return the RMS errors."""
+    numbers: dict[str, Any] = {}
+    lines: list[str] = []
+    good: dict[str, dict[str, History]] = {}
+    for card in cards:
+        ended = {name: runs[card, name].outcome for name in test.specimens}
+        own = {name: one for name, one in ended.items() if isinstance(one, History)}
+        good[card] = own
+        numbers[card] = {"rms_N": _numbers(test, own)}
+        lines += [f"{card}: {words}" for words in _lines(numbers[card]["rms_N"])]
+        for name, one in ended.items():
+            if isinstance(one, SolverFailure):
+                numbers[card].setdefault("failed", {})[name] = one.reason
+                lines.append(f"{card}: {name}: failed: {one.reason}")
+    _drawn(test, good, out)
+    return Simulation({"cards": numbers}, lines, [(out.name(FIGURE), CAPTION)])
+
+
+def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]], out: Output) -> Charts:
+    """Draw load over strain, a chart a specimen."""
+    charts = []
+    for name, one in test.specimens.items():
+        series = [dots("measured", 100 * one.strain, one.load, colour=7)]
+        for rank, (label, own) in enumerate(curves.items()):
+            if name in own:
+                series.append(line(label, 100 * one.strain, own[name].load, colour=1 + rank))
+        what = "strain from the reference load, %"
+        charts.append(Chart(name, what, "load from the reference load, N", series, name))
+    drawn = Charts(f"{test.name} cycles", charts, CAPTION, columns=1)
+    save(out.path(FIGURE), drawn)
+    return drawn
