@@ -88,7 +88,6 @@ class BarKind:
 
     @property
     def report(self) -> Any:
-        """Return what writes the results of a simulation: the kind itself."""
         return self
 
     def simulate(

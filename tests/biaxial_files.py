@@ -18,7 +18,6 @@ HEAD = 'ratio,"n_w, kN/m","n_f, kN/m","eps_w, %","eps_f, %"'
 
 
 def cycle(lowest: float = 2.0, highest: float = 30.0, rows: int = 30) -> np.ndarray:
-    """The larger load: up, then down again in half as many rows."""
     down = np.linspace(highest, lowest, rows // 2 + 2)[1:-1]
     return np.concatenate([np.linspace(lowest, highest, rows), down])
 
@@ -42,7 +41,6 @@ def write_rows(path: Path, rows: Sequence[Sequence[object]], head: str = HEAD) -
 
 
 def biaxial_project(folder: Path, test="", form="cubic", file="test.csv") -> Path:
-    """A project with one biaxial test of the file `test.csv`; test : lines of its section."""
     path = folder / "project.toml"
     path.write_text(
         f'[fabric]\nname = "made"\nthickness = {THICKNESS}\n[units]\nmodulus = "MPa"\n'

@@ -18,7 +18,6 @@ def complaint(call, *arguments, **options):
 
 
 def complaint_with(words, call, *arguments, **options):
-    """Return the same message, which has to hold every one of the words."""
     message = complaint(call, *arguments, **options)
     for word in words:
         assert word in message, message

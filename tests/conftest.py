@@ -33,7 +33,6 @@ settings.load_profile("bubblefit")
 
 
 def pytest_addoption(parser):
-    """Add the option that writes tests/golden/."""
     parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
 
 
@@ -52,13 +51,11 @@ def golden(request):
 
 @pytest.fixture(scope="session")
 def shared_data():
-    """Folder of measured data beside the repository; see `needs`."""
     return needs.measured_data()
 
 
 @pytest.fixture(scope="session")
 def ccx():
-    """A ccx that can load material libraries; see `needs`."""
     return needs.calculix()
 
 

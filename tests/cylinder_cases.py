@@ -148,14 +148,12 @@ beta = [-7.96788e-3, 7.10747e-1, -1.56912e-1, 2.00439e-2, -1.06241e1, 1.37830e1,
 
 
 def write_project(folder: Path, first: str = "", soft: float = 500.0) -> Path:
-    """Two cylinders and two cards. first : further keys of the first cylinder."""
     path = folder / "project.toml"
     path.write_text(PROJECT.format(first=first, soft=soft))
     return path
 
 
 def write_readings(path: Path, slope: float = 3.5, noise: float = 0.0) -> Path:
-    """Made-up readings of two repetitions, 5 kg apart, then unloaded."""
     rows = ["# made up for a test", "run,deflection (mm),mass_kg"]
     for run, sign in ((1, 1.0), (2, -1.0)):
         masses = np.arange(0.0, 30.1, 5.0)
@@ -167,5 +165,4 @@ def write_readings(path: Path, slope: float = 3.5, noise: float = 0.0) -> Path:
 
 
 def ran(model: CylinderModel, card: MaterialCard, solver: Solver | None = None) -> RunRecord:
-    """The record of a run, by the formula unless told otherwise."""
     return run_card(CylinderPredicted(), solver or Formula(), model, card)

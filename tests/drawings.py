@@ -37,7 +37,6 @@ def shown(chart):
 
 
 def caught(patch, module, *names):
-    """Calls of a module's charts that it saves, without drawing: the file, then the arguments."""
     calls = []
     for name in names:
         patch.setattr(f"{module.__name__}.{name}", lambda *args, **_: args)

@@ -53,8 +53,6 @@ def normalised(text, folder):
 
 
 class Golden:
-    """Compare texts with their files, or write the files."""
-
     def __init__(self, rewrite):
         self.rewrite = rewrite
 

@@ -35,7 +35,6 @@ def block(number: int, name: str, lines: Sequence[str]) -> list[str]:
 
 
 def t19_head(points: np.ndarray, quads: np.ndarray, element: int = 139, title: str = "job") -> str:
-    """The model; quads count from 0."""
     header = [0, len(points), len(quads), 6, 4, 9, 1, 0, 3, 4, 2, 0, 0, 14, *[0] * 16]
     lines = block(50100, "Analysis Title", [title])
     lines += block(50200, "Analysis Verification Data", integers(*header))
@@ -78,7 +77,6 @@ STS_HEAD = """1                       MARC  Version: Marc 2023.1
 
 
 def sts_line(case: int, number: int, total: int, step: float, time: float, *span: float) -> str:
-    """An increment of three iterations, `total` so far; span: smallest, largest displacement."""
     return (
         f"{case:6d}{number:8d}{3:6d}{0:5d}{0:5d}{total:7d}{0:5d}{0:5d}{0:5d}"
         f" {step:.5E} {time:.5E} {span[0]:.5E} {span[1]:.5E}\n"
@@ -88,7 +86,6 @@ def sts_line(case: int, number: int, total: int, step: float, time: float, *span
 def sts_text(
     times: Sequence[float], number: int | None = 3004, increments: Sequence[int] | None = None
 ) -> str:
-    """A status file: an increment for each time."""
     text = STS_HEAD
     steps = np.diff(np.concatenate([[0.0], times]))
     for i, (time, step) in enumerate(zip(times, steps, strict=True)):

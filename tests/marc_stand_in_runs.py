@@ -17,8 +17,6 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass
 class StandIn:
-    """program: a run_marc; folder: where it counts its runs."""
-
     folder: Path
 
     @property
@@ -34,7 +32,6 @@ class StandIn:
         (self.folder / "fault").write_text(fault)
 
     def solver(self, **settings) -> Any:
-        """Marc's adapter on it; increments as the model has them unless said."""
         if settings.get("law") == "hypela2":
             needs.fortran()
         scratch = self.folder / "scratch"

@@ -33,7 +33,6 @@ def program(*names, package):
 
 
 def fortran():
-    """The Fortran compiler."""
     return program("gfortran", package="gfortran")
 
 
@@ -46,7 +45,6 @@ def c_compiler():
 
 
 def library(name):
-    """A Python library, or one that cannot be loaded here."""
     try:
         return importlib.import_module(name)
     except (ImportError, OSError) as error:
@@ -54,13 +52,11 @@ def library(name):
 
 
 def linux(what):
-    """`what` is tried on Linux only."""
     if sys.platform != "linux":
         missing(f"{what}: tried on Linux")
 
 
 def calculix():
-    """A ccx that can load material libraries."""
     try:
         return find_ccx()
     except BubblefitError as error:
@@ -68,7 +64,6 @@ def calculix():
 
 
 def measured_data():
-    """Folder of the measured data beside the repository."""
     if not SHARED.is_dir():
         missing(f"no measured data: {SHARED} is not there")
     return SHARED

@@ -20,7 +20,6 @@ def changed(text, *changes):
 
 
 def project_file(folder, text, *changes):
-    """Write the text after each replacement to the folder; return its path."""
     path = folder / "project.toml"
     path.write_text(changed(text, *changes))
     return path

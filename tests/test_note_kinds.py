@@ -58,98 +58,98 @@ from bubblefit.solvers.marc.sheets import NO_REACTIONS
 from bubblefit.solvers.marc.solver import REPEATED
 from bubblefit.solvers.membrane.bending import PENETRATION, WRINKLES
 
+from . import note_cases as made
 from .bars import BarTest
 from .cylinder_cases import Formula, write_project
-from .note_cases import fits, membrane, programs, series
 
 Maker = Callable[[Path, pytest.MonkeyPatch], Iterable[Note]]
 #: Who makes notes of a kind, and their words.
 CASES = (
-    (NOT_ESTIMATED, fits.notes_of_an_estimate, "other: points lie on a part of the disk only"),
-    (GAP, fits.notes_of_an_estimate, r"chi [3-9]|chi \d\d"),
-    (EARLY, membrane.notes_of_bending,
+    (NOT_ESTIMATED, made.notes_of_an_estimate, "other: points lie on a part of the disk only"),
+    (GAP, made.notes_of_an_estimate, r"chi [3-9]|chi \d\d"),
+    (EARLY, made.notes_of_bending,
      "the run stopped early: no equilibrium between 6 and 8 mm"),
-    (EARLY, programs.notes_of_marc_bending,
+    (EARLY, made.notes_of_marc_bending,
      "the run stopped early; the last increment is at 60 mm"),
-    (EARLY, programs.notes_of_marc_bending,
+    (EARLY, made.notes_of_marc_bending,
      "the time step could not get smaller: no convergence"),
-    (EARLY, programs.notes_of_calculix_bending,
+    (EARLY, made.notes_of_calculix_bending,
      "the run stopped early; the last increment is at 6 mm: no step left"),
-    (SNAP, membrane.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
-    (SNAP, membrane.notes_of_inflation,
+    (SNAP, made.notes_of_bending, "snaps, or nearly, before 6 mm of deflection"),
+    (SNAP, made.notes_of_inflation,
      "snaps, or nearly, between 50 and 100 kPa: passed by leading"),
-    (PENETRATION, membrane.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),
-    (WRINKLES, membrane.notes_of_bending,
+    (PENETRATION, made.notes_of_bending, r"rigid bodies penetrate 0\.0\d+ mm at most"),
+    (WRINKLES, made.notes_of_bending,
      r"left to wrinkles \(0\.01 of the taut fabric's\) carries 0\.\d+ %"),
-    (GAS, programs.notes_of_calculix_bending,
+    (GAS, made.notes_of_calculix_bending,
      r"gas: pass 1, p V constant within \S+ \(wanted: 0.0003\)"),
-    (TILT, programs.notes_of_tilted_shells,
+    (TILT, made.notes_of_tilted_shells,
      r"slopes of up to 0\.30 lower its stiffness .* 18\.2 %"),
-    (REPEATED, programs.notes_of_marc_bending, "1 increments were repeated after they did not"),
-    (UNCONFIRMED, programs.notes_of_marc_bending,
+    (REPEATED, made.notes_of_marc_bending, "1 increments were repeated after they did not"),
+    (UNCONFIRMED, made.notes_of_marc_bending,
      "'Contact Normal Force', which is not confirmed"),
-    (UNBALANCED, programs.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),
-    (NO_REACTIONS, programs.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),
-    (SOLVER, series.notes_of_simulation, "thick: as a plug-in says it"),
-    (SOLVER, series.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
-    (SOLVER, series.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
-    (BEYOND_CARD, membrane.notes_of_analysis,
+    (UNBALANCED, made.notes_of_marc_bending, r"collar \(24 N\) and supports \(0 N\) do not"),
+    (NO_REACTIONS, made.notes_of_marc_results, r"the \.t19 holds no 'Reaction Force'"),
+    (SOLVER, made.notes_of_simulation, "thick: as a plug-in says it"),
+    (SOLVER, made.notes_of_nu12, r"a bar, nu12 = 0\.2: as a plug-in says it"),
+    (SOLVER, made.notes_of_refinement, "a bar, 32 quads: as a plug-in says it"),
+    (BEYOND_CARD, made.notes_of_analysis,
      r"warp strain 7\.\d* % is beyond the card's valid range of 5 %"),
-    (BEYOND_CARD, series.notes_of_simulation,
+    (BEYOND_CARD, made.notes_of_simulation,
      r"thick: warp strain 9\.\d* % is beyond the card's valid range"),
-    (UNSTABLE, membrane.notes_of_analysis, "unstable equilibrium at .* would not stay there"),
-    (THICKNESS, series.notes_of_simulation,
+    (UNSTABLE, made.notes_of_analysis, "unstable equilibrium at .* would not stay there"),
+    (THICKNESS, made.notes_of_simulation,
      r"thick: the card was fitted for a thickness of 1 mm, this is 0\.5"),
-    (FAILED, series.notes_of_simulation, "stiff: the bar breaks"),
-    (FAILED, series.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
-    (FAILED, series.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
-    (BEYOND_LAW, fits.notes_of_fit,
+    (FAILED, made.notes_of_simulation, "stiff: the bar breaks"),
+    (FAILED, made.notes_of_nu12, r"a bar, nu12 = 0\.3: the bar breaks"),
+    (FAILED, made.notes_of_refinement, "a bar, 128 quads: the bar breaks"),
+    (BEYOND_LAW, made.notes_of_fit,
      r"one: warp: warp strain reached 13\.\d %, beyond law\.strain_range of 12 %"),
-    (STARTS, fits.notes_of_fit,
+    (STARTS, made.notes_of_fit,
      r"1 of 2 starts ended because membrane failed \(one: warp: too tired\)"),
-    (NOT_CONVERGED, fits.notes_of_an_unfinished_fit,
+    (NOT_CONVERGED, made.notes_of_an_unfinished_fit,
      r"used up its \d+ analyses while its steps still gained"),
-    (UNCERTAIN, fits.notes_of_fit, "G12 is uncertain by up to 1000 % "),
-    (MESH, fits.notes_of_mesh, r"on a fine mesh E1 would be \+4 % at 5 % of strain"),
-    (UNKNOWN, fits.notes_of_no_mesh, "the error of the mesh is not known: membrane: it breaks"),
-    (TAKEN_OUT, fits.notes_of_limit, r"taken out of the moduli \(E1 \+4 %, E2 \+4 %"),
-    (MARGIN, fits.notes_of_fit, "E2 touches its positivity margin"),
-    (BOUND, fits.notes_of_fit, "E1 touches its upper bound"),
-    (BOUND, fits.notes_of_certainty, "pressure_offset lies on its lower bound"),
-    (ALONE, fits.notes_of_fit, "two alone does not determine E2 "),
-    (INVERSE_CRIME, fits.notes_of_bubble, "computed by the very model that is fitted to them"),
-    (ABOVE_NOISE, fits.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
-    (BELOW_NOISE, fits.notes_of_noise, "bubble: the fit leaves .* is given too large"),
-    (DISCREPANCY, fits.notes_of_form,
-     r"0\.036 mm of what the fit leaves, .* is smooth over the whole sheet"),
-    (NOT_THE_CARD, fits.notes_of_profile, "another optimum fits the data better than the card's"),
-    (NOT_CLOSED, fits.notes_of_profile,
-     r"2 % of strain: not closed above: it meets the bound of the fit, 12"),
-    (SECOND_ORDER, fits.notes_of_order,
-     r"second order: 1 sigma against that of the .*: G12 \+36 %"),
-    (FEW_UNITS, fits.notes_of_bootstrap, "one: warp: 2 specimens only: so few drawn"),
-    (SURFACES, fits.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
-    (FLAT_SHEET, fits.notes_of_bubble, "the sheet is taken for flat and taut"),
-    (UNMATCHED, fits.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
-    (LEFT_OUT, fits.notes_of_fit, "one, warp: 2 points beyond the final length"),
-    (DOUBTFUL, fits.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
-    (READING, fits.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
-    (FOLD, fits.notes_of_comparison, "spline:3, fold 3: no fit without its points ended well"),
-    (LOST, series.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
-    (ORDER, series.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
-    (NO_LOAD, series.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
-    (SLIP, series.notes_of_cycles, r"cycle 3 is a negative loop \(-"),
-    (SLIP, series.notes_of_cycles, r"at the peak of cycle 2 0\.0004 less strain than in cycle 1"),
-    (DRIFT, series.notes_of_cycles, "the strain moves by 2e-05 a second before the load does"),
-    (GRIPS, series.notes_of_cycles, "strains are travel of the machine"),
-    (CHANGING, series.notes_of_cycles, r"lost\.csv: no cycle repeats the one before"),
-    (STATES, series.notes_of_states,
+    (UNCERTAIN, made.notes_of_fit, "G12 is uncertain by up to 1000 % "),
+    (MARGIN, made.notes_of_fit, "E2 touches its positivity margin"),
+    (BOUND, made.notes_of_fit, "E1 touches its upper bound"),
+    (BOUND, made.notes_of_certainty, "pressure_offset lies on its lower bound"),
+    (ALONE, made.notes_of_fit, "two alone does not determine E2 "),
+    (INVERSE_CRIME, made.notes_of_bubble, "computed by the very model that is fitted to them"),
+    (ABOVE_NOISE, made.notes_of_fit, r"one: warp: the fit leaves .* the noise given \(0\.01 N; "),
+    (SURFACES, made.notes_of_bubble, "polynomial surfaces of degree 4 do not follow"),
+    (FLAT_SHEET, made.notes_of_bubble, "the sheet is taken for flat and taut"),
+    (UNMATCHED, made.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
+    (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
+    (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
+    (READING, made.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
+    (LOST, made.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
+    (ORDER, made.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
+    (NO_LOAD, made.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),
+    (SLIP, made.notes_of_cycles, r"cycle 3 is a negative loop \(-"),
+    (SLIP, made.notes_of_cycles, r"at the peak of cycle 2 0\.0004 less strain than in cycle 1"),
+    (DRIFT, made.notes_of_cycles, "the strain moves by 2e-05 a second before the load does"),
+    (GRIPS, made.notes_of_cycles, "strains are travel of the machine"),
+    (CHANGING, made.notes_of_cycles, r"lost\.csv: no cycle repeats the one before"),
+    (STATES, made.notes_of_states,
      r"bubble: first loading, one: conditioned, three: first loading\): one law is not both"),
-    (STATES, series.notes_of_states, r"rate \(one: 100 mm/min, two: 10 mm/min\)"),
-    (LOSES, series.notes_of_exports, "there the curve ends at 30 % of log strain"),
-    (CONFIRM, series.notes_of_exports,
+    (STATES, made.notes_of_states, r"rate \(one: 100 mm/min, two: 10 mm/min\)"),
+    (LOSES, made.notes_of_exports, "there the curve ends at 30 % of log strain"),
+    (CONFIRM, made.notes_of_exports,
      "that tables of G12 are looked up with the engineering shear"),
 )  # fmt: skip
+#: What the tests of the studies, of starts and of noise provoke themselves.
+ELSEWHERE = {
+    BELOW_NOISE,
+    DISCREPANCY,
+    FEW_UNITS,
+    FOLD,
+    MESH,
+    NOT_CLOSED,
+    NOT_THE_CARD,
+    SECOND_ORDER,
+    TAKEN_OUT,
+    UNKNOWN,
+}
 
 
 @cache
@@ -158,7 +158,7 @@ def notes_by(maker):
         return list(maker(Path(folder), patch))
 
 
-@pytest.mark.parametrize("kind", [*NoteKind.known.values()], ids=str)
+@pytest.mark.parametrize("kind", sorted(NoteKind.known.values() - ELSEWHERE), ids=str)
 def test_a_note_of_the_kind_comes(kind):
     cases = [(maker, words) for own, maker, words in CASES if own is kind]
     assert cases, f"no case provokes a note {kind!r}: add one to CASES"
@@ -169,8 +169,6 @@ def test_a_note_of_the_kind_comes(kind):
 
 
 class Told(NamedTuple):
-    """Where notes stand in what a command gives; None where it has no such thing."""
-
     terminal: Sequence[str]
     json: Sequence[Mapping[str, str]]
     folder: Path | None = None
@@ -178,7 +176,7 @@ class Told(NamedTuple):
 
 
 def told_by_fit(folder, patch, notes):
-    fit = replace(fits.fit())
+    fit = replace(made.fit())
     fit.__dict__["notes"] = notes
     for name in ("optima", "moduli"):
         patch.setattr(fit_page, name, lambda *_: Charts("a", [], "a picture"))
@@ -190,11 +188,11 @@ def told_by_fit(folder, patch, notes):
 
 
 def told_by_comparison(folder, patch, notes):
-    fit = replace(fits.fit())
+    fit = replace(made.fit())
     fit.__dict__["notes"] = notes
     patch.setattr(study_pages, "save", lambda *_: None)
     patch.setattr(study_pages, "_responses", lambda *_: [])
-    done = fits.comparison(fit)
+    done = made.comparison(fit)
     done.write(folder)
     page = folder / "report.html"
     return Told(lines(done.notes), _json(folder), folder, page.read_text())
@@ -212,28 +210,26 @@ def told_by_predictions(folder, patch, notes):
 
 
 def told_by_simulation(folder, patch, notes):
-    done = simulate_cards(
-        series.bars(patch, notes), [BarTest("a bar")], {"soft": series.CARD}, folder
-    )
+    done = simulate_cards(made.bars(patch, notes), [BarTest("a bar")], {"soft": made.CARD}, folder)
     return Told(done.lines, _json(folder), folder)
 
 
 def told_by_nu12(folder, patch, notes):
     patch.setattr(vega, "rendered", lambda *_: b"")
-    study = vary_nu12(series.bars(patch, notes), series.CARD, [0.2])
+    study = vary_nu12(made.bars(patch, notes), made.CARD, [0.2])
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
 def told_by_refinement(folder, patch, notes):
     patch.setattr(vega, "rendered", lambda *_: b"")
-    study = refine(series.bars(patch, notes), series.CARD)
+    study = refine(made.bars(patch, notes), made.CARD)
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
 def told_by_gauge(folder, _, notes):
-    table = series.gauge(folder)
+    table = made.gauge(folder)
     table = replace(table, record=replace(table.record, warnings=tuple(notes)))
     table.write(folder / "gauge.csv")
     said = [line[2:] for line in (folder / "gauge.csv").read_text().splitlines() if line[0] == "#"]

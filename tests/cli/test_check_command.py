@@ -121,7 +121,6 @@ def test_what_is_trusted_passes_and_is_kept(folder):
 
 
 def test_the_document_lists_every_doubt_and_its_limits():
-    """Every doubt has a trap that provokes it, and a row with its severity and limits."""
     text = (ROOT / "docs" / "reference" / "doubts.md").read_text()
     parts = re.split("## Strips|## Biaxial tests", text)
     row = re.compile(r"^\| `([\w-]+)` \| (.*?) \| (.*) \|$", re.M)

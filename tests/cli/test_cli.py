@@ -17,7 +17,6 @@ from ..projects import small
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """An uninterrupted study of four starts: its folder and the terminal's output."""
     folder = tmp_path_factory.mktemp("study")
     done = in_process("bubble", small(folder), "--out", "out", "--starts", 4, cwd=folder)
     return folder, done.stdout

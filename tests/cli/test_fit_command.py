@@ -65,7 +65,6 @@ def project_in(folder, *changes):
 
 @pytest.fixture(scope="module")
 def together(tmp_path_factory):
-    """Bubble and strips of one law, fitted together from one start."""
     folder = tmp_path_factory.mktemp("together")
     law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.153, 0.232, 0.883])
     write_points(folder / "points.csv", law)
@@ -119,7 +118,6 @@ def test_another_fit_ends_in_one_line(together, tmp_path):
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory):
-    """Strips of constant moduli, one start."""
     project = bf.read_project(constant_strips(tmp_path_factory.mktemp("words")))
     return bf.fit(project, tests=["two"], starts=1, jobs=1)
 

@@ -64,7 +64,6 @@ def refusal(*arguments):
 
 @pytest.fixture(scope="module")
 def strip(tmp_path_factory):
-    """A folder with frames/ (12, none lost) and machine.csv. Not to be written to."""
     folder = tmp_path_factory.mktemp("strip")
     write_frames(folder / "frames")
     machine_export(folder)
@@ -188,7 +187,6 @@ TABLE_A1 = [(39.73, 0.67), (39.78, 0.54), (39.90, 0.23), (39.85, 0.38), (39.89, 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """ball1.csv ...; one point of each is astray."""
     home = tmp_path_factory.mktemp("balls")
     for k, (radius, _) in enumerate(TABLE_A1, start=1):
         points, _, _ = cap(radius, 60.0, 300, k)

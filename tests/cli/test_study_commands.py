@@ -19,7 +19,6 @@ SECONDS = re.compile(r"(?m)^( +\d+ +\d+) +\d+\.\d+")
 
 
 def study(*arguments, cwd, code=0, card="card.toml"):
-    """Run the command on project.toml and a card; assert its exit code; return its output."""
     name, *options = arguments
     run = ("study", name, "project.toml", "--card", card, *options)
     return in_process(*run, cwd=cwd, code=code).output
@@ -27,7 +26,6 @@ def study(*arguments, cwd, code=0, card="card.toml"):
 
 @pytest.fixture
 def bubble(tmp_path):
-    """A folder with a small bubble project and the card of Table 4.2."""
     project_file(tmp_path, KNOWN.read_text(), ("elements = 800", "elements = 80"))
     law = HypoelasticLaw(1000 * np.array(TABLE_4_2), strain_range=[0.13] * 3)
     write_card(MaterialCard(law, 0.81, "Table 4.2"), tmp_path / "card.toml")

@@ -24,14 +24,12 @@ LENGTHS = {"warp": (20.022, 23.329), "fill": (22.780, 28.721), "bias": (19.767, 
 
 
 def small(folder, *changes):
-    """The example with 10 increments, changed further by replacing text."""
     shutil.copy(EXAMPLE / "curves.csv", folder)
     return project_file(folder, (EXAMPLE / "project.toml").read_text(), COARSE, OWN_MESH, *changes)
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """Fit the example from one start; return its folder."""
     folder = tmp_path_factory.mktemp("uniaxial")
     quick("uniaxial", small(folder), "--out", "out", "--starts", 1, cwd=folder)
     return folder

@@ -200,7 +200,6 @@ def test_an_example_that_is_wrong_is_found():
 
 
 def test_bash_completes():
-    """By the very line that the documents say."""
     bash = needs.program("bash", package="bash")
     documented = 'eval "$(_BUBBLEFIT_COMPLETE=bash_source bubblefit)"'
     assert documented in (ROOT / "docs/how-to/terminal.md").read_text()

@@ -66,7 +66,6 @@ class Fault:
 
 
 def faults() -> list[Fault]:
-    """Return all, in the order of the file."""
     content = tomllib.loads((HERE / "escaped.toml").read_text(encoding="utf-8"))
     return [Fault(**entry) for entry in content["fault"]]
 
@@ -88,7 +87,6 @@ def run(root: Path, tests: Sequence[str], keep: str = "1") -> tuple[int, dict[st
 
 
 def caught(root: Path, fault: Fault) -> bool:
-    """Whether every test of a fault fails with it."""
     path = fault.found(root)
     before = path.read_bytes()
     fault.put_in(root)
@@ -101,7 +99,6 @@ def caught(root: Path, fault: Fault) -> bool:
 
 
 def main(names: Sequence[str]) -> int:
-    """Exit code."""
     chosen = [f for f in faults() if not names or any(name in f.name for name in names)]
     if not chosen:
         print(f"no fault is named {' or '.join(names)}", file=sys.stderr)

@@ -122,7 +122,6 @@ CHANGES = st.lists(
 
 
 def mutated(content: bytes, changes: Sequence[Change]) -> bytes:
-    """The content after one change after the other."""
     for change in changes:
         content = KINDS[change.kind](content, change)
     return content

@@ -149,7 +149,6 @@ def _status(path: Path) -> None:
 
 @cache
 def targets() -> dict[str, Target]:
-    """Every reader by name."""
     with TemporaryDirectory() as name:
         return _targets(Path(name))
 

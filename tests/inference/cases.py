@@ -50,7 +50,6 @@ def reference():
 
 
 def targets(fields=None, noise=0.0):
-    """Of the known law unless other fields are given."""
     fields = reference().displacement if fields is None else fields
     random = np.random.default_rng(12)
     return [

@@ -312,7 +312,6 @@ def test_of_three_specimens_it_is_the_square_of_students_t():
 
 
 def test_a_wrong_form_is_told():
-    """A curve that bends by 60 N where a constant modulus cannot."""
     random = np.random.default_rng(8)
     bend = 60.0 * ((PLACES / 1.5 - 1.0) ** 2 - 0.4)
     told = [found(bend + scattered(5, random)).significant for _ in range(100)]

@@ -158,7 +158,6 @@ COVARIANCE = np.array([[4.0, 1.5], [1.5, 1.0]])
 
 
 def draws(mean, rows, least, allowed, covariance=COVARIANCE, seed=5, count=COUNT):
-    """Draw; assert that every draw lies within its bounds."""
     given = [np.asarray(v, dtype=float) for v in (mean, rows, least, allowed)]
     mean, rows, least, allowed = given
     random = np.random.default_rng(seed)

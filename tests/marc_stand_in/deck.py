@@ -28,8 +28,6 @@ ALWAYS = {*PARAMETERS} - {"follow for", "shell sect", "state vars", "cavity"}
 
 
 class DeckError(Exception):
-    """Marc would not run this deck."""
-
     def __init__(self, problem, line=0, number=DATA_ERROR):
         self.problem, self.line, self.number = problem, line, number
         super().__init__(f"{problem} (line {line})" if line else problem)

@@ -65,7 +65,6 @@ def export(name, card=CARD, **options):
 
 
 def few_points(name, count=15):
-    """Return the option of a few points, where a format has curves of them."""
     return {"points": count} if hasattr(FORMATS[name].options(), "points") else {}
 
 
@@ -617,7 +616,6 @@ REMEMBERS = replace(CARD, law=replace(LAWS["cubic"], memory=MEMORY), state="firs
 
 
 def unloaded(component, measure="nominal"):
-    """Return strain and stress from the set to the end of the range, in closed form."""
     law, end, count = REMEMBERS.law, 0.13, 15
     kept, up = MEMORY.kept(component, end), MEMORY.unloading[component]
     x = np.linspace(kept, end, count)

@@ -48,7 +48,6 @@ def differences(value):
 
 
 def followed(law, path, state=None, stress=None):
-    """Return stresses (n, 3) along strains (n, 3), and the last state."""
     state, stress = np.zeros((1, 3)) if state is None else state, np.zeros((1, 3))
     found = []
     for strain in path:

@@ -30,7 +30,6 @@ LEFT_OUT = re.compile(r".*(RemoveDecorator|NoOp|Bit(Or|And|Xor)|Shift|Invert|_Is
 
 
 def git(*arguments: str) -> list[str]:
-    """Return the lines that git prints; none where it fails."""
     done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True)
     return done.stdout.splitlines() if done.returncode == 0 else []
 

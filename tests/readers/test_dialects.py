@@ -24,7 +24,6 @@ def comma(value: float) -> str:
 
 
 def rows(*columns, form="{:.6f}", separator=","):
-    """Return lines of columns (n,), of numbers or of text."""
     text = [[c if isinstance(c, str) else form.format(c) for c in one] for one in columns]
     return [separator.join(row) for row in zip(*text, strict=True)]
 

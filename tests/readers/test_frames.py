@@ -371,7 +371,6 @@ def places(path, ids, points):
 
 
 def test_a_reference_of_its_own_beside_places(tmp_path):
-    """Points are paired by their numbers, or as many by their rows."""
     draw = np.random.default_rng(1)
     rest, moved = draw.uniform(-90, 90, (20, 3)), draw.normal(0, 2, (2, 20, 3))
     options = FrameOptions(QUANTITIES, reference=places(tmp_path / "ref.csv", range(20), rest))

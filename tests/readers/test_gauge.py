@@ -180,7 +180,6 @@ def test_loads_that_do_not_pair(options, words):
 
 
 def square(spacing: float = 1.0, without: tuple[float, float] | None = None) -> Frame:
-    """A grid of 11 x 11 points that does not move."""
     x, y = (part.ravel() for part in np.meshgrid(*2 * [spacing * np.arange(11.0)]))
     points = np.column_stack([x, y, 0 * x])
     if without is not None:

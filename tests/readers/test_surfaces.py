@@ -35,7 +35,6 @@ def equation_4_4(c: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def on_a_disk(count: int, seed: int, radius: float = 100.0) -> np.ndarray:
-    """Points (count, 2) spread evenly."""
     random = np.random.default_rng(seed)
     r, angle = radius * np.sqrt(random.random(count)), 2 * np.pi * random.random(count)
     return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
@@ -103,7 +102,6 @@ def surfaces() -> tuple[DisplacementSurface, ...]:
 
 
 def test_surface_files_come_back(tmp_path, surfaces):
-    """As plain equation 4.4 in mm."""
     path, points = tmp_path / "surfaces.csv", on_a_disk(50, 6)
     write_surfaces(surfaces, path)
     for read, written in zip(read_surfaces(path), surfaces, strict=True):

@@ -15,7 +15,6 @@ from ..drawings import check_charts, data, legend, lines, named, shown
 
 
 def cap(xy, height):
-    """Displacement (n, 3) of a parabolic cap of radius 100 mm."""
     inside = 1 - (xy**2).sum(axis=1) / 1e4
     return np.column_stack([0.05 * xy * inside[:, None], height * inside])
 

@@ -262,7 +262,6 @@ def predictions(folder, own, **options):
 
 
 def slope(folder):
-    """N per MPa of E1 at the frames, by the formula."""
     loads = [predictions(folder, replace(card(), certainty=None,
                                          law=HypoelasticLaw.linear(e, 150.0, 20.0))).curves()
              for e in (E1 - 1, E1 + 1)]  # fmt: skip

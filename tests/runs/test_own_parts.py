@@ -99,14 +99,12 @@ def prepared(project):
 
 
 def easy(folder, form='form = "cubic"', objective="e", starts=2):
-    """The small known solution with bounds on moduli, from so many starts."""
     path = with_form(folder, form)
     path.write_text(path.read_text().replace('objective = "e"', f'objective = "{objective}"'))
     return read_project(path).with_fit(starts=starts, jobs=1)
 
 
 def at_known(setup, times=1.05):
-    """The fit's problem, and unknowns near its known solution."""
     problem = setup.problem()
     moduli = {name: times * setup.tests[0].known.modulus(name, 0.03) for name in ORDER}
     values = [moduli[name] for name in problem.unknowns.form.modulus_of]
@@ -419,8 +417,6 @@ def test_a_test_of_ones_own_alone_and_by_another_solver(tmp_path):
 
 
 class Plain:
-    """A solver that gives no derivatives."""
-
     external, progress = False, None
 
     def __init__(self, solver):

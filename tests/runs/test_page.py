@@ -102,14 +102,12 @@ def nothing_shown(together, monkeypatch):
 
 
 def points(test, direction):
-    """Strain and load (N) of both specimens, as far as the model goes."""
     strain = np.log1p(ELONGATION[ELONGATION <= ENDS[test]] / 20)
     loads = [20 * e * strain for e in MODULI[test][direction]]
     return np.tile(strain, 2), np.concatenate(loads)
 
 
 def rms(fit, test, direction):
-    """N, of a constant modulus in closed form."""
     strain, load = points(test, direction)
     modulus = fit.law.beta[11 if direction == "warp" else 7]
     return float(np.sqrt(np.mean((20 * modulus * strain - load) ** 2)))

@@ -221,7 +221,6 @@ def scheduler():
 
 
 def tasks(scheduler, prepare, count, **more):
-    """What the tasks 0 .. count - 1 tell and give."""
     told = Executor(scheduler=scheduler).run_tasks(prepare, range(count), **more)
     return [record for record in told if record is not None]
 

@@ -50,7 +50,6 @@ def edit(tmp_path):
 
 @pytest.fixture
 def example(tmp_path):
-    """Read an example, of strips unless said, after replacing some texts."""
     (tmp_path / "curves.csv").write_bytes((STRIPS.parent / "curves.csv").read_bytes())
     return lambda *changes, source=STRIPS: read_project(
         project_file(tmp_path, source.read_text(), *changes)

@@ -254,7 +254,6 @@ def test_the_same_data_on_larger_quads(fitted):
 
 
 def ended(fit, number, value, moduli=(80.0, 400.0, 800.0)):
-    """A start that ended with moduli (G12, E2, E1) in MPa."""
     unknowns = tuple(fit.problem.unknowns.at(np.array(moduli)).tolist())
     return StartRecord(
         number, (1, number), value, "", 5, () if value is None else unknowns, (), 0.1,

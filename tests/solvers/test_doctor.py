@@ -33,7 +33,6 @@ def fake(path, version="2.99", then="exit 0"):
 
 @pytest.fixture
 def bare(tmp_path, monkeypatch):
-    """A machine without any ccx: an empty cache, and a PATH with one empty folder."""
     (tmp_path / "bin").mkdir()
     (tmp_path / "cache").mkdir()
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))

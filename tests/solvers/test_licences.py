@@ -173,7 +173,6 @@ def test_a_lock_is_of_the_file_that_is_there(tmp_path, monkeypatch):
 
 @pytest.fixture
 def pauses(monkeypatch):
-    """Pauses between tries, none of which is made; time passes as if they were."""
     made = []
     monkeypatch.setattr(licences.time, "sleep", made.append)
     monkeypatch.setattr(licences.time, "monotonic", lambda: sum(made))

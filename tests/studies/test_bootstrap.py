@@ -97,7 +97,6 @@ def test_specimens_drawn_again(drawn_again):
 
 
 def relative_error(test, direction, modulus):
-    """RMS error of a constant modulus (MPa) over the largest load."""
     loads = np.array([20 * e * STRAIN[test] for e in MODULI[test][direction]])
     return float(np.sqrt(np.mean((20 * modulus * STRAIN[test] - loads) ** 2)) / loads.max())
 

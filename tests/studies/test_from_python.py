@@ -47,7 +47,6 @@ TIMES = ("seconds", "wall_s", "cpu_s", "card")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A project of strips, with the folder of its fit."""
     folder = tmp_path_factory.mktemp("made") / "project"
     folder.mkdir()
     path = constant_strips(folder, ("seed = 7", "seed = 7\njobs = 1"))

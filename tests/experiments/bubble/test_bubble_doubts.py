@@ -258,7 +258,6 @@ def heights(height):
 
 
 def force(modulus):
-    """Return the load a width (N/mm) at a strain of 0.04 of strips with this modulus."""
     return modulus / 0.75 * 0.8 * 0.04
 
 

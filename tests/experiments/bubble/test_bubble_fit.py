@@ -269,7 +269,6 @@ QUARTER = BubbleModel(MESH, 0.8, (0.05, 0.1), (0.02, 0.05, 0.1))
 
 
 def stretched(warp, fill):
-    """Return (nodes, 3) of a flat sheet that is pulled evenly."""
     return MESH.points * [warp - 1, fill - 1, 0.0]
 
 

@@ -69,7 +69,6 @@ def project_of_registered_fit(seen, name: str, more: str = ""):
 
 
 def test_moduli_are_those_of_the_right_frame(seen):
-    """Within 1 % over the strain reached."""
     folder, _, known = seen
     path, out = project_of_registered_fit(seen, "found"), folder / "out"
     done = in_process("bubble", path, *ONE_START, "--out", out, cwd=folder)

@@ -47,7 +47,6 @@ AHEAD = 41.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """data/frames/p1_0kPa.csv ..., data/valve.csv in volts."""
     home = tmp_path_factory.mktemp("recorded")
     (home / "data" / "frames").mkdir(parents=True)
     x, y = (one.ravel() for one in np.meshgrid(*2 * [np.linspace(-70, 70, 9)]))

@@ -22,7 +22,6 @@ CARD = MaterialCard(HypoelasticLaw.linear(500.0, 150.0, 20.0), 0.81)
 
 
 def made(symmetry: str):
-    """A tube of 150 mm, and its run by the formula."""
     way = np.linspace(0.0, 240.0, 61)[1:].tolist()
     model = inflated_cylinder(150.0, 0.14, 0.81, 40.0, deflections=way, symmetry=symmetry)
     return model, run_of(ran(model, CARD))

@@ -51,7 +51,6 @@ def of(*values: float) -> np.ndarray:
 
 
 def test_a_bilinear_curve():
-    """4 N/mm to 100 mm, 1 N/mm from there."""
     load = np.minimum(4 * WAY, 300 + WAY)
     stiffness = initial_stiffness(WAY, load, OVER)
     assert stiffness == pytest.approx(4.0)
@@ -143,7 +142,6 @@ def test_straightness():
 
 
 def test_wrinkles_begin_where_more_is_wrinkled_than_when_inflated():
-    """By more than a hundredth of the surface."""
     run = BendingRun(of(0, 5, 10), of(0, 15, 30), NONE, NONE, NONE, NONE, of(0.25, 0.26, 0.2601))
     assert wrinkle_onset(run) == (10.0, 30.0)
     assert wrinkle_onset(replace(run, wrinkled=NONE)) is None

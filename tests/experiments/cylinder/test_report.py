@@ -61,7 +61,6 @@ def run(test, card: str, end=None, notes=None, **record: Any) -> SimpleNamespace
 
 
 def outcome_of(*runs, bent=None, measures=None) -> CylinderOutcome:
-    """Runs that ended by number; MEASURES and BENT unless given."""
     found = CylinderOutcome(runs)
     found.__dict__["bent"] = bent or {}
     found.__dict__["measures"] = measures or dict.fromkeys(bent or {}, MEASURES)

@@ -113,7 +113,6 @@ def strips(unknowns: Unknowns = CUBIC, law: HypoelasticLaw = LAW, **how: Any) ->
 
 
 def joint(unknowns: Unknowns = CUBIC, law: HypoelasticLaw = LAW, **how: Any) -> Any:
-    """Of one stage, unless `stages` are asked for."""
     stages, noise = how.pop("stages", False), how.pop("bubble_noise", 0.0)
     fields = exact("bubble", law).displacement
     fields = fields + noise * np.random.default_rng(3).standard_normal(fields.shape)
@@ -349,7 +348,6 @@ def test_no_analysis_of_a_fit_leaves_the_bounds():
 
 
 def watched(*problems) -> list[tuple]:
-    """(value, status, solver) of every analysis from now on."""
     seen = []
     for problem in problems:
         problem.watch = lambda y, value, status, solver: seen.append((value, status, solver))
@@ -461,7 +459,6 @@ WHOLE = 100.0 * ELONGATION
 
 
 def strip(loads: np.ndarray) -> Strip:
-    """Of curves (specimens, n) N."""
     curves = [LoadCurve("warp", str(k), ELONGATION, f, None) for k, f in enumerate(loads)]
     points = np.tile(ELONGATION, len(loads)), loads.ravel()
     polynomial = fit_load_polynomial(*points, 2, True)

@@ -260,7 +260,6 @@ def history(*load: float, shear: float = 0.0) -> History:
 
 
 def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
-    """2 and 4 mm matched at 200 and 400 N."""
     objective = LoadObjective([2.0, 4.0], [2.0, 4.0], [200.0, 400.0])
     return FittedStrip(strip, MODEL, objective, history(*loads))
 
@@ -373,7 +372,6 @@ def simulated(folder, outcomes, within: bool = False):
     ],
 )  # fmt: skip
 def test_curves_end_where_the_range_of_the_card_does(tmp_path, drawn, monkeypatch, strains, shown):
-    """At the first increment and at the second."""
     strain = iter(strains)
     monkeypatch.setattr(report, "surface_strain", lambda *_: np.array([next(strain)]))
     found = simulated(tmp_path, {("soft", "warp"): history(223.0, 436.0)}, within=True)

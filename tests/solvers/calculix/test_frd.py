@@ -23,7 +23,6 @@ def frames(count):
 
 
 def write(path, given, flag, end=True, skip=()):
-    """A result file as ccx writes it: displacements and eight state variables of six nodes."""
     out = bytearray(b"    1C\n    1UUSER\n")
 
     def rows(values):

@@ -43,7 +43,6 @@ LINEAR = HypoelasticLaw.linear(5000.0, 4000.0, 200.0)
 
 
 def beam(displacements=(2.0, 6.0, 10.0), penalty=5.0, across=8):
-    """A quarter of a short beam, 150 mm, at 100 kPa."""
     mesh = half_tube(across, 24, RADIUS, LENGTH)
     foot = mesh.node_sets["foot"]
     hang = foot[[np.argmin(np.abs(mesh.points[foot, 2] - 0.5 * SPAN))]]

@@ -1,0 +1,318 @@
+"""Notes of every kind, provoked; a fit and a run of Marc go wrong in many ways at once."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
+from bubblefit.experiments import kinds
+from bubblefit.experiments import registry as experiments
+from bubblefit.experiments.bubble import findings as bubble_findings
+from bubblefit.experiments.bubble.findings import sheet_warnings
+from bubblefit.experiments.kinds import notes_of, state_said
+from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
+from bubblefit.inference.assessment import certainty
+from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.problem import ANALYSES_USED_UP
+from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.exports import subroutines
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.cylinder_model import inflated_cylinder
+from bubblefit.meshes.strip_models import straight_strip
+from bubblefit.readers.curves import LoadCurve
+from bubblefit.readers.frames import Frame, frame_files
+from bubblefit.runs.compare import FoldError, FormFit, LawComparison
+from bubblefit.runs.estimate import estimate_of
+from bubblefit.runs.poisson import vary_nu12
+from bubblefit.runs.refinement import refine
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.runs.simulation import simulate_cards
+from bubblefit.solvers import registry
+from bubblefit.solvers.base import History
+from bubblefit.solvers.calculix import cylinder as cylinder_analysis
+from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
+from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
+from bubblefit.solvers.marc.cylinder import may_touch
+from bubblefit.solvers.marc.sheets import bubble_history
+from bubblefit.solvers.marc.solver import MarcSolver
+from bubblefit.solvers.membrane import bending
+from bubblefit.solvers.membrane.closed import ClosedMembrane
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from . import load_cycles
+from .bars import BarKind, BarSolver, BarTest, project_of
+from .inference import cases
+from .inference.cases import MODEL
+from .marc_files import sts_text, t19_text
+from .places import KNOWN
+from .projects import constant_strips, small
+from .solvers.marc.test_marc_deck import frames_of
+from .solvers.membrane.test_bending import LINEAR, beam
+
+
+@cache
+def fit() -> bf.Fit:
+    """Strips in two tests: bounds too narrow, noise too small, a preload, a start that fails."""
+    with TemporaryDirectory() as name, pytest.MonkeyPatch.context() as patch:
+        folder = Path(name)
+        path = constant_strips(
+            folder,
+            ("E1 = [0.02, 2.0]", "E1 = [0.02, 0.3]"),
+            ("E2 = [0.03, 1.0]", "E2 = [0.24, 1.0]"),
+            ('name = "one"', 'name = "one"\nnoise = 0.01'),
+            ("increments = 8", "increments = 4"),
+            ("seed = 7", "seed = 7\nmax_analyses = 12"),
+        )
+        # Another column of elongations, and a load before any.
+        head, *rows = (folder / "one.csv").read_text().splitlines()
+        rows = [f"{head},crosshead [mm]", "warp,a,0.0,60.0,0.0", *(f"{row},0.0" for row in rows)]
+        (folder / "one.csv").write_text("\n".join(rows) + "\n")
+        (folder / "tired").touch()
+
+        class Tired(MembraneSolver):
+            def run_with_sensitivity(self, *arguments: Any, **named: Any) -> Any:
+                if (folder / "tired").exists():
+                    (folder / "tired").unlink()
+                    raise SolverFailure("too tired", self.name)
+                return super().run_with_sensitivity(*arguments, **named)
+
+        patch.setitem(registry.SOLVERS, "membrane", Tired)
+        return bf.fit(bf.read_project(path), jobs=1)
+
+
+def notes_of_fit(*_: Any) -> list[Note]:
+    return fit().notes
+
+
+def notes_of_an_unfinished_fit(*_: Any) -> list[Note]:
+    best = fit().best
+    ranked = [replace(record, status=ANALYSES_USED_UP) for record in best.ranked]
+    return replace(fit(), best=replace(best, ranked=ranked)).notes
+
+
+def comparison(fit: bf.Fit) -> LawComparison:
+    """A fit as that of a form whose third fold failed."""
+    folds = (FoldError(0, 0.1, {}), FoldError(1, 0.1, {}), FoldError(2, None, {}))
+    return LawComparison((FormFit("spline:3", fit, folds, ("one: warp",)),), 1)
+
+
+def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
+    """Matched by crude surfaces to data of its own model; and were they measured."""
+    match = ('by = "points"', 'by = "surfaces"\ndegree = 4')
+    project = bf.read_project(small(folder, match))
+    (prepared,) = prepare_fit(project, list(project.tests.values())).tests
+    flat = sheet_warnings(replace(prepared, known=None))
+    return [*bubble_findings.match_warnings(prepared), *flat]
+
+
+def notes_of_certainty(*_: Any) -> Iterable[Note]:
+    """A pressure that is as far off as it may be."""
+    offset = Nuisance("pressure_offset", -3.0, 50.0, "kPa", "pressure_offset", 1e-3)
+    problem = cases.problem(replace(cases.CUBIC, nuisance=NuisanceOf({"bubble": (offset,)})))
+    unknowns = problem.unknowns.at(cases.LAW.beta)
+    unknowns[-1] = offset.lower
+    point = problem.evaluate(unknowns, True)
+    assert point is not None
+    return certainty(problem, point, cases.LAW, np.full(3, 0.08)).undetermined
+
+
+def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
+    """Return notes of a bubble at wrong pressures, beside a test that gives no estimate."""
+    project = bf.read_project(KNOWN)
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    (prepared,) = setup.tests
+    pressures = tuple(p + 0.01 for p in prepared.test.pressures)
+    test = replace(prepared.test, pressures=pressures, increments=pressures, noise=0.01)
+    fields = tuple(replace(f, pressure=p) for f, p in zip(prepared.fields, pressures, strict=True))
+
+    def refuse(make_solver: Any) -> Any:
+        raise InputError(None, "points", "lie on a part of the disk only")
+
+    other: Any = SimpleNamespace(test=SimpleNamespace(name="other"), virtual_work=refuse)
+    tests = (replace(prepared, test=test, fields=fields), other)
+    return estimate_of(replace(setup, tests=tests)).notes
+
+
+Array = np.ndarray
+
+
+def notes_of_bending(*_: Any) -> Iterable[Note]:
+    """A beam bent to 6 of 8 mm, every move called a jump."""
+    find, heights = ClosedMembrane.equilibrium, list[float]()
+
+    def tired(self: ClosedMembrane, u: Array, pressure: float) -> Array | None:
+        if self.bodies:
+            heights.append(self.bodies[-1].centre[1])
+            if heights[0] - heights[-1] > 4.5:
+                return None
+        return find(self, u, pressure)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ClosedMembrane, "equilibrium", tired)
+        patch.setattr(bending, "LEAP", 1e-6)
+        solver = MembraneSolver(1e-6, wrinkle_stiffness=0.01)
+        return solver.run(beam((2.0, 4.0, 6.0, 8.0), across=4), LINEAR).remarks
+
+
+def notes_of_inflation(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
+    patch.setattr(bending, "MOST_GROWTH_INFLATED", 0.0)
+    model = replace(beam(across=4), bending=None)
+    return MembraneSolver(1e-6).run(model, LINEAR).remarks
+
+
+def notes_of_analysis(*_: Any) -> list[Note]:
+    """Yarns slide where half the stress along them is more than the shear modulus."""
+    soft = replace(HypoelasticLaw.linear(500.0, 200.0, 4.0), strain_range=np.array([0.05, 1, 1]))
+    model = straight_strip("warp", 20.0, 21.6, 0.81, increments=10, across=8)
+    return notes_of(MembraneSolver().run(model, soft), MaterialCard(soft, 0.81))
+
+
+def notes_of_marc_bending(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
+    """A Marc that repeats an increment and stops at 60 of 100 mm; the supports carry nothing."""
+    patch.delenv("BUBBLEFIT_MARC", raising=False)
+    model = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0, 60.0, 100.0])
+    frames, _ = frames_of(model, model.mesh.points * [0.05, 0.05, 0.0], last=2)
+    frames[-1][1]["Contact Normal Force"][may_touch(model)["supports"]] = 0.0
+    filled = len(model.inflation)
+    for name, given in (("inflation", frames[: filled + 1]), ("bending", frames)):
+        ended, times = name == "inflation", [time for time, _ in given[1:]]
+        (folder / name).mkdir()
+        text = t19_text(model.mesh.points, model.mesh.quads, given, ended=ended)
+        (folder / name / "job.t19").write_text(text)
+        numbers = [*range(1, len(times)), len(times) - 1]
+        text = sts_text(times) if ended else sts_text(times, 3015, numbers)
+        (folder / name / "job.sts").write_text(text)
+    program = folder / "run_marc"
+    program.write_text(
+        f"#!/bin/sh\nif grep -q '^contact' job.dat; then cp {folder}/bending/* .\n"
+        f"else cp {folder}/inflation/* .; fi\n"
+    )
+    program.chmod(0o755)
+    return MarcSolver(marc=program, scratch=str(folder / "scratch")).run(model, LINEAR).remarks
+
+
+def notes_of_marc_results(folder: Path, _: Any) -> Iterable[Note]:
+    u = np.zeros_like(MODEL.mesh.points)
+    frames = [(float(i), {"Displacement": u}) for i in range(len(MODEL.increments) + 1)]
+    (folder / "job.t19").write_text(t19_text(MODEL.mesh.points, MODEL.mesh.quads, frames))
+    return bubble_history(folder / "job.t19", MODEL, 1).remarks
+
+
+def notes_of_calculix_bending(*_: Any) -> Iterable[Note]:
+    """A run that stopped at 6 of 8 mm; its volume does not change, so nor does the pressure."""
+    model = inflated_cylinder(150.0, 0.14, 0.81, 60.0, deflections=[4.0, 8.0])
+    solids, still = solid_mesh(model), np.zeros((3, *model.mesh.points.shape))
+    forces = {name: np.zeros((3, 3)) for name in ("supports", "collar")}
+    volume = volumes(model, still)
+    filling = volume[0] * (1 + 0.01 * np.arange(1, len(model.inflation) + 1))
+    found = BentCylinder(np.array([0.0, 3, 6]), still, forces, volume, 9, True, "no step left")
+
+    def run(_decks: Any, _read: Any, rescue: Any = None) -> Any:
+        return (np.zeros_like(solids.points), filling) if rescue is None else found
+
+    setup: Any = SimpleNamespace(templates=None)
+    return cylinder_analysis.analyse(model, LINEAR, setup, run).remarks
+
+
+def notes_of_tilted_shells(*_: Any) -> Iterable[Note]:
+    shells = shell_mesh(MODEL.mesh, "S4")
+    radius = np.hypot(*shells.points[:, :2].T)
+    cone = shells.points + np.outer(30.0 * (1 - radius / radius.max()), [0, 0, 1])
+    return tilt_remarks(replace(shells, points=cone))
+
+
+LAW = HypoelasticLaw.linear(600.0, 120.0, 15.0)
+CARD = MaterialCard(LAW, 0.5, "soft")
+
+
+class Saying(BarSolver):
+    """A solver of another distribution, whose remarks are plain words unless told otherwise."""
+
+    says: Sequence[str] = ("as a plug-in says it",)
+
+    def run(self, *arguments: Any, **named: Any) -> History:
+        return replace(super().run(*arguments, **named), remarks=tuple(self.says))
+
+
+def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> bf.Project:
+    """A project of one bar; what its solver `says` and `fails` at."""
+    solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
+    solver.says = says or solver.says
+    patch.setattr("bubblefit.project.project.kinds", lambda: known)
+    for module in ("runs.simulation", "project.project"):
+        patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
+    reports = experiments.report_of
+    patch.setattr(
+        "bubblefit.runs.simulation.report_of",
+        lambda name: BarKind() if name == "bars" else reports(name),
+    )
+    patch.setitem(registry.SOLVERS, "bars", lambda: solver)
+    return project_of(BarTest("a bar"))
+
+
+def notes_of_simulation(folder: Path, patch: pytest.MonkeyPatch) -> list[Note]:
+    """A thick card that is valid nowhere, and one whose bar breaks."""
+    project = bars(patch, law_fails=lambda law: law.nu12 == 0.3)
+    short = replace(LAW, strain_range=np.array([0.05, 1.0, 1.0]))
+    cards = {
+        "thick": MaterialCard(short, 1.0),
+        "stiff": MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.3), 0.5),
+    }
+    done = simulate_cards(project, [BarTest("a bar")], cards, folder / "out")
+    return [Note(NoteKind(n["kind"]), n["note"], n["of"]) for n in done.numbers["notes"]]
+
+
+def notes_of_nu12(_: Path, patch: pytest.MonkeyPatch) -> list[Note]:
+    project = bars(patch, law_fails=lambda law: law.nu12 == 0.3)
+    return vary_nu12(project, CARD, [0.2, 0.3]).notes
+
+
+def notes_of_refinement(_: Path, patch: pytest.MonkeyPatch) -> list[Note]:
+    return refine(bars(patch, fails=8), CARD).notes
+
+
+def gauge(folder: Path) -> GaugeTable:
+    """Its upper end is lost in frame 2 of 12, and frame 10 has no load."""
+    x, y = (part.ravel() for part in np.meshgrid(np.arange(3.0), np.arange(11.0)))
+    points = np.stack([x, y, 0 * x], axis=1)
+    frames = [Frame(points, 0.01 * i * points * [0, 1, 0]) for i in range(12)]
+    frames[2] = Frame(points[:20], frames[2].displacement[:20])
+    names = sorted(f"f{i}.csv" for i in range(12))
+    for name in names:
+        (folder / name).touch()
+    _, order = frame_files([str(folder / name) for name in names])
+    record = virtual_strain_gauge(frames, (1.0, 1.0), (1.0, 9.0))
+    seen = np.array([i for i in range(12) if i not in (2, 10)])
+    curve = LoadCurve("warp", "1", record.elongation[seen], 9.0 * seen, None, frame=seen)
+    return GaugeTable(names, (1.0, 1.0), (1.0, 9.0), record, curve, order)
+
+
+def notes_of_gauge(folder: Path, _: Any) -> list[Note]:
+    return gauge(folder).notes
+
+
+def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
+    time, load, strain = load_cycles.made()
+    travel = folder / "travel.csv"
+    load_cycles.write(travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain))
+    faulty = list(load_cycles.faulty(folder).values())
+    return [*bf.cycles(faulty).notes, *bf.cycles(travel, length=200.0).notes]
+
+
+def notes_of_states(*_: Any) -> list[Note]:
+    said = {"bubble": "first loading", "one": state_said("3 cycles to 5 kN/m"), "two": "",
+            "three": state_said("None")}  # fmt: skip
+    rates = {"one": 100.0, "two": 10.0, "three": None}
+    tests: Any = [SimpleNamespace(name=n, state=s, rate=rates.get(n)) for n, s in said.items()]
+    return kinds.notes_of_states(tests)
+
+
+def notes_of_exports(*_: Any) -> list[Note]:
+    return subroutines.NLELAST.export(CARD).says.notes
