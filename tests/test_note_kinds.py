@@ -158,7 +158,7 @@ def notes_by(maker):
         return list(maker(Path(folder), patch))
 
 
-@pytest.mark.parametrize("kind", sorted(NoteKind.known.values() - ELSEWHERE), ids=str)
+@pytest.mark.parametrize("kind", sorted({*NoteKind.known.values()} - ELSEWHERE), ids=str)
 def test_a_note_of_the_kind_comes(kind):
     cases = [(maker, words) for own, maker, words in CASES if own is kind]
     assert cases, f"no case provokes a note {kind!r}: add one to CASES"
