@@ -202,7 +202,7 @@ class Kind(Protocol):
     """A kind of test, as the registry holds it.
     name : of its tables in a project, [[name]]. title : in a few words, for help and documents.
     section : of such a table; `name` is among its keys, and `weight` where it is fitted. fitted :
-    whether its tests are `FittableTest`s. predicted : of tests that cards predict, None for others.
+    whether a fit can match its tests. predicted : of tests that cards predict, None for others.
     studied : None where no study runs it. A kind that knows tests worth making next is `Plannable`.
     A kind with measured files in a folder has `folder_key`, the dotted key of it, by which a
     project can be written down with the folder that it was run with."""
@@ -237,10 +237,6 @@ class Weighting:
     weight: float = 1.0
 
 
-#: A test whose measurement a fit can match.
-FittableTest = Test
-
-
 class PreparedTest(Protocol):
     """A test with its data, in memory, as worker processes get it.
     objective_is : its own objective, in words. known : the law behind computed data. specimens : by
@@ -250,7 +246,7 @@ class PreparedTest(Protocol):
     doubts, `Kind.doubts`."""
 
     @property
-    def test(self) -> FittableTest: ...
+    def test(self) -> Test: ...
 
     @property
     def objective_is(self) -> str: ...
@@ -460,11 +456,20 @@ def in_percent(strain: float, end: float) -> tuple[str, str]:
     return apart(100 * strain, 100 * end)
 
 
-def beyond_card(reached: Array, card: MaterialCard) -> list[Note]:
-    """Note where strains (3,) leave the range that a card is valid for."""
-    words = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
-    found = beyond(reached, card.law.strain_range)
-    return [Note(BEYOND_CARD, words.format(name, *in_percent(*two))) for name, *two in found]
+#: Notes on a strain beyond an end: of a card that was run, and of a test that was fitted.
+HELD = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
+WIDER = (
+    "{} strain reached {} %, beyond law.strain_range of {} %: the modulus was held at its end "
+    "value there; a wider range would let it vary"
+)
+
+
+def notes_beyond(
+    reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = HELD
+) -> list[Note]:
+    """Note strains (3,) beyond their ends; words : with places for name, strain and end in %."""
+    found = beyond(reached, ends)
+    return [Note(kind, words.format(name, *in_percent(*two))) for name, *two in found]
 
 
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
@@ -472,16 +477,6 @@ def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
     words = thickness_difference(card, thickness)
     run = f"{words}; it was run with the card's thickness"
     return [] if words is None else [Note(THICKNESS, run)]
-
-
-def beyond_range(reached: Array, ends: Array) -> list[Note]:
-    """Note where strains (3,) of a fitted test leave the range that its law was given."""
-    words = (
-        "{} strain reached {} %, beyond law.strain_range of {} %: the modulus was held at its "
-        "end value there; a wider range would let it vary"
-    )
-    found = beyond(reached, ends)
-    return [Note(BEYOND_LAW, words.format(name, *in_percent(*two))) for name, *two in found]
 
 
 #: How strips say that they were not conditioned; and rates that differ by more are no longer one.
@@ -517,16 +512,11 @@ def notes_of_states(tests: Iterable[Test]) -> list[Note]:
     return found
 
 
-def notes_of(history: History, card: MaterialCard) -> list[Note]:
-    """Return all notes on an analysis with a card."""
-    reached = beyond_card(strains_of(history), card)
-    return [*map(as_note, history.remarks), *reached, *unstable_words(history.unstable)]
-
-
-def notes_of_record(record: RunRecord, card: MaterialCard) -> list[Note]:
-    """Return all notes on a stored run; nothing of one that failed, but its failure."""
-    reached = [] if record.strain is None else beyond_card(record.strain, card)
-    return [*map(as_note, record.remarks), *reached, *unstable_words(record.unstable)]
+def notes_of(run: History | RunRecord, card: MaterialCard) -> list[Note]:
+    """Return all notes on an analysis with a card, or on the record of one."""
+    strain = strains_of(run) if isinstance(run, History) else run.strain
+    reached = [] if strain is None else notes_beyond(strain, card.law.strain_range)
+    return [*map(as_note, run.remarks), *reached, *unstable_words(run.unstable)]
 
 
 #: Of an unlimited law: no fabric is planned to be strained further (logarithmic).
@@ -657,11 +647,15 @@ class Expected:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The doubts of one test, sure ones first; those that are trusted stop nothing."""
+    """The doubts of one test; those whose names are trusted stop nothing."""
 
     test: str
     doubts: tuple[Doubt, ...]
-    trusted: frozenset[str]
+    trusted: Collection[str]
+
+    def __post_init__(self) -> None:
+        sure_first = tuple(sorted(self.doubts, key=lambda d: not d.sure))
+        object.__setattr__(self, "doubts", sure_first)
 
     @property
     def errors(self) -> tuple[Doubt, ...]:
@@ -684,11 +678,6 @@ class Judgement:
             said = "; ".join(f"{d.text} [{d.name}]" for d in self.errors)
             problem = f"{said}. Correct the data, or let it pass with --trust NAME"
             raise InputError(project, f"the data of {self.test!r}", problem)
-
-
-def judged(test: str, doubts: Sequence[Doubt], trust: Collection[str]) -> Judgement:
-    """Return the doubts of a test, sure ones first."""
-    return Judgement(test, tuple(sorted(doubts, key=lambda d: not d.sure)), frozenset(trust))
 
 
 @dataclass(frozen=True, eq=False)
@@ -812,10 +801,10 @@ class ChannelSection(Section):
     scale: Number | None = None
     offset: Number = 0.0
 
-
-def channel_of(section: ChannelSection) -> Channel:
-    """Return the channel of a section."""
-    return Channel(**section.model_dump())
+    @property
+    def channel(self) -> Channel:
+        """Return the channel."""
+        return Channel(**self.model_dump())
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SOLVER, InputError, Note, NoteKind, SolverFailure
-from ..experiments.kinds import FittableTest, Refinable, strains_of
+from ..experiments.kinds import Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
 from ..inference.descent import descend
@@ -345,7 +344,7 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         notes.append(Note(SOLVER, said))
         project = project.with_solver(SURROGATE, {})
     material = card_of(project, card)
-    setup = prepare_fit(project, cast(Sequence[FittableTest], project.chosen(tests, fitted=True)))
+    setup = prepare_fit(project, project.chosen(tests, fitted=True))
     problem = setup.problem()
     own, unknowns = material.law.form, problem.unknowns
     if own != setup.law.form:

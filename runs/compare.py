@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, NoFeasibleStart, Note, NoteKind, checked, rows
-from ..experiments.kinds import FittableTest, Masks
+from ..experiments.kinds import Masks
 from ..files import __version__
 from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
@@ -358,10 +358,7 @@ def compare(
     # All of them first: a mistake in the project shows before the first fit.
     projects = candidates(project.with_fit(starts=starts), forms)
     chosen = project.chosen(tests, fitted=True)
-    setups = {
-        name: prepare_fit(own, cast(Sequence[FittableTest], chosen))
-        for name, own in projects.items()
-    }
+    setups = {name: prepare_fit(own, chosen) for name, own in projects.items()}
     compared = tuple(specimens_of(next(iter(setups.values()))))
     if not compared:
         problem = (

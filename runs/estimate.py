@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
-from ..experiments.kinds import FittableTest, PreparedTest, Weighting, strains_of
+from ..experiments.kinds import PreparedTest, Weighting, strains_of
 from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
 from ..inference.comparison import Comparison
@@ -119,7 +119,7 @@ def estimate(project: Project, tests: str | Sequence[str] | None = None) -> Esti
     tests : names or a kind, by default all that can be fitted. InputError : in the project or its
     data, or no test that can be estimated from. SolverFailure : no law within the bounds fits.
     """
-    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    chosen = project.chosen(tests, fitted=True)
     return estimate_of(prepare_fit(project, chosen))
 
 

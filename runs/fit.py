@@ -9,21 +9,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
-from ..experiments.kinds import (
-    DataFile,
-    Expected,
-    Fabric,
-    FittableTest,
-    Judgement,
-    files_of,
-    judged,
-)
+from ..experiments.kinds import DataFile, Expected, Fabric, Judgement, files_of
 from ..experiments.own import OwnTest
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
@@ -297,7 +289,7 @@ def fit(
         starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute()),
     ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
-    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    chosen = project.chosen(tests, fitted=True)
     tell = listener(progress)
     tell(Stage("tests to read", len(chosen)))
     with timed("tests and their data made ready"):
@@ -413,7 +405,7 @@ def judge(setup: FitSetup, saw: Saw = lambda words: None) -> tuple[Judgement, ..
         saw(f"looking at {name}")
         if (look := getattr(one, "doubts", None)) is not None:
             with one_blas_thread(), timed(f"{name}, looked at for doubts"):
-                judgements.append(judged(name, look(expected), trust))
+                judgements.append(Judgement(name, tuple(look(expected)), trust))
     return tuple(judgements)
 
 
@@ -508,7 +500,7 @@ def check(
     SolverFailure : a known solution does not run.
     """
     project = project.with_fit(trust=[*project.fit.trust, *trust])
-    chosen, done = cast(Sequence[FittableTest], project.chosen(tests, fitted=True)), count()
+    chosen, done = project.chosen(tests, fitted=True), count()
     tell = listener(progress)
 
     def saw(words: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from ..errors import lines as note_lines
 from ..experiments.kinds import (
     BEYOND_LAW,
     Candidate,
-    FittableTest,
     MakeSolver,
     Place,
     Plannable,
@@ -275,7 +274,7 @@ def plan(
             problem = f"expected KIND=VALUE above 0, KIND of: {', '.join(known)}"
             raise InputError(None, "--noise", f"{problem}; got {name}={value:g}")
     material = card_of(project, card)
-    chosen = cast(Sequence[FittableTest], project.chosen(tests, fitted=True))
+    chosen = project.chosen(tests, fitted=True)
     setup = prepare_fit(project, chosen)
     present = present_tests(setup, material)
     asked = LawQuery(present.problem.unknowns, present.law, present.point.unknowns,

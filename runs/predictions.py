@@ -21,7 +21,7 @@ from ..experiments.kinds import (
     Test,
     band_of,
     laws_around,
-    notes_of_record,
+    notes_of,
     other_thickness,
     record_of,
 )
@@ -373,7 +373,7 @@ def _run(
     def end(number: int, record: RunRecord, again: bool) -> None:
         pair = pairs[number]
         thick = other_thickness(pair.material, project.fabric.thickness)
-        notes = [*notes_of_record(record, pair.material), *thick]
+        notes = [*notes_of(record, pair.material), *thick]
         ended[number] = replace(pair, record=record, notes=notes)
         log_run(pair.title, record, again)
         progress(RunEvent(ended[number], len(ended), len(pairs), again))

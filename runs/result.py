@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, as_note, rows
 from ..experiments.kinds import (
+    BEYOND_LAW,
+    WIDER,
     Findings,
     FittedTest,
     Judgement,
     Output,
     PreparedTest,
-    beyond_range,
     by_strain,
+    notes_beyond,
     notes_of_states,
     state_of,
     strains_of,
@@ -626,7 +628,10 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     every = zip(fit.problem.comparisons, best.point.histories, leading, strict=True)
     for comparison, history, beside in every:
         unstable = beside.unstable if history.unstable is None else history.unstable
-        own = [*unstable_words(unstable), *beyond_range(strains_of(history), ends)]
+        own = [
+            *unstable_words(unstable),
+            *notes_beyond(strains_of(history), ends, BEYOND_LAW, WIDER),
+        ]
         own += map(as_note, history.remarks)
         notes += [note.about(comparison.name) for note in own] if several else own
     # Computed data hold no noise: that less is left than is reckoned with is as it should be.

@@ -15,11 +15,11 @@ import numpy as np
 from ..errors import InputError
 from ..experiments.kinds import (
     STRAINS,
-    FittableTest,
     Masks,
     PreparedTest,
     Reach,
     Refinable,
+    Test,
     Weighting,
 )
 from ..experiments.registry import kind_named
@@ -427,9 +427,7 @@ class FitSetup:
 Saw = Callable[[str], object]
 
 
-def prepare_fit(
-    project: Project, tests: Sequence[FittableTest], saw: Saw = lambda words: None
-) -> FitSetup:
+def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words: None) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
     Raises
     ------
@@ -439,7 +437,7 @@ def prepare_fit(
         return _prepared(project, tests, saw)
 
 
-def _prepared(project: Project, tests: Sequence[FittableTest], saw: Saw) -> FitSetup:
+def _prepared(project: Project, tests: Sequence[Test], saw: Saw) -> FitSetup:
     fit = project.fit
     options = project.options_of(fit.solver)
     # Once here, in one line, rather than as the failure of every analysis.

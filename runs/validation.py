@@ -9,23 +9,20 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, checked, rows
 from ..experiments.kinds import (
-    BEYOND_CARD,
     Divisible,
-    FittableTest,
     FittedTest,
     MakeSolver,
     Masks,
     PredictedRun,
     PreparedTest,
     Weighting,
-    beyond,
-    in_percent,
+    notes_beyond,
     strains_of,
     unstable_words,
 )
@@ -132,22 +129,16 @@ def _fitted(
     return FittedTest(own, point.histories, nuisance, law, [law], reached, valid, None)
 
 
+UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus held there"
+
+
 def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[Note]:
     notes = []
     for comparison, history in zip(problem.comparisons, point.histories, strict=True):
         part = comparison.name if len(problem.comparisons) > 1 else ""
-        words = [
-            Note(
-                BEYOND_CARD,
-                f"{strain} strain {at} % is beyond {end} %, up to which the law is known: modulus "
-                "held there",
-                part,
-            )
-            for strain, *two in beyond(strains_of(history), law.strain_range)
-            for at, end in [in_percent(*two)]
-        ]
-        unstable = [Note(n.kind, str(n), part) for n in unstable_words(history.unstable)]
-        notes += [*words, *unstable]
+        held = notes_beyond(strains_of(history), law.strain_range, words=UP_TO)
+        own = [*held, *unstable_words(history.unstable)]
+        notes += [Note(n.kind, str(n), part) for n in own]
     return notes
 
 
@@ -401,8 +392,7 @@ def validate(
     projects = candidates(project, forms) if forms else {project.law.form: project}
     setups, parts = {}, {}
     if leave != TESTS:  # a mistake shows before the first fit
-        able = cast(Sequence[FittableTest], chosen)
-        setups = {form: prepare_fit(own, able) for form, own in projects.items()}
+        setups = {form: prepare_fit(own, chosen) for form, own in projects.items()}
         parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -456,7 +446,7 @@ def judge_cards(
     judged = []
     if not beside or any(kind_named(test.kind).fitted for test in every):
         chosen = project.chosen(tests, fitted=True)
-        setup = prepare_fit(project, cast(Sequence[FittableTest], chosen))
+        setup = prepare_fit(project, chosen)
         judged = [
             Judged(name, held_out(test, card.law, setup.make_solver))
             for name, card in cards.items()

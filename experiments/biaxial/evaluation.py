@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, rows
@@ -22,6 +21,9 @@ from ..kinds import UNMATCHED, UNSTABLE
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialTest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 #: Of a loading's range: how near both loads must be to those of the first row.
@@ -154,6 +156,8 @@ def in_words(options: Options) -> str:
 
 def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return constants E and A (direct form) in kN/m and squares of strain in %^2, by options."""
+    import pandas as pd
+
     named = [("chosen", found.chosen), *(("", one) for one in found.others)]
     ends = {"first cycle": found.first, "last cycle": found.last}
     named += [(which, one) for which, one in ends.items() if one is not None]
@@ -164,6 +168,8 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
     Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
     Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither."""
+    import pandas as pd
+
     evaluated = {
         (path.table.path.name, path.cycle.phase): (path, line)
         for path, line in zip(found.paths, found.lines, strict=True)
@@ -206,6 +212,8 @@ STANDARD = "en-17117"
 
 def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     """Return all tables by name."""
+    import pandas as pd
+
     table = []
     for path, line in zip(found.paths, found.lines, strict=True):
         row = {

@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...meshes.disk import Outline
@@ -360,6 +359,8 @@ def _same_points(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the rows of points that are in both frames: by their places, before or after.
     Rows are paired as they stand where most of the places are found in neither way."""
+    from scipy.spatial import cKDTree  # heavy: where it is used
+
     moved = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
     for taken_off in (0.0, 1.0):
         a, b = (f.points - taken_off * f.displacement[:, :2] for f in (last, other))

@@ -20,7 +20,7 @@ from ...readers.machine_tables import Channel, read_times
 from ...readers.pressure_log import check_pattern, number_in_name, values_in_file
 from ...readers.sections import LENGTH_UNITS
 from ...readers.tables import PRESSURE_UNITS, TIME_UNITS
-from ..kinds import Array, Place, channel_of, named_format
+from ..kinds import Array, Place, named_format
 from .registration import RegistrationOptions
 from .section import BubbleSection, LogSection, PointsSection, PressureSection, registration_options
 
@@ -40,7 +40,7 @@ def pressures_by_log(
     at = f"{AT}.log"
     file = _beside(section.file, place, folder, f"{at}.file")
     kind = named_format(place, f"{at}.format", "machine table", section.format)
-    pressure, time = channel_of(section.pressure), channel_of(section.time)
+    pressure, time = section.pressure.channel, section.time.channel
     log = pressure_log.read_pressure_log(
         file, pressure_log.LogOptions(pressure, time, kind, section.comment, section.decimal)
     )

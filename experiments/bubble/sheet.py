@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.spatial import QhullError, cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import Nuisance
@@ -196,6 +195,8 @@ def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
     found = np.full((len(nodes), 3), np.nan)
     if len(places) < 4:
         return found
+    from scipy.spatial import QhullError, cKDTree  # heavy: where it is used
+
     tree = cKDTree(places)
     apart = float(np.median(tree.query(places, k=2)[0][:, 1]))
     near = tree.query(nodes)[0] <= FAR * apart

@@ -14,10 +14,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind
@@ -34,6 +33,9 @@ from ...readers.histories import (
     read_history,
 )
 from ..kinds import READING
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 SLIP, DRIFT = NoteKind("extensometer slip", 3.0), NoteKind("extensometer drift", 2.0)
@@ -337,6 +339,8 @@ def left_out(one: EvaluatedHistory, knots: int = KNOTS) -> pd.DataFrame:
     Predicted are loads at the measured strains, so stiffness, and the permanent strain. A cycle
     that alone reaches its largest strain, and the first, have no others that could predict them.
     """
+    import pandas as pd
+
     table, largest = [], 0.0
     tops = [v.top for v in one.values]
     for v in one.values:
@@ -374,6 +378,8 @@ class Cycles:
     @property
     def table(self) -> pd.DataFrame:
         """Return a row a cycle; stiffness in N, or N/mm of width; ratios to the first cycle."""
+        import pandas as pd
+
         scale, unit = (1.0, "N") if self.width is None else (1.0 / self.width, "N_per_mm")
         table = []
         for one in self.histories:
@@ -403,6 +409,8 @@ class Cycles:
     @property
     def holds(self) -> pd.DataFrame:
         """Return a row a hold: strain (creep) and load (relaxation) before, after, per decade."""
+        import pandas as pd
+
         table = []
         for one in self.histories:
             h, zero = one.history, one.zero
@@ -429,6 +437,8 @@ class Cycles:
     @property
     def memory(self) -> pd.DataFrame:
         """Return a row a history: set, unloading, reloading, saturation, one sigma each, RMS."""
+        import pandas as pd
+
         table = []
         for one, fitted in zip(self.histories, self.fits, strict=True):
             row: dict[str, Any] = {"file": one.history.path.name, "rms_N": fitted.rms}
@@ -443,6 +453,8 @@ class Cycles:
     @cached_property
     def left_out(self) -> pd.DataFrame:
         """Return each cycle beside its prediction by a fit to the others, see `left_out`."""
+        import pandas as pd
+
         return pd.concat([left_out(one, self.knots) for one in self.histories], ignore_index=True)
 
     def fit_lines(self) -> list[str]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure, marks
@@ -20,6 +19,9 @@ from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
 from ..kinds import STRAINS, PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -296,6 +298,8 @@ MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetiti
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     """Return mean and scatter of the repetitions on a grid, of the tests that were measured."""
+    import pandas as pd
+
     parts = []
     for test in tests:
         if test.measured:
@@ -474,6 +478,8 @@ class CylinderOutcome:
 
     def curve(self, number: int) -> pd.DataFrame:
         """Return the run frame by frame; no rows where it failed."""
+        import pandas as pd
+
         run = self.bent.get(number)
         values = [np.empty(0)] * len(CURVE)
         if run is not None:

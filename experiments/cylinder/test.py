@@ -45,7 +45,6 @@ from ..kinds import (
     Place,
     Reach,
     Refined,
-    channel_of,
     joined,
     named_format,
 )
@@ -423,7 +422,7 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
     if folder is None:
         folder = place.path.parent / section.folder
     format = named_format(place, "measured.format", "machine table", section.format)
-    way, load = channel_of(section.deflection), channel_of(section.load)
+    way, load = section.deflection.channel, section.load.channel
     keys = ("repetition", "preload", "zero", "comment", "decimal")
     said = {key: getattr(section, key) for key in keys}
     curves: list[BendingCurve] = []

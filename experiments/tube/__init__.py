@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
@@ -107,6 +106,8 @@ def read(section: TubeSection, place: Place, name: str) -> TubeTest:
 
 
 def _columns(path: Path, radius: float) -> tuple[Array, Array]:
+    import pandas as pd
+
     try:
         table = pd.read_csv(path, comment="#", skipinitialspace=True)
     except (OSError, ValueError) as error:

@@ -19,7 +19,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...files import __version__
@@ -377,6 +376,8 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
 
 def _between(x: Array, values: Array, wanted: Array) -> Array:
     """Interpolate (n, ...) by cubics with slopes from neighbours: forces in balance stay so."""
+    from scipy.interpolate import CubicHermiteSpline  # heavy: where it is used
+
     slopes = np.gradient(values, x, axis=0)
     return np.asarray(CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
 

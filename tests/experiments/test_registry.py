@@ -13,19 +13,19 @@ from bubblefit.experiments.kinds import (
     BEYOND_CARD,
     BEYOND_LAW,
     DOUBTFUL,
+    HELD,
     THICKNESS,
     UNSTABLE,
+    WIDER,
     Doubt,
     Expected,
     Fabric,
+    Judgement,
     Place,
-    beyond_card,
-    beyond_range,
     by_strain,
-    judged,
     named_format,
+    notes_beyond,
     notes_of,
-    notes_of_record,
     other_thickness,
     strains_of,
     unstable_words,
@@ -51,7 +51,7 @@ THING = Kind()
     ("reached", "said"), [(0.1080004, ["10.80004", "10.8"]), (0.313, ["31.3", "10.8"])]
 )
 def test_a_strain_beyond_its_end_is_not_printed_as_the_end(reached, said):
-    (note,) = beyond_range(np.array([reached, 0.0, 0.0]), np.full(3, 0.108))
+    (note,) = notes_beyond(np.array([reached, 0.0, 0.0]), np.full(3, 0.108), BEYOND_LAW, WIDER)
     assert re.findall(r"([\d.]+) %", note) == said
 
 
@@ -154,7 +154,7 @@ def test_bounds_that_mean_the_warp_to_be_stiffer(low, stiffer):
 def test_what_stops_a_fit_and_what_is_noted():
     doubts = [Doubt("a", False, "perhaps"), Doubt("b", True, "sure"), Doubt("c", True, "known"),
               Doubt("d", True, "too")]  # fmt: skip
-    found = judged("t", doubts, ["c", "a"])
+    found = Judgement("t", tuple(doubts), ["c", "a"])
     assert [d.name for d in found.doubts] == ["b", "c", "d", "a"]
     assert [d.name for d in found.errors] == ["b", "d"]
     assert [(n.kind, str(n), n.of) for n in found.notes] == [
@@ -162,18 +162,15 @@ def test_what_stops_a_fit_and_what_is_noted():
         for text, name in (("known", "c"), ("perhaps", "a"))
     ]
     complaint_with(["sure [b]; too [d].", "--trust"], found.demand, Path("p.toml"))
-    judged("t", doubts, "abcd").demand(Path("p.toml"))
+    Judgement("t", tuple(doubts), "abcd").demand(Path("p.toml"))
 
 
 def test_the_words_of_notes():
     ends, beyond = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.21, 0.2])
-    assert beyond_card(ends * (1 + 9e-7), CARD) == beyond_range(ends * (1 + 9e-7), ends) == []
-    assert len(beyond_card(ends * (1 + 1.1e-6), CARD)) == 3
-    assert len(beyond_range(ends * (1 + 1.1e-6), ends)) == 3
-    for found, kind in (
-        (beyond_card(beyond, CARD), BEYOND_CARD),
-        (beyond_range(beyond, ends), BEYOND_LAW),
-    ):
+    assert notes_beyond(ends * (1 + 9e-7), ends) == []
+    assert len(notes_beyond(ends * (1 + 1.1e-6), ends)) == 3
+    for words, kind in ((HELD, BEYOND_CARD), (WIDER, BEYOND_LAW)):
+        found = notes_beyond(beyond, ends, kind, words)
         assert [note.kind for note in found] == [kind]
         assert "fill" in found[0] and "21 %" in found[0] and "20 %" in found[0]
     assert by_strain([1, 2, 3]) == {"warp": 1.0, "fill": 2.0, "shear": 3.0}
@@ -181,11 +178,11 @@ def test_the_words_of_notes():
     (note,) = other_thickness(CARD, 0.405)
     assert note.kind is THICKNESS and "50 % softer" in note
     record = SimpleNamespace(strain=beyond, remarks=("made up",), unstable=("132 kPa",))
-    assert [n.kind for n in notes_of_record(record, CARD)] == [
+    assert [n.kind for n in notes_of(record, CARD)] == [
         SOLVER, BEYOND_CARD, UNSTABLE
     ]  # fmt: skip
     record.strain = None
-    assert [n.kind for n in notes_of_record(record, CARD)] == [SOLVER, UNSTABLE]
+    assert [n.kind for n in notes_of(record, CARD)] == [SOLVER, UNSTABLE]
     assert unstable_words(None) == unstable_words(()) == []
     (note,) = unstable_words(("132 kPa",))
     assert note.kind is UNSTABLE and "132 kPa" in note
