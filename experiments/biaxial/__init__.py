@@ -4,31 +4,23 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from ...materials.law import HypoelasticLaw
-from ..kinds import Kind, MakeSolver, Predicted, Studied
+from ..kinds import Kind
+from ..measured import MeasuredKind
 from .prepared import PreparedBiaxial, candidates
-from .test import BiaxialSection, BiaxialTest, read
+from .test import BiaxialSection, read
 
 
-class Biaxial:
+class Biaxial(MeasuredKind):
     """A cruciform loaded along warp and fill in several ratios."""
 
     name: str = "biaxial"
     title: str = "a cruciform loaded along warp and fill in several ratios"
     section: type[BaseModel] = BiaxialSection
     folder_key: str = "data.folder"
-    fitted: bool = True
-    predicted: Predicted | None = None
     doubts: tuple[str, ...] = ("strain-unit", "load-unit", "ratio", "modulus", "swapped")
+    prepared = PreparedBiaxial
     read = staticmethod(read)
     candidates = staticmethod(candidates)
-    studied: Studied | None = None
-
-    def prepare(
-        self, test: BiaxialTest, law: HypoelasticLaw, make_solver: MakeSolver
-    ) -> PreparedBiaxial:
-        """Return the test, which was read with its data."""
-        return PreparedBiaxial(test)
 
 
 KIND: Kind = Biaxial()

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ...errors import InputError, SolverFailure
-from ...inference.comparison import Comparison, NoiseIs
+from ...errors import SolverFailure
+from ...inference.comparison import Comparison
 from ...materials.designers import RATIOS, shares
-from ...materials.law import HypoelasticLaw
 from ...materials.responses import biaxial_response, largest_load
 from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Doubt, Expected, FittedTest, MakeSolver, Masks, Planning, Weighting
+from ..measured import PERCENT, USUAL_NOISE, StrainObjective, StrainsPrepared
 from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
 from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
 
 Array = NDArray[np.float64]
-#: Of one measured strain: what an extensometer or a camera on a cruciform is good for.
-EXTENSOMETER = 1e-4
-PERCENT = 100.0
 #: Strains at the end of a path: no coated fabric ends below or above.
 LEAST_END, MOST_END = 5e-4, 0.5
 #: kN/m: a cruciform of a coated fabric is loaded by more, and by less.
@@ -45,78 +41,30 @@ LOADS, INDEPENDENT = 20, 5
 PRESTRESS = 0.05
 
 
-class StrainObjective:
-    """Residuals (model - measured) / (scale sqrt(n)) of n strains along warp, then fill.
-    Strains count from the first load of the path, (n, 2). scale : strain that counts as one."""
+class PathObjective(StrainObjective):
+    """Residuals of the strains along warp, then fill, of one path, (n, 2) since its first load."""
 
-    unit = "%"
-
-    def __init__(
-        self, load: ArrayLike, strain: ArrayLike, scale: float, weight: float, noise: float | None
-    ) -> None:
-        self.load, self.strain = np.asarray(load, float), np.asarray(strain, float)
-        if len(self.strain) < 2:
-            raise InputError(None, "path", "expected two loads at least")
-        self.least_noise = PERCENT * (EXTENSOMETER if noise is None else noise)
-        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
-        # The first row is the zero of the others and matches whatever the law is.
-        self.sizes = (len(self.strain) - 1,) * 2
-        self._unit = scale * np.sqrt(len(self.strain) - 1) / weight
-
-    @property
-    def scale(self) -> Array:
-        """Return % of strain in one unit of each residual, (2 n,)."""
-        return np.full(sum(self.sizes), PERCENT * self._unit)
+    # The first row is the zero of the others and matches whatever the law is.
+    first = 1
 
     @property
     def places(self) -> tuple[Array, ...]:
         """Return the load (n, 1) N/mm of each block's values: neighbours err as one."""
         return (self.load[1:].max(axis=1, keepdims=True),) * 2
 
-    @property
-    def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
-        return self.load, self.strain
-
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, 2) since the beginning of the path."""
         own = elongations(history.displacement)
         return np.asarray(own - own[0])
 
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return both blocks, (2 n,)."""
-        return self._blocks(self.modelled(history) - self.strain)
-
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (2 n, parameters) from the slope of the displacements."""
         own = elongations(slope)
-        return self._blocks(own - own[0])
-
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (2 n, 0): there are no nuisance unknowns."""
-        if names:
-            raise InputError(None, "nuisance", f"a biaxial path knows no {', '.join(names)}")
-        return np.empty((sum(self.sizes), 0))
+        return self.in_blocks(own - own[0])
 
     def of_points(self, values: Array) -> Array:
         """Return values for each residual from values for each load of the path."""
         return np.tile(values[1:], 2)
-
-    def shifted(self, here: History, there: History) -> StrainObjective:
-        """Return the objective of a model that shows `here` where this one shows `there`."""
-        other = copy.copy(self)
-        other.strain = self.strain - (self.modelled(here) - self.modelled(there))
-        return other
-
-    def rms(self, history: History) -> Array:
-        """Return the RMS errors (2,) of the strains along warp and fill, %."""
-        off = (self.modelled(history) - self.strain)[1:]
-        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
-
-    def _blocks(self, values: Array) -> Array:
-        """Return rows (n, 2, ...) without the first as one column of values, the warp's first."""
-        rows = np.swapaxes(values[1:], 0, 1)
-        return np.asarray(rows.reshape(-1, *values.shape[2:]) / self._unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +72,7 @@ class FittedPath:
     """One ratio of a finished fit: measured data and the best law's response."""
 
     path: BiaxialPath
-    objective: StrainObjective
+    objective: PathObjective
     history: History
 
     @property
@@ -135,17 +83,11 @@ class FittedPath:
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedBiaxial:
+class PreparedBiaxial(StrainsPrepared):
     """A biaxial test with its data."""
 
     test: BiaxialTest
     objective_is = "sum of the ratios' RMS errors of strain, warp and fill, over their largest"
-    known: HypoelasticLaw | None = None
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return nothing: a ratio is no specimen of another."""
-        return {}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
@@ -179,16 +121,10 @@ class PreparedBiaxial:
             largest = float(np.abs(path.since).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
-            objective = StrainObjective(path.load, path.since, largest, share, test.noise)
+            objective = PathObjective(path.load, path.since, largest, share, test.noise)
             own = self.part(path.ratio), models[path.ratio], make_solver(), objective
             found.append(Comparison(*own, contracts=True))
         return tuple(found)
-
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the same comparisons: there is no mesh to refine."""
-        return self.comparisons(make_solver, weighting)
 
     def fitted_paths(self, fitted: FittedTest) -> tuple[FittedPath, ...]:
         """Return the ratios with the best law's response."""
@@ -196,7 +132,7 @@ class PreparedBiaxial:
         found = []
         for path in self.test.data.paths:
             comparison, history = known[self.part(path.ratio)]
-            assert isinstance(comparison.objective, StrainObjective)
+            assert isinstance(comparison.objective, PathObjective)
             found.append(FittedPath(path, comparison.objective, history))
         return tuple(found)
 
@@ -280,7 +216,7 @@ def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
         return planning.noise
     known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.data.paths]
     if not known:
-        return kinds.Precision(PERCENT * EXTENSOMETER, 1.0, INDEPENDENT).at(LOADS - 1)
+        return kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(LOADS - 1)
     return max(one.at(LOADS - 1) for one in known)
 
 

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...materials.law import HypoelasticLaw
-from ..kinds import MakeSolver, Studied
+from ..kinds import Studied
+from ..measured import MeasuredKind
 from .prepared import PreparedStrips, candidates
-from .test import StripsSection, StripsTest, read
+from .test import StripsSection, read
 
 
-class Strips:
+class Strips(MeasuredKind):
     """Cut strips pulled along warp, fill and across the yarns."""
 
     name = "strips"
     title = "cut strips pulled along warp, fill and 45 degrees"
     section = StripsSection
     folder_key = "data.folder"
-    fitted = True
-    predicted = None
+    prepared = PreparedStrips
     doubts = (
         "elongation-unit", "load-unit", "preload", "after-failure", "swapped", "grip-travel",
         "gauge-still",
@@ -32,12 +31,6 @@ class Strips:
         response="load",
         curve=lambda model, history: (np.array(model.elongations), history.load),
     )
-
-    def prepare(
-        self, test: StripsTest, law: HypoelasticLaw, make_solver: MakeSolver
-    ) -> PreparedStrips:
-        """Return the test, which was read with its data."""
-        return PreparedStrips(test)
 
 
 KIND = Strips()

@@ -6,7 +6,6 @@ wall as nothing but G12 resists, so that a tube tells G12 where strips and bubbl
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,21 +18,20 @@ from pydantic import BaseModel, Field
 
 from ...errors import InputError
 from ...files import is_file
-from ...inference.comparison import Comparison, NoiseIs
+from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
 from ...readers.sections import Length, Name, Positive, Section, beside
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Predicted, Reach, Studied, Weighting
+from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
+from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, StrainObjective, StrainsPrepared
 
 Array = NDArray[np.float64]
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
 STRAINS = {"axial_percent": 0.01, "hoop_percent": 0.01, "twist_deg_per_m": np.pi / 180e3}
-#: Of one measured strain, unless the project says its own: a camera's, or an encoder's.
-NOISE, PERCENT = 1e-4, 100.0
 PART = "tube"
 #: Of a candidate: radius in mm, hoop strain over the law's range, loads, and values of a strain
 #: that are taken to be independent.
@@ -130,34 +128,16 @@ def _columns(path: Path, radius: float) -> tuple[Array, Array]:
     return np.stack(loads, axis=1), np.stack(strain, axis=1)
 
 
-class TubeObjective:
-    """Residuals (model - measured) / (largest sqrt(n)) of each measured strain.
+class TubeObjective(StrainObjective):
+    """Residuals of each measured strain over its largest.
 
     The zero of a strain is not known: strains are compared about their means.
     """
 
-    unit = "%"
-
     def __init__(self, test: TubeTest, weight: float) -> None:
         self.model = next(iter(test.models().values()))
-        self.strain = test.strain
         self.read = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
-        self.least_noise = PERCENT * (NOISE if test.noise is None else test.noise)
-        self.noise_is: NoiseIs = "assumed" if test.noise is None else "given"
-        count = len(self.strain)
-        self.sizes = (count,) * len(self.read)
-        largest = np.abs(self.measured).max(axis=0)
-        self._unit = np.maximum(largest, NOISE) * np.sqrt(count) / max(weight, 1e-300)
-
-    @property
-    def measured(self) -> Array:
-        """Return what was measured (n, blocks) about its mean."""
-        return _centred(self.strain[:, self.read])
-
-    @property
-    def scale(self) -> Array:
-        """Return % of strain in one unit of each residual."""
-        return PERCENT * np.repeat(self._unit, self.sizes[0])
+        super().__init__(self.model.loads, test.strain[:, self.read], None, weight, test.noise)
 
     @property
     def places(self) -> tuple[Array, ...]:
@@ -165,44 +145,18 @@ class TubeObjective:
         return (np.arange(1.0, 1 + self.sizes[0])[:, None],) * len(self.sizes)
 
     @property
-    def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
-        return self.model.loads, self.strain[:, self.read]
+    def measured(self) -> Array:
+        """Return what was measured (n, blocks) about its mean."""
+        return _centred(self.strain)
 
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, blocks) about their means."""
         return _centred(self.model.strains(history.displacement)[:, self.read])
 
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return all blocks one after the other."""
-        return self._blocks(self.modelled(history) - self.measured)
-
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from the slope of the displacements."""
         own = self.model.strain_slopes(history.displacement, slope)[:, self.read]
-        return self._blocks(_centred(own))
-
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (m, 0): there are no nuisance unknowns."""
-        if names:
-            raise InputError(None, "nuisance", f"a tube knows no {', '.join(names)}")
-        return np.empty((sum(self.sizes), 0))
-
-    def shifted(self, here: History, there: History) -> TubeObjective:
-        """Return the objective of a model that shows `here` where this one shows `there`."""
-        other = copy.copy(self)
-        other.strain = self.strain.copy()
-        other.strain[:, self.read] -= self.modelled(here) - self.modelled(there)
-        return other
-
-    def rms(self, history: History) -> Array:
-        """Return the RMS error of each block, %."""
-        off = self.modelled(history) - self.measured
-        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
-
-    def _blocks(self, values: Array) -> Array:
-        rows = values / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
-        return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))
+        return self.in_blocks(_centred(own))
 
 
 def _centred(values: Array) -> Array:
@@ -210,17 +164,11 @@ def _centred(values: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedTube:
+class PreparedTube(StrainsPrepared):
     """A tube with its data."""
 
     test: TubeTest
     objective_is = "sum of the RMS errors of the measured strains over their largest"
-    known: HypoelasticLaw | None = None
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return nothing: one tube."""
-        return {}
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the test, which is matched whole."""
@@ -235,12 +183,6 @@ class PreparedTube:
         weight = weighting.weight / count if weighting.relative else 1.0
         objective = TubeObjective(test, weight)
         return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
-
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the same comparison: there is no mesh to refine."""
-        return self.comparisons(make_solver, weighting)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the file."""
@@ -266,7 +208,7 @@ def _twisted(own: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
     loads = np.column_stack([np.full(STEPS, pressure), np.zeros(STEPS), turns])
     model = TubeModel(loads, radius, thick)
     strain = model.strains(planning.make_solver("membrane").run(model, law).displacement)
-    noise = planning.noise or kinds.Precision(PERCENT * NOISE, 1.0, INDEPENDENT).at(STEPS)
+    noise = planning.noise or kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(STEPS)
     test = TubeTest(
         name="torsion of a tube", place=planning.place, weight=1.0, radius=radius, loads=loads,
         strain=strain, noise=noise / PERCENT,
@@ -280,22 +222,16 @@ def _integral(law: HypoelasticLaw, name: str, end: ArrayLike) -> float:
     return float(np.trapezoid(law.modulus(name, strain), strain))
 
 
-class Tube:
+class Tube(MeasuredKind):
     """An inflated tube in tension and torsion."""
 
     name: str = "tube"
     title: str = "an inflated tube in tension and torsion"
     section: type[BaseModel] = TubeSection
     folder_key: str = "folder"
-    fitted: bool = True
-    predicted: Predicted | None = None
-    studied: Studied | None = None
+    prepared = PreparedTube
     read = staticmethod(read)
     candidates = staticmethod(candidates)
-
-    def prepare(self, test: TubeTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTube:
-        """Return the test, which was read with its data."""
-        return PreparedTube(test)
 
 
 KIND: Kind = Tube()

@@ -1,0 +1,117 @@
+"""Kinds whose tests are read with their data, and the objective of measured columns of strain."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..inference.comparison import Comparison, NoiseIs
+from ..materials.law import HypoelasticLaw
+from ..solvers.base import History
+from .kinds import Array, MakeSolver, Predicted, PreparedTest, Studied, Weighting
+
+PERCENT = 100.0
+#: Of one measured strain: what an extensometer, a camera or an encoder is good for.
+USUAL_NOISE = 1e-4
+
+
+class MeasuredKind:
+    """A kind of test that is fitted, and read with its data. prepared : makes one of a test."""
+
+    fitted: bool = True
+    predicted: Predicted | None = None
+    studied: Studied | None = None
+    prepared: type[Any]
+
+    def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
+        """Return the test, which was read with its data."""
+        prepared: PreparedTest = self.prepared(test)
+        return prepared
+
+
+class StrainsPrepared:
+    """What prepared tests share that have one strain everywhere: no mesh, and no specimens."""
+
+    known: HypoelasticLaw | None = None
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        """Return nothing: no part is a specimen of another."""
+        return {}
+
+    def finer(
+        self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        """Return the same comparisons: there is no mesh to refine."""
+        same: tuple[Comparison, ...] = self.comparisons(make_solver, weighting)
+        return same
+
+
+class StrainObjective:
+    """Residuals (model - measured) / (scale sqrt(n)) of columns of strain, one block each.
+    first : row from which rows are matched."""
+
+    unit = "%"
+    first = 0
+
+    def __init__(
+        self, load: Array, strain: Array, scale: float | None, weight: float, noise: float | None
+    ) -> None:
+        self.load, self.strain = load, strain
+        self.least_noise = PERCENT * (USUAL_NOISE if noise is None else noise)
+        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
+        count, blocks = len(strain) - self.first, strain.shape[1]
+        self.sizes = (count,) * blocks
+        scales = np.full(blocks, scale)
+        if scale is None:
+            scales = np.maximum(np.abs(self.measured).max(axis=0), USUAL_NOISE)
+        self._unit = scales * np.sqrt(count) / max(weight, 1e-300)
+
+    @property
+    def measured(self) -> Array:
+        """Return the measured strains (rows, blocks) from their zero on."""
+        return self.strain
+
+    @property
+    def scale(self) -> Array:
+        """Return % of strain in one unit of each residual."""
+        return PERCENT * np.repeat(self._unit, self.sizes[0])
+
+    @property
+    def data(self) -> tuple[Array, ...]:
+        """Return everything measured that the residual depends on."""
+        return self.load, self.strain
+
+    def modelled(self, history: History) -> Array:
+        """Return the model's strains (rows, blocks) from their zero on."""
+        raise NotImplementedError
+
+    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
+        """Return all blocks one after the other."""
+        return self.in_blocks(self.modelled(history) - self.measured)
+
+    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
+        """Return (m, 0): there are no nuisance unknowns."""
+        if names:
+            raise InputError(None, "nuisance", f"these strains know no {', '.join(names)}")
+        return np.empty((sum(self.sizes), 0))
+
+    def shifted(self, here: History, there: History) -> StrainObjective:
+        """Return the objective of a model that shows `here` where this one shows `there`."""
+        other = copy.copy(self)
+        other.strain = self.strain - (self.modelled(here) - self.modelled(there))
+        return other
+
+    def rms(self, history: History) -> Array:
+        """Return the RMS error of each block, %."""
+        off = (self.modelled(history) - self.measured)[self.first :]
+        return np.asarray(PERCENT * np.sqrt(np.mean(off**2, axis=0)))
+
+    def in_blocks(self, values: Array) -> Array:
+        """Return values (rows, blocks, ...) block after block, in units of the residual."""
+        rows = values[self.first :] / self._unit.reshape(1, -1, *(1,) * (values.ndim - 2))
+        return np.asarray(np.swapaxes(rows, 0, 1).reshape(-1, *values.shape[2:]))
