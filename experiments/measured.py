@@ -94,6 +94,10 @@ class StrainObjective:
         """Return all blocks one after the other."""
         return self.in_blocks(self.modelled(history) - self.measured)
 
+    def jacobian(self, history: History, slope: Array) -> Array:
+        """Return (m, parameters) from the slope of the displacements."""
+        raise NotImplementedError
+
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """Return (m, 0): there are no nuisance unknowns."""
         if names:
