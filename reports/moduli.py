@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,43 +32,32 @@ SAMPLES = "percentiles of the samples"
 
 def moduli_charts(
     strains: ArrayLike, moduli: ArrayLike, known: ArrayLike | None = None,
-    band: ArrayLike | None = None, caption: str = "", names: Sequence[str] | None = None,
+    band: ArrayLike | None = None, caption: str = "",
 ) -> Charts:  # fmt: skip
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
-    strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached;
-    (fits, 3, k) where every law has a range of its own. moduli : (fits, 3, k) MPa, best fit first,
-    in the same order. known : (3, k) MPa; a second row of charts then shows the deviation from it
-    in percent. band : (2, 3, k) MPa, ends of the band of the first fit; not drawn where it is not
-    finite. names : of the fits where they are different laws, and not one's best and the next.
-    Raises ValueError: not one name a fit, or strains of each law's own together with a known
-    solution."""
-    fits, given = np.asarray(moduli, dtype=float), np.asarray(strains, dtype=float)
-    if names is not None and len(names) != len(fits):
-        raise ValueError(f"moduli_charts: {len(names)} names for {len(fits)} fits")
-    if known is not None and given.ndim == 3:
-        raise ValueError("moduli_charts: beside a known solution all fits need the same strains")
-    given = PERCENT * given
-    x, truth = np.broadcast_to(given, fits.shape), None if known is None else np.asarray(known)
+    strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached.
+    moduli : (fits, 3, k) MPa, best fit first, in the same order. known : (3, k) MPa; a second row
+    of charts then shows the deviation from it in percent. band : (2, 3, k) MPa, ends of the band
+    of the first fit; not drawn where it is not finite."""
+    fits, x = np.asarray(moduli, dtype=float), PERCENT * np.asarray(strains, dtype=float)
+    truth = None if known is None else np.asarray(known)
     ends = None if band is None else np.asarray(band, dtype=float)
     charts = []
     for m, (title, label) in enumerate(PANELS):
         own = None if ends is None else (ends[0, m], ends[1, m])
-        series = [
-            line(x=x[i, m], y=fits[i, m], **_look(i, len(fits), names)) for i in range(1, len(fits))
-        ]
         dot = ends is not None and known is None
-        best = line(x=x[0, m], y=fits[0, m], band=own, ends=dot, **_look(0, len(fits), names))
-        series.insert(0, best)
+        series = [line("best", x[m], fits[0, m], own, ends=dot)]
+        series += [line(x=x[m], y=curve, **_next(fits)) for curve in fits[1:, m]]
         drawn = [fits[:, m].max()]
         if truth is not None:
-            series.append(line("known", given[m], truth[m], colour=1, dashes=1))
+            series.append(line("known", x[m], truth[m], colour=1, dashes=1))
             drawn.append(truth[m].max())
         first, *_, last = fits[0, m]
         top, cut = _top(1.12 * float(max(drawn)), () if own is None else own[1])
-        alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[0, m, -1]:.3g} %"
+        alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
-        charts += [_deviation(m, given[m], fits[:, m], truth[m], names) for m in range(3)]
+        charts += [_deviation(m, x[m], fits[:, m], truth[m]) for m in range(3)]
     return Charts("moduli", charts, caption, columns=3)
 
 
@@ -81,48 +70,33 @@ def _top(curves: float, upper: ArrayLike) -> tuple[float, str]:
     return MOST * curves, f": its band goes to {high:.3g} MPa"
 
 
-def _look(rank: int, count: int, names: Sequence[str] | None) -> dict[str, Any]:
-    """Return name and look of a fit: by its name, or the best before all others."""
-    if names is not None:
-        return {"name": names[rank], "colour": rank, "dashes": rank // 8}
-    if rank == 0:
-        return {"name": "best", "colour": 0}
-    return {"name": f"next {count - 1}", "colour": 6, "faint": True}
+def _next(fits: Array) -> dict[str, Any]:
+    """Return name and look of every fit after the best."""
+    return {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
 
 
-def _deviation(
-    m: int, strain: Array, fits: Array, truth: Array, names: Sequence[str] | None
-) -> Chart:
+def _deviation(m: int, strain: Array, fits: Array, truth: Array) -> Chart:
     percent = np.maximum(100 * np.abs(fits / truth - 1), SAME)
     worst = float(percent[0].max())
     # Dips where curves cross say nothing.
     least = float(percent.max()) / 10**DECADES
-    series = [
-        line(**_look(i, len(fits), names), x=strain, y=np.maximum(own, least))
-        for i, own in enumerate(percent)
-    ]
-    label, first = "deviation from known, %", names[0] if names else "best"
-    said = f"{first}: at most {worst:.2g} %"
+    first, *others = np.maximum(percent, least)
+    series = [line("best", strain, first), *(line(x=strain, y=y, **_next(fits)) for y in others)]
+    label, said = "deviation from known, %", f"best: at most {worst:.2g} %"
     return Chart(f"{PANELS[m][0]}: {said}", PANELS[m][1], label, series, said, log_y=True)
 
 
-def moduli_together(
-    strains: ArrayLike, moduli: ArrayLike, sigma: ArrayLike | None = None, title: str = ""
-) -> Charts:
+def moduli_together(strains: ArrayLike, moduli: ArrayLike) -> Charts:
     """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
-    strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. sigma :
-    (3, k) MPa, one standard deviation, as bands; left out where it is not finite. The axis is
-    logarithmic where the moduli are positive and span more than a decade."""
+    strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. The axis
+    is logarithmic where the moduli are positive and span more than a decade."""
     x, curves = PERCENT * np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
-    series = []
-    for m, name in enumerate(("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")):
-        s = None if sigma is None else np.asarray(sigma, dtype=float)[m]
-        band = None if s is None else (curves[m] - s, curves[m] + s)
-        series.append(line(name, x[m], curves[m], band, colour=m, ends=True))
+    names = ("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")
+    series = [line(name, x[m], curves[m], colour=m, ends=True) for m, name in enumerate(names)]
     log, high = spans_a_decade(curves), float(curves.max())
     alt = f"moduli from {float(curves.min()):.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
-    chart = Chart(title, "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
+    chart = Chart("", "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
     return Charts("moduli together", [chart], "")
 
 

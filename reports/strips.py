@@ -73,8 +73,6 @@ class BiaxialPanel:
 
 def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
     """Return loads over elongation, and differences from the polynomial, else the points."""
-    if not curves:
-        raise ValueError("load_charts: no strips to draw")
     # The same model has the same colour in every chart.
     names = list(dict.fromkeys(model for c in curves for model, _, _ in c.models))
     compared = [c for c in curves if c.models and (c.polynomial or c.points)]
@@ -159,8 +157,6 @@ def specimen_charts(
 
 def order_charts(directions: Sequence[OrderErrors]) -> Charts:
     """Return RMSE and leave-one-out error over the order; a ring is the chosen one."""
-    if not directions:
-        raise ValueError("order_charts: no directions to draw")
     charts = []
     for row in directions:
         errors = [np.asarray(values, dtype=float) for values in (row.rmse, row.left_out)]
@@ -181,18 +177,15 @@ def order_charts(directions: Sequence[OrderErrors]) -> Charts:
 
 def strip_charts(
     points: ArrayLike, quads: ArrayLike, displacement: ArrayLike, shear: ArrayLike,
-    gauge: ArrayLike, title: str = "", grips: bool = True,
+    gauge: ArrayLike,
 ) -> Charts:  # fmt: skip
     """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
     points : (n, 3) or (n, 2) mm, at rest. quads : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
     shear : (m,) gamma12 of each quad, signed or its magnitude. gauge : (2,) nodes of the virtual
-    strain gauge. grips : whether the ends are held in grips, to be drawn. Raises ValueError: not
-    one shear strain a quad."""
+    strain gauge."""
     rest = np.asarray(points, dtype=float)[:, :2]
     now = rest + np.asarray(displacement, dtype=float)[:, :2]
     cells, gamma = np.asarray(quads, dtype=int), np.asarray(shear, dtype=float)
-    if gamma.shape != (len(cells),):
-        raise ValueError(f"strip_charts: {gamma.size} shear strains for {len(cells)} quads")
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     outline, ends = unique[count == 1], np.asarray(gauge, dtype=int)
@@ -200,14 +193,14 @@ def strip_charts(
         faces("", now[cells], gamma),
         line("at rest", *_segments(rest[outline]), colour=7, dashes=1),
         line("", *_segments(now[outline]), colour=3),
-        *(_grips(rest, now) if grips else ()),
+        *_grips(rest, now),
     ]
     for place, colour, words in ((rest, 7, "gauge at rest"), (now, 3, "gauge")):
         long = float(np.linalg.norm(np.diff(place[ends], axis=0)))
         series.append(dots(f"{words}, {long:.2f} mm", *place[ends].T, colour=colour, hollow=True))
     alt = f"the strip, its shear strain from {gamma.min():.3g} to {gamma.max():.3g}"
     chart = Chart(
-        title, "x, mm", "y, mm", series, alt, equal=True, scale="shear strain γ12",
+        "", "x, mm", "y, mm", series, alt, equal=True, scale="shear strain γ12",
         shades=shades_of(gamma),
     )  # fmt: skip
     return Charts("strip", [chart], "")
@@ -254,8 +247,6 @@ def cycle_charts(
 
 def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
     """Return the strains of both yarns over the larger load, a chart a ratio."""
-    if not panels:
-        raise ValueError("biaxial_charts: no ratio to draw")
     charts = []
     for panel in panels:
         series: list[Series] = []

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .charts import DECADE, TITLES, Chart, Charts, Series, dots, line, spans_a_decade
+from .charts import TITLES, Chart, Charts, Series, dots, line, spans_a_decade
 
 #: What a perfect fit (zero) is drawn as on a logarithmic axis.
 PERFECT = 1e-16
@@ -68,11 +68,8 @@ class ProfilePanel:
     band: tuple[float, float]
 
 
-def optima_chart(
-    objectives: ArrayLike, caption: str, label: str = "objective",
-    references: Mapping[str, float] | None = None,
-) -> Charts:  # fmt: skip
-    """Return the optima (starts,), worst to best, NaN counted, and published ones as lines."""
+def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
+    """Return the optima (starts,), worst to best; starts without one (NaN) are counted."""
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
     ended = np.maximum(np.sort(values[np.isfinite(values)])[::-1], PERFECT)
     failed = len(values) - len(ended)
@@ -80,21 +77,14 @@ def optima_chart(
     said += f", {failed} without a result" if failed else ""
     if len(ended):
         said += f": best {ended[-1]:.3g}, median {np.median(ended):.3g}, worst {ended[0]:.3g}"
-    series = [dots("optima" if references else "", 1 + np.arange(len(ended)), ended)]
-    across = [1, max(len(values), 2)]
-    for name, value in (references or {}).items():
-        series.append(line(f"published {name} {value:g}", across, [value] * 2, colour=1, dashes=1))
-    levels = [*ended, *(references or {}).values()]
-    log = bool(levels) and max(levels) > DECADE * min(levels)
-    axes = "start, from worst to best", label
+    series, log = [dots("", 1 + np.arange(len(ended)), ended)], spans_a_decade(ended)
+    axes = "start, from worst to best", "objective"
     chart = Chart("", *axes, series, said, log_y=log, from_zero=not log)
     return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")
 
 
 def convergence_charts(models: Sequence[ConvergencePanel], what: str, caption: str) -> Charts:
     """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
-    if not models:
-        raise ValueError("convergence_charts: no models to draw")
     charts = [_changes(model, SIZES[what]) for model in models]
     cost = [
         line(TITLES.get(m.name, m.name), m.work, m.seconds, colour=rank, marks=True)
@@ -134,8 +124,6 @@ def nu12_charts(
     caption: str,
 ) -> Charts:  # fmt: skip
     """Return responses over that at the base nu12, a chart a model: nu12 and ratio (n,)."""
-    if not models:
-        raise ValueError("nu12_charts: no models to draw")
     charts, label = [], f"{response} / that at nu12 = {base:g}"
     for name, lines in models.items():
         many = len(lines) > NAMED
@@ -155,8 +143,6 @@ def nu12_charts(
 
 def profile_charts(panels: Sequence[ProfilePanel], threshold: float, caption: str) -> Charts:
     """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends."""
-    if not panels:
-        raise ValueError("profile_charts: no profiles to draw")
     return Charts("profiles", [_profile(panel, threshold) for panel in panels], caption)
 
 
@@ -224,8 +210,6 @@ def held_out_charts(
 
 def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption: str) -> Charts:
     """Return errors of forms: of the fit, cross-validated, of every fold; noise, a line."""
-    if not rows:
-        raise ValueError("law_charts: no laws to draw")
     names = [_form(row) for row in rows]
     errors = {
         "error of the fit": np.array([row.fitted for row in rows]),
@@ -256,8 +240,6 @@ def _form(row: LawRow) -> str:
 
 def plan_charts(tests: Sequence[str], sigma: Mapping[str, Sequence[float]], caption: str) -> Charts:
     """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
-    if not tests:
-        raise ValueError("plan_charts: no tests to draw")
     every = {name: np.asarray(own, dtype=float) for name, own in sigma.items()}
     known = {name: np.where(own < MOST, own, np.nan) for name, own in every.items()}
     aside = _aside(len(sigma))

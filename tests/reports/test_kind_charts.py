@@ -274,12 +274,12 @@ def test_loads_and_what_the_models_miss():
     assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
 
 
-def draw_strip(shear, grips=True):
+def draw_strip(shear):
     mesh = strip_mesh(4.0, 8.0, 4, 8, 3.0)
     u = np.zeros_like(mesh.points)
     u[:, 1] = 0.5 * (mesh.points[:, 1] - 8.0)
     gauge = mesh.node_sets["gauge"]
-    return strips.strip_charts(mesh.points, mesh.quads, u, shear, gauge, "bias", grips)
+    return strips.strip_charts(mesh.points, mesh.quads, u, shear, gauge)
 
 
 def test_deformed_strip():
@@ -299,12 +299,12 @@ def test_deformed_strip():
     assert (upper[1].min(), upper[1].max()) == pytest.approx((8.0, 8.0 + 0.06 * 8.0))
     assert (lower[1].min(), lower[1].max()) == pytest.approx((-4.0 - 0.06 * 8.0, -4.0))
     assert np.ptp(upper[0]) == pytest.approx(max(body.x) - min(body.x))
-    assert chart.equal and chart.scale == "shear strain γ12" and chart.title == "bias"
+    assert chart.equal and chart.scale == "shear strain γ12"
     for ends, limits in (
         ((-0.2, 0.6), (-0.6, 0.6)), ((-0.001, 0.6), (-0.001, 0.6)), ((0.0, 0.0), (0.0, 1.0))
     ):  # fmt: skip
-        (chart,) = draw_strip(np.linspace(*ends, 32), grips=False).charts
-        assert scale_ends(chart) == pytest.approx(limits) and "grips" not in named(chart)
+        (chart,) = draw_strip(np.linspace(*ends, 32)).charts
+        assert scale_ends(chart) == pytest.approx(limits)
 
 
 def test_orders():
@@ -332,14 +332,3 @@ def test_orders():
         for name, factor in (("measured", 1), ("m", 2)):
             drawn = lines(chart, f"{yarn}, {name}")[0]
             np.testing.assert_array_equal(drawn, [load, factor * strain[:, k]])
-
-
-@pytest.mark.parametrize(
-    ("draw", "words"),
-    [(lambda: load_charts("l", []), "no strips"), (lambda: order_charts([]), "no directions"),
-     (lambda: strips.biaxial_charts("b", []), "no ratio"),
-     (lambda: draw_strip(np.zeros(3)), "3 shear strains for 32 quads")],
-)  # fmt: skip
-def test_nothing_to_draw(draw, words):
-    with pytest.raises(ValueError, match=words):
-        draw()

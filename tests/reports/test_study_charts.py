@@ -9,9 +9,6 @@ from bubblefit.reports.studies import LawRow, ProfilePanel
 
 from ..drawings import check_charts, data, legend, lines, named
 
-#: Best, median and worst of 50 starts (docs/references.md, its Fig. 4.8).
-PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
-
 
 @pytest.mark.parametrize(
     ("values", "said"),
@@ -21,20 +18,15 @@ PUBLISHED = {"best": 0.096, "median": 0.226, "worst": 3.2}
 )  # fmt: skip
 def test_optima(values, said):
     ended = sorted((v for v in values if np.isfinite(v)), reverse=True)
-    for references in (PUBLISHED, {}):
-        charts = studies.optima_chart(values, "Words", "RMS, mm", references)
-        check_charts(charts)
-        (chart,) = charts.charts
-        optima, *published = data(chart)
-        np.testing.assert_array_equal(optima[0], np.arange(1, len(ended) + 1))
-        np.testing.assert_allclose(optima[1], np.maximum(ended, 1e-16))
-        assert [line[1].tolist() for line in published] == [[v] * 2 for v in references.values()]
-        names = [f"published {name} {value:g}" for name, value in references.items()]
-        assert [s.name for s in chart.series[1:]] == names
-        levels = [*optima[1], *references.values()]
-        assert chart.log_y == (bool(levels) and max(levels) > 10 * min(levels))
-        assert chart.alt == said and said in charts.caption
-        assert (chart.x_label, chart.y_label) == ("start, from worst to best", "RMS, mm")
+    charts = studies.optima_chart(values, "Words")
+    check_charts(charts)
+    (chart,) = charts.charts
+    (optima,) = data(chart)
+    np.testing.assert_array_equal(optima[0], np.arange(1, len(ended) + 1))
+    np.testing.assert_allclose(optima[1], np.maximum(ended, 1e-16))
+    assert chart.log_y == (len(ended) > 0 and max(optima[1]) > 10 * min(optima[1]))
+    assert chart.alt == said and said in charts.caption
+    assert (chart.x_label, chart.y_label) == ("start, from worst to best", "objective")
 
 
 def test_laws():
@@ -55,8 +47,6 @@ def test_laws():
     assert [s.y for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
     assert chart.level == 45.0 and not chart.log_y and chart.from_zero
     assert studies.law_charts([LawRow("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
-    with pytest.raises(ValueError, match="no laws"):
-        studies.law_charts([], None, "N", "")
 
 
 def test_profiles():
