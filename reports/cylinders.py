@@ -55,13 +55,12 @@ class BendReadings:
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: a curve a card, readings, and names of a band and of what curves may be off by.
+    """One case: a curve a card, readings, and the name of what curves may be off by.
     along : the name of the deflection."""
 
     title: str
     lines: Sequence[BendLine] = ()
     measured: BendReadings | None = None
-    band: str = ""
     spread: str = ""
     along: str = ALONG
 

@@ -30,7 +30,7 @@ from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, T
 from .html import percent, write_report
 from .moduli import moduli_charts, pinned_charts
 from .studies import optima_chart
-from .vega import Drawing, save
+from .vega import save
 
 Array = NDArray[np.float64]
 
@@ -471,28 +471,19 @@ def _saved(charts: Charts, path: Path) -> Charts:
     return charts
 
 
-def draw_moduli(fit: Fit) -> Drawing:
-    """Return the moduli for a notebook."""
-    return Drawing(moduli(fit))
-
-
-def draw_starts(fit: Fit) -> Drawing:
-    """Return the optima of all starts for a notebook."""
-    return Drawing(optima(fit))
-
-
-def draw_test(fit: Fit, what: str, test: str | None) -> Drawing:
+def of_kind(fit: Fit, what: str, test: str | None) -> Charts:
     """Return what the kind of a test calls by this name: of the first test that has it, or one."""
     names = [name for name in fit.tests if test in (None, name)]
     for prepared in fit.setup.tests:
         own = getattr(report_of(prepared.test.kind), "CHARTS", {})
         if prepared.test.name in names and what in own:
-            return Drawing(own[what](prepared, fit.tests[prepared.test.name]))
+            charts: Charts = own[what](prepared, fit.tests[prepared.test.name])
+            return charts
     problem = f"expected one of {', '.join(fit.tests)}, with {what}; got {test or 'none of them'}"
     raise InputError(fit.project.path, "test", problem)
 
 
-def draw_residuals(fit: Fit, test: str | None) -> Drawing:
+def residuals(fit: Fit, test: str | None) -> Charts:
     """Return modelled less measured values over the measured ones, a chart a quantity."""
     table = fit.residuals()
     if test is not None and test not in fit.tests:
@@ -508,7 +499,7 @@ def draw_residuals(fit: Fit, test: str | None) -> Drawing:
         rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
         title, across = f"{quantity}: RMS {rms:.3g} {unit}", f"measured {quantity}, {unit}"
         charts.append(Chart(title, across, f"modelled − measured, {unit}", series, title, level=0))
-    return Drawing(Charts("residuals", charts, "What the fit leaves of every matched value."))
+    return Charts("residuals", charts, "What the fit leaves of every matched value.")
 
 
 def _strains(fit: Fit, count: int = SMOOTH) -> Array:

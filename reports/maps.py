@@ -23,7 +23,7 @@ from ..files import replacing, write_text
 from ..meshes.mesh import Mesh, meshio_of
 from ..solvers.base import History
 from .charts import Array, Chart, Charts, Shades, dots, ends_of, faces, shades_of
-from .vega import COLOURS, PALETTE, Drawing, view
+from .vega import COLOURS, PALETTE, view
 
 #: Steps between the least and the largest value; one more stands for what is not there.
 STEPS = 65534
@@ -235,7 +235,7 @@ WAYS = ("along the warp", "along the fill", "in shear")
 FLAT = 0.2
 
 
-def draw_history(name: str, history: History, quantity: str, component: int, frame: int) -> Drawing:
+def history(name: str, history: History, quantity: str, component: int, frame: int) -> Charts:
     """Return the deformed mesh coloured by its strain or stress: a tube from the side."""
     count = len(history.load)
     for field, good, expected in (
@@ -261,7 +261,7 @@ def draw_history(name: str, history: History, quantity: str, component: int, fra
     said = f"{what} {WAYS[component]}, {unit}"
     chart = Chart(name, *axes, [body], f"{name}: {said}", equal=True, scale=said,
                   shades=shades_of(values))  # fmt: skip
-    return Drawing(Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}"))
+    return Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}")
 
 
 #: Classes of a surface's values.

@@ -1,6 +1,6 @@
 """Write the folder of a study: tables, figures, notes.csv, report.html and, last, result.json.
 
-A function a study returns its content, by the type of its result; `write_folder` writes it."""
+A function a study returns its content, by the type of its result; `write_study` writes it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from pandas.api.types import is_numeric_dtype
 from ..errors import NOTES, NOTES_ARE, SolverFailure, percent
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
-from ..files import json_text, replacing, write_notes, write_text
+from ..files import replacing, write_notes
 from ..inference.likelihood import THRESHOLD
 from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS
 from ..runs import bootstrap, plan, profile, weights
 from ..runs.compare import LawComparison, noise
-from ..runs.folder import RESULT
+from ..runs.folder import RESULT, Store
 from ..runs.poisson import Nu12Study
 from ..runs.refinement import Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
@@ -33,7 +33,7 @@ from .content import Listing, Picture, Report, Section, Table
 from .fit_page import about_of, citation, correlation_table
 from .html import write_report
 from .moduli import bootstrap_charts
-from .vega import Drawing, save
+from .vega import save
 
 #: Files of every study, after its own.
 FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
@@ -54,13 +54,13 @@ ERRORS = "Error of the fit, and at specimens left out of it; the line is the dat
 Content = tuple[Report, Mapping[str, pd.DataFrame], Mapping[str, Charts], int | None]
 
 
-def write_folder(
-    folder: Path, study: Any, page: Report, tables: Mapping[str, pd.DataFrame],
-    figures: Mapping[str, Charts], digits: int | None = None,
-) -> Path:  # fmt: skip
-    """Write tables and figures by file name, with so many digits, and the page; return its path."""
-    if (folder / RESULT).exists():  # a folder that is half written has no result
-        (folder / RESULT).unlink()
+def write_study(study: Any, folder: Path) -> Path:
+    """Write tables and figures of a study of any type, and the page; return its path."""
+    if isinstance(study, LawComparison):  # what each test draws is written there
+        page, tables, figures, digits = _comparison(study, folder)
+    else:
+        page, tables, figures, digits = CONTENT[type(study).__name__](study)
+    (folder / RESULT).unlink(missing_ok=True)  # a folder that is half written has no result
     form = None if digits is None else f"%.{digits}g"
     for name, table in tables.items():
         with replacing(folder / name) as path:
@@ -71,21 +71,16 @@ def write_folder(
     warnings, files = [note.line for note in study.notes], [*page.files, *FILES]
     about = about_of(study.project, None)
     written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
-    write_text(folder / RESULT, json_text(study.result))
+    Store(folder).finish(study.result)
     return written
 
 
-def write_study(study: Any, folder: Path) -> Path:
-    """Write the folder of a study of any type."""
-    return write_folder(folder, study, *CONTENT[type(study).__name__](study))
-
-
-def draw_study(study: Any) -> Drawing:
+def figure(study: Any) -> Charts:
     """Return the figure of a study for a notebook."""
     page, _, figures, _ = CONTENT[type(study).__name__](study)
     on_page = (part for section in page.sections for part in section.parts)
     every = [*figures.values(), *(part for part in on_page if isinstance(part, Charts))]
-    return Drawing(every[0])
+    return every[0]
 
 
 def plain(
@@ -310,11 +305,6 @@ def _comparison(study: LawComparison, folder: Path | None = None) -> Content:
         files=[("comparison.csv", "the table"), ("laws.png", "picture of the errors")],
     )
     return page, {"comparison.csv": table}, {"laws.png": charts}, 9
-
-
-def write_comparison(study: LawComparison, folder: Path) -> Path:
-    """Write the folder of a comparison of forms."""
-    return write_folder(folder, study, *_comparison(study, folder))
 
 
 #: Content of the folder of each study, by its type.

@@ -317,30 +317,27 @@ class KeptAnalyses(RunCache):
             raise error
 
 
-#: Module of `reports` and its function, by the type of the result.
+#: Module of `reports` and its function, by the type of the result; all others are studies.
 PRESENTERS = {
-    "Bootstrap": ("study_pages", "write_study"), "Check": ("run_pages", "write_check"),
-    "Fit": ("fit_page", "write_fit"), "LawComparison": ("study_pages", "write_comparison"),
-    "Nu12Study": ("study_pages", "write_study"), "Plan": ("study_pages", "write_study"),
-    "Predictions": ("run_pages", "write_predictions"), "Profiles": ("study_pages", "write_study"),
-    "Refinement": ("study_pages", "write_study"), "Validation": ("study_pages", "write_study"),
-    "WeightStudy": ("study_pages", "write_study"),
+    "Check": ("run_pages", "write_check"), "Fit": ("fit_page", "write_fit"),
+    "Predictions": ("run_pages", "write_predictions"),
 }  # fmt: skip
 
 
 def write_report(result: Any, folder: Path | str) -> Path:
     """Write all files of a result, report.html among them, and return the page's path.
     Presenters look at results from above, so that no result imports them. Raises OutputError."""
-    module, function = PRESENTERS[type(result).__name__]
+    module, function = PRESENTERS.get(type(result).__name__, ("study_pages", "write_study"))
     page: Path = getattr(import_module(f"bubblefit.reports.{module}"), function)(
         result, Path(folder)
     )
     return page
 
 
-def draw(module: str, what: str, *given: Any) -> Any:
-    """Return the drawing that the function `draw_`what of a module of `reports` makes."""
-    return getattr(import_module(f"bubblefit.reports.{module}"), f"draw_{what}")(*given)
+def draw(module: str, charts: str, *given: Any) -> Any:
+    """Return the drawing of the charts that a function of a module of `reports` declares."""
+    declared = getattr(import_module(f"bubblefit.reports.{module}"), charts)(*given)
+    return import_module("bubblefit.reports.vega").Drawing(declared)
 
 
 def finished(result: R, out: Path | str | None) -> R:
@@ -366,7 +363,7 @@ class Presented:
 
     def plot(self) -> Any:
         """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""
-        return draw("study_pages", "study", self)
+        return draw("study_pages", "figure", self)
 
 
 @contextmanager

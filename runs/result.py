@@ -246,7 +246,7 @@ class Fit:
 
     def plot_starts(self) -> Any:
         """Return a drawing of the optima of all starts, as `plot_moduli`."""
-        return draw("fit_page", "starts", self)
+        return draw("fit_page", "optima", self)
 
     def plot_residuals(self, test: str | None = None) -> Any:
         """Return a drawing of modelled less measured values of a test, or of all."""
@@ -254,11 +254,11 @@ class Fit:
 
     def plot_loads(self, test: str | None = None) -> Any:
         """Return a drawing of measured and modelled load curves, of the first test that has any."""
-        return draw("fit_page", "test", self, "loads", test)
+        return draw("fit_page", "of_kind", self, "loads", test)
 
     def plot_heights(self, test: str | None = None) -> Any:
         """Return a drawing of cuts through a bubble, measured and modelled."""
-        return draw("fit_page", "test", self, "heights", test)
+        return draw("fit_page", "of_kind", self, "heights", test)
 
     def plot_history(self, name: str | None = None, **look: Any) -> Any:
         """Return a drawing of one of `history`, as `Histories.plot`."""

@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.kinds import RunRecord, strains_of
@@ -77,23 +78,15 @@ class StartRecord:
     same_as: int | None = None
     cached_runs: int = 0
 
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values, exact in JSON."""
-        return asdict(self)
+    @property
+    def text(self) -> str:
+        """Return the record as a line of JSON, every number in full."""
+        return json.dumps(asdict(self)) + "\n"
 
     @classmethod
-    def from_json(cls, values: dict[str, Any]) -> StartRecord:
-        """Return the record of `to_json`; raises KeyError or TypeError if it is none."""
-        return cls(
-            int(values["number"]), (int(values["seed"][0]), int(values["seed"][1])),
-            _number(values["objective"]), str(values["status"]), int(values["analyses"]),
-            tuple(map(float, values["unknowns"])), tuple(map(float, values["coefficients"])),
-            float(values["wall_s"]), int(values.get("external_runs", 0)),
-            str(values.get("failure", "")), tuple(map(float, values.get("reached", ()))),
-            "coarse" if values.get("mesh") == "coarse" else "full",
-            _number(values.get("coarse_objective")), int(values.get("coarse_analyses", 0)),
-            cached_runs=int(values.get("cached_runs", 0)),
-        )  # fmt: skip
+    def read(cls, text: str) -> StartRecord:
+        """Return the record of a line; raises ValueError if it is none."""
+        return TypeAdapter(cls).validate_json(text)
 
 
 def run_start(
@@ -156,10 +149,6 @@ def coarse_columns(record: StartRecord) -> dict[str, Any]:
     return {name: getattr(record, name) for name in names}
 
 
-def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
-
-
 def _why(problems: Sequence[FitProblem]) -> str:
     """Return the failure of the project's solver, else of the one that leads it."""
     return next((p.failure for p in problems if p.failure), "the first analysis failed")
@@ -184,8 +173,7 @@ class RunningFiles:
         done = self.finished() if resume else []
         ended = {(str(record.number), record.mesh) for record in done}
         rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
-        lines = [json.dumps(record.to_json()) + "\n" for record in done]
-        self.store.write(STARTS, "".join(lines))
+        self.store.write(STARTS, "".join(record.text for record in done))
         self.store.write(HISTORY, _table([[*HEADER, *self.columns], *rows]))
         with output_errors(self.store.path):
             # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
@@ -198,7 +186,7 @@ class RunningFiles:
         assert self._rows is not None and self._starts is not None
         with output_errors(self.store.path):
             if isinstance(record, StartRecord):
-                _append(self._starts, json.dumps(record.to_json()) + "\n")
+                _append(self._starts, record.text)
                 os.fsync(self._starts.fileno())
                 return
             values = (*record.coefficients, *record.nuisance)
@@ -231,8 +219,8 @@ class RunningFiles:
         lines = text.splitlines()
         for i, line in enumerate(lines):
             try:
-                record = StartRecord.from_json(json.loads(line))
-            except (ValueError, KeyError, TypeError, IndexError):
+                record = StartRecord.read(line)
+            except ValueError:
                 if i == len(lines) - 1:
                     break  # cut off by a kill: that start is run again
                 problem = "is damaged; use --overwrite"

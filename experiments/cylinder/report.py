@@ -250,11 +250,9 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
         readings = [(c.deflection, c.load) for c in test.measured]
         shown = (np.where(whole, values, np.nan) for values in (s.mean, s.deviation))
         measured = BendReadings(readings, s.deflection, *shown)
-    names = [end.name for end in outcome.band]
-    walls = f"from {' to '.join(names)}" if names else ""
     beam = any(isinstance(run.model, BeamModel) for run in outcome.runs if run.test is test)
     along = "deflection of mid-span, mm" if beam else ALONG
-    return BendPanel(test.name, lines, measured, walls, f"{100 * LEVEL:g} % by the card", along)
+    return BendPanel(test.name, lines, measured, f"{100 * LEVEL:g} % by the card", along)
 
 
 #: mm, of what a project may leave to the usual values.
