@@ -27,7 +27,6 @@ lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	MYPYPATH=$(VENV)/typing $(BIN)/mypy -p bubblefit
-	MYPYPATH=$(VENV)/typing $(BIN)/mypy tests/typed/*.py
 	$(BIN)/python .ci/licences.py
 	$(BIN)/python docs/make_site.py
 

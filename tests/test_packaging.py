@@ -157,9 +157,12 @@ def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
     assert PROJECT["project"]["version"] in output_of(command, "--version")
     output_of(command, "init", "measured", "--example", "measured")
     assert (tmp_path / "measured" / "test3-cubic.toml").exists()
-    # A script of a user, whose types `make lint` checks: fit, chart, export.
+    # Scripts of a user, checked by the types of what is installed; one is run: fit, chart, export.
+    shutil.copytree(ROOT / "tests" / "typed", typed := tmp_path / "typed")
+    check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
+    output_of(sys.executable, *check, "--python-executable", python, typed)
     two_exports(tmp_path)
-    output_of(python, shutil.copy(ROOT / "tests" / "typed" / "two_cameras.py", tmp_path))
+    output_of(python, typed / "two_cameras.py")
     assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
     assert (tmp_path / "out" / "history.csv").exists()
 

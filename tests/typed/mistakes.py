@@ -1,4 +1,4 @@
-"""Make two mistakes that the types of the package show: `make lint` finds an ignore unused."""
+"""Make two mistakes that the types of the package show, or mypy finds an ignore unused."""
 
 import bubblefit as bf
 
