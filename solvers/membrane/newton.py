@@ -253,7 +253,10 @@ def march(
     for i, level in enumerate(float(value) for value in levels):
         found = None
         if asked.guess is not None and i < len(asked.guess):
-            found = loading.equilibrium(loading.guessed(asked.guess[i]), level)
+            start = loading.guessed(asked.guess[i])
+            if path and i:  # what a guess lacks is much the same at neighbouring levels
+                start = start + path[-1] - loading.guessed(asked.guess[i - 1])
+            found = loading.equilibrium(start, level)
         if found is None and asked.guess is not None and not path:
             found = _from_guess(loading, levels, asked.guess)
         if found is None and path:
