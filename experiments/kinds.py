@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
+from ..files import replacing
 from ..materials.card import MaterialCard, State, positive, thickness_difference
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
@@ -74,6 +75,14 @@ class Output:
     def path(self, file: str) -> Path:
         """Return the file."""
         return self.folder / self.name(file)
+
+    def write(
+        self, file: str, table: pd.DataFrame, what: str = "", digits: str | None = "%.9g"
+    ) -> Shown:
+        """Write a table as CSV; return the file and what it is."""
+        with replacing(self.path(file)) as path:
+            table.to_csv(path, index=False, float_format=digits)
+        return self.name(file), what
 
 
 Array = NDArray[np.float64]

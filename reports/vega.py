@@ -19,7 +19,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 from markupsafe import Markup, escape
@@ -27,6 +27,9 @@ from markupsafe import Markup, escape
 from ..errors import InputError, OutputError
 from ..files import cache_folder, replacing
 from .charts import Chart, Charts, Series, Shades, axis_ends, looks_of, scale_ends
+
+if TYPE_CHECKING:
+    from ..experiments.kinds import Output
 
 Spec = dict[str, Any]
 
@@ -96,6 +99,12 @@ def save(path: Path | str, charts: Charts) -> Path:
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return Path(path)
+
+
+def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, str]:
+    """Write charts where a test writes; return the file below the folder, and the caption."""
+    save(out.path(name), charts)
+    return out.name(name), caption
 
 
 def rendered(charts: Charts, suffix: str) -> bytes:

@@ -154,16 +154,6 @@ def in_words(options: Options) -> str:
     return f"least squares of {options.minimise}s, {reciprocal}, {unloaded} unloaded yarns{ratios}"
 
 
-def option_table(found: BiaxialEvaluation) -> pd.DataFrame:
-    """Return constants E and A (direct form) in kN/m and squares of strain in %^2, by options."""
-    import pandas as pd
-
-    named = [("chosen", found.chosen), *(("", one) for one in found.others)]
-    ends = {"first cycle": found.first, "last cycle": found.last}
-    named += [(which, one) for which, one in ends.items() if one is not None]
-    return pd.DataFrame([{"what": what, **designers.row_of(one)} for what, one in named])
-
-
 def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
     Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
@@ -211,9 +201,13 @@ STANDARD = "en-17117"
 
 
 def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
-    """Return all tables by name."""
+    """Return all tables by name: constants E, A (direct form), kN/m; squares of strain, %^2."""
     import pandas as pd
 
+    named = [("chosen", found.chosen), *(("", one) for one in found.others)]
+    ends = {"first cycle": found.first, "last cycle": found.last}
+    named += [(which, one) for which, one in ends.items() if one is not None]
+    options = [{"what": what, **designers.row_of(one)} for what, one in named]
     table = []
     for path, line in zip(found.paths, found.lines, strict=True):
         row = {
@@ -235,7 +229,7 @@ def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
             values = np.full(2, np.nan) if strain is None else PERCENT * strain
             row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
         phases.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
-    return {"constants": option_table(found), STANDARD: standard_table(found),
+    return {"constants": pd.DataFrame(options), STANDARD: standard_table(found),
             "lines": pd.DataFrame(table), "kept": pd.DataFrame(phases)}  # fmt: skip
 
 

@@ -11,14 +11,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import Note, SolverFailure
-from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...reports.charts import Charts
 from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
-from ...reports.vega import save
+from ...reports.vega import saved
 from .. import kinds
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from .data import BiaxialPath
@@ -104,8 +103,7 @@ def simulate(
         table.insert(1, "ratio", ratio)
         tables.append(table)
     if tables:
-        with replacing(out.path("paths.csv")) as file:
-            pd.concat(tables, ignore_index=True).to_csv(file, index=False, float_format="%.9g")
+        out.write("paths.csv", pd.concat(tables))
     panels = []
     for path in test.data.paths:
         curves = tuple(
@@ -114,7 +112,8 @@ def simulate(
             if ratio == path.ratio and len(one.larger)
         )
         panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
-    save(out.path("paths.png"), biaxial_charts("ratios", panels))
+    charts = biaxial_charts("ratios", panels)
+    figures = [saved(out, "paths.png", charts, "Strain over the larger load")]
     numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
     lines = []
     for (name, ratio), run in found.items():
@@ -133,7 +132,6 @@ def simulate(
                 f"{name}: ratio {ratio}: RMS of strain {run.rms[0]:.3g} % along warp, "
                 f"{run.rms[1]:.3g} % along fill, to {end:.3g} kN/m"
             )
-    figures = [(out.name("paths.png"), "Strain over the larger load")]
     return Simulation({"cards": numbers}, lines, figures)
 
 
@@ -188,31 +186,29 @@ CHARTS = {"loads": fitted_paths}
 def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
     paths = prepared.fitted_paths(fitted)
-    with replacing(out.path("paths.csv")) as path:
-        parts = []
-        for p in paths:
-            parts.append(_columns(p.path.load, "load_kN_per_m"))
-            parts[-1].insert(0, "ratio", p.path.ratio)
-            strains = (("strain", p.objective.strain), ("model", p.objective.modelled(p.history)))
-            parts[-1][[f"{yarn}_{name}_percent" for name, _ in strains for yarn in YARNS]] = (
-                PERCENT * np.hstack([strain for _, strain in strains])
-            )
-        pd.concat(parts, ignore_index=True).to_csv(path, index=False, float_format="%.9g")
+    parts = []
+    for p in paths:
+        own = p.objective.strain, p.objective.modelled(p.history)
+        columns = zip(("strain_percent", "model_percent"), own, strict=True)
+        strains = [_columns(PERCENT * values, name) for name, values in columns]
+        parts.append(pd.concat([_columns(p.path.load, "load_kN_per_m"), *strains], axis=1))
+        parts[-1].insert(0, "ratio", p.path.ratio)
     charts = fitted_paths(prepared, fitted)
-    save(out.path("paths.png"), charts)
     facts = [("ratios matched", ", ".join(p.path.ratio for p in paths))]
     files = [
-        (out.name("paths.csv"), "loads and strains of every ratio, measured and modelled"),
-        (out.name("paths.png"), "picture of the ratios"),
+        out.write(
+            "paths.csv", pd.concat(parts), "loads and strains of every ratio, measured and modelled"
+        ),
+        saved(out, "paths.png", charts, "picture of the ratios"),
     ]
     return Exhibit(facts=facts, tables=[misfit_table(paths)], files=files, parts=[charts])
 
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     """Draw the paths; return a table of all cycles."""
-    data, picture = prepared.test.data, "biaxial.png"
+    data = prepared.test.data
     panels = [BiaxialPanel(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
-    save(out.path(picture), biaxial_charts("ratios", panels))
+    charts = biaxial_charts("ratios", panels)
     used = {(id(path.table), path.cycle.count) for path in data.paths}
     rows: list[list[object]] = []
     for read, cycles in zip(data.tables, data.cycles, strict=True):
@@ -226,7 +222,8 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
         "strain kept before it, warp, %", "fill, %", "evaluated",
     ]  # fmt: skip
     table = Table("Cycles as read", header, rows, text=(0, 2, 8))
-    figures = [(out.name(picture), "the loading of each ratio that is evaluated")]
+    words = "the loading of each ratio that is evaluated"
+    figures = [saved(out, "biaxial.png", charts, words)]
     return Exhibit(figures=figures, tables=[table])
 
 
@@ -279,11 +276,8 @@ def constants_table(found: BiaxialEvaluation) -> Table:
 
 def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
     """Write all tables as CSV, and constants.png; return the constants for the page."""
-    files, tables = [], tables_of(found)
-    for name, table in tables.items():
-        files.append((out.name(f"{name}.csv"), CONTENT[name]))
-        with replacing(out.path(f"{name}.csv")) as path:
-            table.to_csv(path, index=False, float_format="%.9g")
+    tables = tables_of(found)
+    files = [out.write(f"{name}.csv", own, CONTENT[name]) for name, own in tables.items()]
     panels = []
     for measured in found.paths:
         load = measured.load
@@ -292,8 +286,7 @@ def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
         panels.append(BiaxialPanel(measured.ratio, measured.larger, seen, curves))
     caption = "Strain over the larger load: measured, and by the constants"
     charts = biaxial_charts(f"{found.test} constants", panels, caption)
-    save(out.path("constants.png"), charts)
-    files.append((out.name("constants.png"), "picture of the ratios"))
+    files.append(saved(out, "constants.png", charts, "picture of the ratios"))
     note = (
         "Stiffness: change of a yarn's load over that of its strain, along the cycle evaluated; "
         "its Poisson's ratio where it is unloaded. Strain kept: after the load cycles, at the "

@@ -38,7 +38,7 @@ from ...reports.maps import (
     write_pvd,
     write_vtu,
 )
-from ...reports.vega import save
+from ...reports.vega import save, saved
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, History
 from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
 from . import findings as wording
@@ -169,8 +169,8 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     files = [
         *surfaces,
         (series.name, "the inflated bubble pressure by pressure, for ParaView"),
-        _saved(out, "profiles.png", cuts, f"{name}: cuts through the bubble along warp and fill"),
-        _saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
+        saved(out, "profiles.png", cuts, f"{name}: cuts through the bubble along warp and fill"),
+        saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
         *sheet_files,
     ]
     tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
@@ -200,11 +200,6 @@ def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, obje
         facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
     (sheet,) = wording.sheet_lines(numbers["sheet"])
     return [*facts, ("sheet", sheet.removeprefix("sheet: "))]
-
-
-def _saved(out: Output, name: str, charts: Charts, caption: str) -> Shown:
-    save(out.path(name), charts)
-    return out.name(name), caption
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:
@@ -380,7 +375,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
         tables.append(_equilibrium(prepared))
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
     rises = bubbles.rise_charts([field.pressure for field in prepared.fields], view.rises)
-    figure = _saved(out, "rises.png", rises, "rise about the centre against pressure")
+    figure = saved(out, "rises.png", rises, "rise about the centre against pressure")
     return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
 
 
@@ -412,30 +407,25 @@ def sheet_exhibit(
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
         columns = dict(zip(("x_mm", "y_mm", "z0_mm"), points.T, strict=True))
-        _write(out, "reference_surface.csv", columns)
         charts = bubbles.disk_charts([("z0, mm", points[:, :2], points[:, 2])], edge)
         shapes = ("measured surface", "modes")
         how = " and ".join(used for used in wording.used_of(prepared) if used in shapes)
         words = "surface of the sheet in the reference picture"
         caption = f"{prepared.test.name}: {words} ({how})"
-        figures.append(_saved(out, "reference_surface.png", charts, caption))
-        files.append((out.name("reference_surface.csv"), f"{words}, node by node"))
+        figures.append(saved(out, "reference_surface.png", charts, caption))
+        table, what = pd.DataFrame(columns), f"{words}, node by node"
+        files.append(out.write("reference_surface.csv", table, what, "%.6g"))
     if sheet.constant:
         places, field = wording.constant_field(fitted)
         own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
         columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
         columns = {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns}
-        _write(out, "constant_field.csv", columns)
         words = "measured less modelled, as far as it is the same at all pressures"
         caption = f"Taken out of the fit: {words}"
-        figures.append(_saved(out, "constant_field.png", bubbles.disk_charts(own, edge), caption))
-        files.append((out.name("constant_field.csv"), f"{words}, point by point"))
+        figures.append(saved(out, "constant_field.png", bubbles.disk_charts(own, edge), caption))
+        table, what = pd.DataFrame(columns), f"{words}, point by point"
+        files.append(out.write("constant_field.csv", table, what, "%.6g"))
     return figures, files
-
-
-def _write(out: Output, name: str, columns: dict[str, Array]) -> None:
-    with replacing(out.path(name)) as path:
-        pd.DataFrame(columns).to_csv(path, index=False, float_format="%.6g")
 
 
 def recorded_table(taken: RecordedFrames) -> Table:
@@ -465,7 +455,7 @@ def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
     times = clock.times + clock.offset
     charts = bubbles.clock_charts(times, clock.pressure, clock.heights, taken.pressure)
     words = "pressures of the log and heights of the frames, by one clock"
-    return [_saved(out, "clock.png", charts, words)]
+    return [saved(out, "clock.png", charts, words)]
 
 
 def registration_table(found: Registration) -> Table:
@@ -512,7 +502,7 @@ def registration_picture(
         maps.insert(0, ("reference height z, mm", last.z))
     charts = bubbles.registration_charts(last.points, maps, outline.edge())
     words = "measured points in the test's coordinates, the rim, warp and fill"
-    return _saved(out, "registration.png", charts, words)
+    return saved(out, "registration.png", charts, words)
 
 
 def correlation_table(prepared: PreparedBubble) -> list[Table]:
@@ -582,8 +572,7 @@ def simulate(
             "apex_mm": heights.tolist(),
             "strain_reached": dict(zip(STRAINS, strains_of(history).tolist(), strict=True)),
         }
-        with replacing(out.path(f"displacement{suffix}.csv")) as path:
-            displacement_table(model, history).to_csv(path, index=False, float_format="%.9g")
+        out.write(f"displacement{suffix}.csv", displacement_table(model, history))
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))
         cuts = bubbles.cut_charts(name, test.pressures, model.mesh.points, history.displacement)
         save(out.path(f"profiles{suffix}.png"), cuts)

@@ -12,7 +12,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import marks, percent
-from ...files import replacing
 from ...materials.card import BAND, LEVEL, MaterialCard
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
@@ -363,13 +362,11 @@ def _write_tables(
         (CURVES, pd.concat(curves), what),
         (MEASURED, measured_table(tests), "mean and scatter of the repetitions on a grid"),
     ]
-    files = []
-    for name, table, what in found:
-        if len(table) or name == CURVES:
-            with replacing(out.path(name)) as path:
-                table.to_csv(path, index=False)
-            files.append((out.name(name), what))
-    return files
+    return [
+        out.write(name, table, what, None)
+        for name, table, what in found
+        if len(table) or name == CURVES
+    ]
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:

@@ -12,7 +12,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
-from ...files import replacing
 from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import surface_strain
@@ -29,7 +28,7 @@ from ...reports.strips import (
     specimen_charts,
     strip_charts,
 )
-from ...reports.vega import save
+from ...reports.vega import save, saved
 from ...solvers.base import History
 from ..kinds import (
     READING,
@@ -254,8 +253,7 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
         pd.DataFrame(dict(zip(header, (*key, pull.elongation, pull.history.load), strict=True)))
         for key, pull in ended.items()
     ]
-    with replacing(out.path("loads.csv")) as path:
-        pd.concat(tables).to_csv(path, index=False)
+    out.write("loads.csv", pd.concat(tables), digits=None)
     drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
     rms: dict[str, list[float]] = {d: [] for d in test.strips}
     for (name, direction), pull in ended.items():
@@ -332,23 +330,20 @@ CHARTS = {"loads": fitted_loads}
 def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
     test, strips = prepared.test, prepared.fitted_strips(fitted)
-    with replacing(out.path("loads.csv")) as path:
-        parts = []
-        for s in strips:
-            u, polynomial = np.array(s.model.elongations), s.strip.polynomial
-            columns = {
-                "direction": s.direction, "elongation_mm": u,
-                "engineering_strain": u / s.strip.gauge_length, "model_N": s.history.load,
-                "polynomial_N": np.nan if polynomial is None else polynomial(u),
-            }  # fmt: skip
-            parts.append(pd.DataFrame(columns))
-        pd.concat(parts, ignore_index=True).to_csv(path, index=False)
+    parts = []
+    for s in strips:
+        u, polynomial = np.array(s.model.elongations), s.strip.polynomial
+        columns = {
+            "direction": s.direction, "elongation_mm": u,
+            "engineering_strain": u / s.strip.gauge_length, "model_N": s.history.load,
+            "polynomial_N": np.nan if polynomial is None else polynomial(u),
+        }  # fmt: skip
+        parts.append(pd.DataFrame(columns))
     charts = fitted_loads(prepared, fitted)
-    save(out.path("loads.png"), charts)
     figures: list[Shown] = []
     files = [
-        (out.name("loads.csv"), "load curves of the best fit"),
-        (out.name("loads.png"), "picture of the load curves"),
+        out.write("loads.csv", pd.concat(parts), "load curves of the best fit", None),
+        saved(out, "loads.png", charts, "picture of the load curves"),
     ]
     for s in strips:
         if s.direction == "bias":
@@ -406,8 +401,6 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
     found = standard_table(test)
     if not len(found):
         return [], []
-    with replacing(out.path(STANDARD)) as path:
-        found.to_csv(path, index=False, float_format="%.9g")
     note = (
         "The largest force in the data: that at break where the test went so far; elongation over "
         "the gauge length. Mean, standard deviation and coefficient of variation by direction."
@@ -421,14 +414,13 @@ def show_standard(test: StripsTest, out: Output) -> tuple[list[Table], list[tupl
     header = ["direction", "specimen", *QUANTITIES.values()]
     rows = found[["direction", "specimen", *QUANTITIES]].to_numpy(dtype=object).tolist()
     table = Table("Report after EN ISO 1421", header, rows, note, text=(1,))
-    return [table], [(out.name(STANDARD), "forces and elongations after EN ISO 1421")]
+    return [table], [out.write(STANDARD, found, "forces and elongations after EN ISO 1421")]
 
 
 def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
     """Draw the load curves as read; return tables of the specimens."""
     strips = prepared.test.strips
     curves = {direction: curves_of(strip) for direction, strip in strips.items()}
-    save(out.path("curves.png"), specimen_charts(curves))
     rows: list[list[object]] = []
     for direction, specimens in curves.items():
         for name, u, load in specimens:
@@ -439,7 +431,8 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
         "direction", "specimen", "points", "first elongation, mm", "last, mm", "last log strain, %",
         "first load, N", "largest load, N",
     ]  # fmt: skip
-    figures = [(out.name("curves.png"), "load curves as they were read")]
+    charts = specimen_charts(curves)
+    figures = [saved(out, "curves.png", charts, "load curves as they were read")]
     tables, files = show_standard(prepared.test, out)
     as_read = Table("Load curves as read", header, rows, text=(1,))
     return Exhibit(figures=figures, tables=[*tables, as_read], files=files)

@@ -9,13 +9,12 @@ import numpy as np
 import pandas as pd
 
 from ...errors import SolverFailure
-from ...files import replacing
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import save
 from ...solvers.base import History
-from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation
+from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from . import PART, PERCENT, PreparedTube, TubeObjective, TubeTest
 
 NAMES = ("along the tube", "around the tube", "radius times twist")
@@ -44,13 +43,13 @@ def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedTube, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write strains.csv and the figure."""
-    with replacing(out.path("strains.csv")) as path:
-        residuals(prepared, fitted).to_csv(path, index=False, float_format="%.9g")
     charts = _drawn(prepared.test, {"model": fitted.histories[0]}, out)
     rows: list[list[object]] = [[*row] for row in found.numbers["rms_percent"].items()]
-    files: list[Shown] = [
-        (out.name("strains.csv"), "strains, measured and modelled"), (out.name(FIGURE), CAPTION)
-    ]  # fmt: skip
+    what = "strains, measured and modelled"
+    files = [
+        out.write("strains.csv", residuals(prepared, fitted), what),
+        (out.name(FIGURE), CAPTION),
+    ]
     tables = [Table("Misfit of the tube", ["strain", "RMS error, %"], rows)]
     return Exhibit(tables=tables, files=files, parts=[charts])
 
