@@ -39,7 +39,7 @@ from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run
 from . import options as given
 from .options import check_out, columns_named, frame_options
-from .progress import NamedProgress
+from .progress import CountProgress
 from .terminal import FILE, command, group, show, written_to
 
 
@@ -65,7 +65,7 @@ def check_command(**options: Any) -> None:
     """
     read = read_project(options["project"], given.data_folders(options["data"]))
     folder = given.folder_of(options, "check")
-    with NamedProgress("steps", given.quiet(options)) as progress:
+    with CountProgress("steps", given.quiet(options)) as progress:
         found = check(
             read, options["tests"] or None, options["trust"], out=folder, progress=progress.saw
         )

@@ -23,7 +23,7 @@ from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from . import options as given
 from .options import command_line, data_folders, with_solver
-from .progress import RunsProgress, SeriesProgress
+from .progress import CountProgress, SeriesProgress
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
@@ -62,7 +62,7 @@ def run_predictions(
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
-    with resumable(folder), RunsProgress(given.quiet(options)) as progress:
+    with resumable(folder), CountProgress("runs", given.quiet(options)) as progress:
         predictions = predict(
             project, tests, cards, samples=options["samples"], jobs=options["jobs"],
             scheduler=options["scheduler"], out=folder, resume=options["resume"],

@@ -6,7 +6,7 @@ import sys
 import time
 from collections import Counter
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -21,7 +21,6 @@ from rich.progress import (
 from .terminal import EVENTS
 
 if TYPE_CHECKING:
-    from ..runs.predictions import RunEvent
     from ..runs.simulation import Step
     from ..runs.starts import Stage
     from ..solvers.base import Announcement
@@ -115,14 +114,30 @@ class SeriesProgress(LiveLine):
 
 
 class CountProgress(LiveLine):
-    """Show tasks done, a note and the time left."""
+    """Show how many are done, what runs or ran last, and the time left."""
 
-    def __init__(self, what: str, total: int, done: int, quiet: bool) -> None:
+    def __init__(self, what: str, quiet: bool, total: int = 0) -> None:
         super().__init__(quiet, TextColumn("{task.fields[note]}"))
-        self.what, self.total, self.done, self.already = what, total, done, done
-        self.begun = time.monotonic()
+        self.what, self.total, self.done, self.already = what, total, 0, 0
+        self.now, self.begun = "", time.monotonic()
         if self.bar is not None:
-            self.task = self.bar.add_task(what, total=total, completed=done, note="")
+            self.task = self.bar.add_task(what, total=total, note="")
+
+    def saw(self, *event: Any) -> None:
+        """Record how many of how many are done, and which one begins where it has a name.
+        Or a `RunEvent`, the end of a run; None: time passes."""
+        if len(event) == 3:
+            self.done, self.total, name = event
+            self.now = f"{name}, " if name else self.now
+        elif (ended := event[0]) is not None:
+            self.done, self.total = ended.done, ended.total
+            self.already += ended.again
+            if ended.run is not None:
+                record = ended.run.record
+                how = "ended early" if record.early else "finished"
+                how = f"failed ({record.failure})" if record.failure else how
+                self.now = f"last: {ended.run.title}: {how} in {record.seconds:.0f} s; "
+        self.show()
 
     def show(self) -> None:
         """Update the bar, or elsewhere print a plain line a minute; write events as they come."""
@@ -135,7 +150,7 @@ class CountProgress(LiveLine):
 
     def note(self) -> str:
         """Return the words beside the count."""
-        return self.left()
+        return self.now + self.left()
 
     def left(self) -> str:
         """Return the time left, estimated from the tasks done so far."""
@@ -146,40 +161,24 @@ class CountProgress(LiveLine):
         return f"{each * (self.total - self.done):.0f} s left"
 
 
-class NamedProgress(CountProgress):
-    """Show how many are done, which one runs, and the time left."""
-
-    def __init__(self, what: str, quiet: bool) -> None:
-        super().__init__(what, 0, 0, quiet)
-        self.now = ""
-
-    def saw(self, done: int, total: int, name: str) -> None:
-        """Record how many are done, and which one begins where it has a name."""
-        self.done, self.total, self.now = done, total, name or self.now
-        self.show()
-
-    def note(self) -> str:
-        """Return what is computed, and the time left."""
-        return f"{self.now}, {self.left()}" if self.now else self.left()
-
-
 class StudyProgress(CountProgress):
     """Show starts done, best objective, and the time left.
     said : the line that begins each of several fits in turn, with {} for its name."""
 
     def __init__(self, total: int, quiet: bool, said: str = "{}") -> None:
-        super().__init__("starts", total, 0, quiet)
+        super().__init__("starts", quiet, total)
         self.starts, self.said_of_fit = total, said
         self.best: float | None = None
         self.analyses = 0
         #: The start that last had an analysis, and what that left of the objective.
         self.under_way: tuple[int, float | None] | None = None
 
-    def saw(self, record: object) -> None:
+    def saw(self, *event: Any) -> None:
         """Record the name of a fit that begins, a stage, an analysis or the end of a start.
         None: time passes."""
         from ..runs.starts import EvaluationRecord, Stage, StartRecord
 
+        record = event[0]
         if isinstance(record, str):
             self.begin(Stage("starts", self.starts))
             if not self.quiet:
@@ -212,27 +211,3 @@ class StudyProgress(CountProgress):
             parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
         count = f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}"
         return ", ".join([*(parts or ["no analysis yet"]), count, self.left()])
-
-
-class RunsProgress(CountProgress):
-    """Show runs done, how the last one ended, and the time left."""
-
-    def __init__(self, quiet: bool) -> None:
-        super().__init__("runs", 0, 0, quiet)
-        self.last = ""
-
-    def saw(self, event: RunEvent | None) -> None:
-        """Record a run that ended; None: time passes."""
-        if event is not None:
-            self.done, self.total = event.done, event.total
-            self.already += event.again
-            if event.run is not None:
-                record = event.run.record
-                how = "ended early" if record.early else "finished"
-                how = f"failed ({record.failure})" if record.failure else how
-                self.last = f"last: {event.run.title}: {how} in {record.seconds:.0f} s; "
-        self.show()
-
-    def note(self) -> str:
-        """Return how the last run ended, and the time left."""
-        return self.last + self.left()

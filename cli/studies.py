@@ -22,7 +22,7 @@ from ..runs.profile import profile
 from ..runs.refinement import Refined, refine
 from . import options as given
 from .fits import fit_options, settings_given
-from .progress import NamedProgress, SeriesProgress, StudyProgress
+from .progress import CountProgress, SeriesProgress, StudyProgress
 from .terminal import Decorator, command, group, resumable, show, written_to
 
 
@@ -83,7 +83,7 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
         own = given.numbers(strains, "--modulus") if equals else common
         asked.setdefault(name, []).extend(own)
     folder = given.folder_of(options, "profile")
-    with NamedProgress("sides", given.quiet(options)) as progress:
+    with CountProgress("sides", given.quiet(options)) as progress:
         found = profile(
             project, asked or None, options["card"], options["tests"] or None, out=folder,
             overwrite=options["overwrite"], progress=progress.saw,
@@ -120,7 +120,7 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     """
     project = given.read_to_refit(options)
     folder = given.folder_of(options, "bootstrap")
-    with resumable(folder), NamedProgress("samples", given.quiet(options)) as progress:
+    with resumable(folder), CountProgress("samples", given.quiet(options)) as progress:
         done = bootstrap(
             project, over, samples, options["card"], options["tests"] or None,
             seed=options["seed"], out=folder, resume=options["resume"],
@@ -165,7 +165,7 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     """
     project = given.read_with_solver(options)
     folder = given.folder_of(options, "plan")
-    with NamedProgress("tests", given.quiet(options)) as progress:
+    with CountProgress("tests", given.quiet(options)) as progress:
         made = plan(
             project, options["card"], options["tests"] or None,
             strain=None if strain is None else given.numbers(strain, "--strain"),

@@ -24,7 +24,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
-from ..runs.result import USABLE, Fit, answers, coefficients_of, next_step, reaches
+from ..runs.result import USABLE, Fit, answers, next_step, reaches
 from .charts import Chart, Charts, dots, line
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
@@ -548,7 +548,7 @@ def coefficients_table(fit: Fit) -> list[Table]:
         "make up for each other: single ones are far less certain than the moduli they make."
     )
     unit = {"unit": "unit"}
-    return [correlation_table(COEFFICIENTS_TITLE, coefficients_of(fit), unit, note, text=(3,))]
+    return [correlation_table(COEFFICIENTS_TITLE, fit.coefficients(), unit, note, text=(3,))]
 
 
 def correlation_table(

@@ -169,8 +169,19 @@ class Fit:
 
     @cached_property
     def pinned(self) -> dict[str, dict[str, Array]]:
-        """Return 1 sigma (n,) of each modulus along its strains, by test and from all."""
-        return pinned(self)
+        """Return 1 sigma (n,) of each modulus along its strains, by test and from all.
+        Empty if not known, or of one test."""
+        point, sure = self.best.differentiated, self.best.certainty
+        if point is None or sure is None or sure.rows is None or len(self.setup.tests) < 2:
+            return {}
+        leading = self.problem.surrogate or self.problem
+        names = [c.name for c in self.problem.comparisons]
+        numbers = {name: [names.index(c.name) for c in fitted.comparisons]
+                   for name, fitted in self.tests.items()}  # fmt: skip
+        given = leading, point, self.law, self.best.valid
+        sigma = partial(uncertainty_from, *given, noise=sure.rows)
+        alone = {name: sigma(numbers=own) for name, own in numbers.items()}
+        return {**alone, TOGETHER: dict(sure.sigma)}
 
     @cached_property
     def coarse_to_fine(self) -> CoarseToFine | None:
@@ -278,8 +289,27 @@ class Fit:
         return html_table(words, ["", "strain", "MPa", f"{LEVEL:.0%} band", "kN/m"], rows)
 
     def coefficients(self) -> pd.DataFrame:
-        """Return a row an unknown: value, sigma, bounds, correlation with each other one."""
-        return coefficients_of(self)
+        """Return a row an unknown: coefficients in the project's unit, then the nuisance.
+        `COLUMNS` (sigma by noise, bounds left aside), then correlations. NaN where not known."""
+        import pandas as pd
+
+        unknowns, sure, scales = self.problem.unknowns, self.best.certainty, self.project.scales
+        size, nuisance = unknowns.size, unknowns.nuisance.all
+        names = [*unknowns.labels, *unknowns.nuisance_names]
+        scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
+        known = None if sure is None else sure.reported
+        y = self.best.point.unknowns if known is None else known.best
+        values = np.concatenate([self.law.beta[list(unknowns.free)], y[size:]]) / scale
+        every = zip(unknowns.box, unknowns.nuisance.bounds, strict=True)
+        ends = [np.concatenate(own) / scale for own in every]
+        sigma = np.full(len(names), np.nan)
+        correlations = np.full((len(names), len(names)), np.nan)
+        if known is not None:
+            sigma = np.sqrt(np.diag(known.coefficients)) / scale
+            correlations = known.correlations
+        units = [scales.modulus_unit] * size + [n.unit for n in nuisance]
+        table = pd.DataFrame(dict(zip(COLUMNS, (names, units, values, sigma, *ends), strict=True)))
+        return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
 
     def residuals(self) -> pd.DataFrame:
         """Return a row a matched value: test, part, place, then `COMPARED`, modelled - measured."""
@@ -468,30 +498,6 @@ def next_step(fit: Fit) -> str:
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 
 
-def coefficients_of(fit: Fit) -> pd.DataFrame:
-    """Return coefficients of the law in the project's unit, then the nuisance, a row each.
-    `COLUMNS` (sigma by noise, bounds left aside), then correlations by name. NaN where not
-    known."""
-    import pandas as pd
-
-    unknowns, sure, scales = fit.problem.unknowns, fit.best.certainty, fit.project.scales
-    size, nuisance = unknowns.size, unknowns.nuisance.all
-    names = [*unknowns.labels, *unknowns.nuisance_names]
-    scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
-    known = None if sure is None else sure.reported
-    y = fit.best.point.unknowns if known is None else known.best
-    values = np.concatenate([fit.law.beta[list(unknowns.free)], y[size:]]) / scale
-    ends = [np.concatenate([own, other]) / scale
-            for own, other in zip(unknowns.box, unknowns.nuisance.bounds, strict=True)]  # fmt: skip
-    sigma, correlations = np.full(len(names), np.nan), np.full((len(names), len(names)), np.nan)
-    if known is not None:
-        sigma = np.sqrt(np.diag(known.coefficients)) / scale
-        correlations = known.correlations
-    units = [scales.modulus_unit] * size + [n.unit for n in nuisance]
-    table = pd.DataFrame(dict(zip(COLUMNS, (names, units, values, sigma, *ends), strict=True)))
-    return pd.concat([table, pd.DataFrame(correlations, columns=names)], axis=1)
-
-
 #: Relative 1 sigma beyond which a test says nothing about a modulus.
 NOTHING = 1.0
 #: Name of all tests together among the tests.
@@ -563,20 +569,6 @@ def result_of(fit: Fit) -> dict[str, Any]:
 
 def _largest(relative: Mapping[str, np.ndarray] | None) -> dict[str, float] | None:
     return None if relative is None else {n: float(np.abs(s).max()) for n, s in relative.items()}
-
-
-def pinned(fit: Fit) -> dict[str, dict[str, np.ndarray]]:
-    """Return 1 sigma of each modulus from each test alone and from all; empty if not known."""
-    point, sure = fit.best.differentiated, fit.best.certainty
-    if point is None or sure is None or sure.rows is None or len(fit.setup.tests) < 2:
-        return {}
-    leading = fit.problem.surrogate or fit.problem
-    names = [c.name for c in fit.problem.comparisons]
-    numbers = {name: [names.index(c.name) for c in fitted.comparisons]
-               for name, fitted in fit.tests.items()}  # fmt: skip
-    sigma = partial(uncertainty_from, leading, point, fit.law, fit.best.valid, noise=sure.rows)
-    alone = {name: sigma(numbers=own) for name, own in numbers.items()}
-    return {**alone, TOGETHER: dict(sure.sigma)}
 
 
 def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:

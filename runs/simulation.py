@@ -264,20 +264,14 @@ def part_name(test: Test, part: str, parts: int, tests: int) -> str:
 def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
     """Return a card that is given as itself, its file, or its name in the project; InputError.
     None : the one that the project's fit left in its usual folder."""
-    card = fitted_card(project) if card is None else card
     if isinstance(card, MaterialCard):
         return card
-    (chosen,) = chosen_cards(project, [card]).values()
-    return chosen
-
-
-def fitted_card(project: Project) -> Path:
-    """Return the path of the card that the project's fit left; InputError: there is none."""
     path = usual_folder(project.path) / FITTED
-    if not path.is_file():
+    if card is None and not path.is_file():
         problem = f"no fit left a card in {path}: fit first (bubblefit fit), or name a card"
         raise InputError(project.path, "--card", problem)
-    return path
+    (chosen,) = chosen_cards(project, [path if card is None else card]).values()
+    return chosen
 
 
 def card_words(card: GivenCard | None) -> str:
