@@ -35,7 +35,7 @@ from bubblefit.solvers.process import check, run_process
 from bubblefit.solvers.scratch import run_folder
 
 from .. import counted_program, needs
-from ..commands import in_process
+from ..commands import in_process, wait_for
 from ..complaints import complaint
 from ..counted_program import CountedSolver, seen
 
@@ -459,10 +459,3 @@ def test_a_fit_hands_its_scheduler_to_the_solver(strips_project):
     assert executor_of(project).scheduler == project.options_of("marc")["licence_scheduler"]
     assert "licence_scheduler" not in strips_project.options_of("marc")
     assert "licence_scheduler" not in project.solver_options["marc"]
-
-
-def wait_for(there):
-    end = time.monotonic() + 30
-    while not there():
-        assert time.monotonic() < end
-        time.sleep(0.01)

@@ -22,6 +22,7 @@ from bubblefit.solvers.licences import held, locked, patiently
 from bubblefit.solvers.registry import counted, solver_named, solver_settings
 from bubblefit.solvers.settings import LicenceSettings, licence_settings, split
 
+from ..commands import wait_for
 from ..complaints import complaint
 from ..counted_program import CountedSolver, seen
 from ..plug_ins import install
@@ -261,10 +262,3 @@ def test_every_external_solver_has_the_keys(packages):
             assert said.startswith(f"{PROJECT}: solver.{name}.{key}: "), said
     assert found["acme"]["acmes"] == 1
     assert counted("acme", found["acme"]) == {"acmes": 1}  # licences change no result
-
-
-def wait_for(there):
-    end = time.monotonic() + 30
-    while not there():
-        assert time.monotonic() < end
-        time.sleep(0.01)

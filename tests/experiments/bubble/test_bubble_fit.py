@@ -49,7 +49,7 @@ from ...complaints import complaint
 from ...drawings import caught
 from ...inference.cases import MODEL as CASE
 from ...inference.cases import reference, targets
-from ...projects import small
+from ...projects import changed, small
 
 BETA = np.zeros(12)
 BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
@@ -380,67 +380,6 @@ def test_the_series_is_read_back(tmp_path):
 OUTLINE = Outline(120.0, 80.0, 30.0)
 KILO = [40, 120, 250]
 LAW_ELLIPTIC_FIT = HypoelasticLaw.linear(700.0, 300.0, 15.0)
-PROJECT = """\
-[fabric]
-name = "computed"
-thickness = 0.81
-[units]
-modulus = "MPa"
-[law]
-form = "constant"
-strain_range = [0.13, 0.13, 0.13]
-[law.bounds]
-E1 = [100.0, 2000.0]
-E2 = [50.0, 1500.0]
-G12 = [2.0, 100.0]
-[[bubble]]
-name = "oval"
-ellipse = { major = 120, minor = 80, angle = 30 }
-pressures = [40, 120, 250]
-elements = 112
-[bubble.data.points]
-files = ["0.csv", "1.csv", "2.csv"]
-columns = { z = "z" }
-[bubble.data.points.registration]
-[fit]
-mesh_error = "told"
-starts = 1
-seed = 3
-jobs = 1
-"""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A test on the mesh of the fit, seen by a camera whose x is 20 degrees from the warp."""
-    place = tmp_path_factory.mktemp("oval")
-    mesh = elliptic_disk_mesh(OUTLINE, 112)
-    pressures = [1e-3 * p for p in KILO]
-    model = BubbleModel(mesh, 0.81, pressures, default_increments(pressures))
-    turn = Rotation.from_euler("z", 20.0, degrees=True).as_matrix().T
-    line = np.linspace(-1, 1, 25)
-    points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
-    points = OUTLINE.places(points[np.hypot(*points.T) < 0.98])
-    sample, inside = SmoothReading.of(mesh).matrix(points)
-    places = np.column_stack([points[inside], np.zeros(inside.sum())]) @ turn + [2.0, -3.0, 600.0]
-    for k, moved in enumerate(MembraneSolver().run(model, LAW_ELLIPTIC_FIT).displacement):
-        table = np.hstack([places, (sample @ moved) @ turn])
-        np.savetxt(place / f"{k}.csv", table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")
-    (place / "project.toml").write_text(PROJECT)
-    return place
-
-
-def test_the_moduli_come_back(folder):
-    in_process("bubble", folder / "project.toml", "--out", folder / "out", cwd=folder)
-    result = result_in(folder / "out")
-    law = bf.read_card(folder / "out" / "material.toml").law
-    # The turn of the rim is told to a few tenths of a degree; G12 feels it.
-    for name, modulus, within in (("E1", 700.0, 0.01), ("E2", 300.0, 0.01), ("G12", 15.0, 0.06)):
-        assert float(law.modulus(name, 0.02)) == pytest.approx(modulus, rel=within), name
-    assert result["registration"]["warp_degrees"] == pytest.approx(20.0, abs=0.6)
-    assert result["registration"]["warp"]["clear"] is None
-
-
 PROJECT_FILTER = """
 [fabric]
 thickness = 0.8
@@ -463,6 +402,48 @@ mesh_error = "told"
 starts = 1
 jobs = 1
 """
+OVAL = changed(
+    PROJECT_FILTER,
+    ("[0.02, 0.3]", "[0.002, 0.1]"),
+    ("radius = 100.0", "ellipse = { major = 120, minor = 80, angle = 30 }"),
+    ("[30, 120]", "[40, 120, 250]"),
+    ("108\nSYMMETRY", "112"),
+    ('"a.csv", "b.csv"]', '"0.csv", "1.csv", "2.csv"]\ncolumns = { z = "z" }'),
+    ("FILTER", "[bubble.data.points.registration]"),
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A test on the mesh of the fit, seen by a camera whose x is 20 degrees from the warp."""
+    place = tmp_path_factory.mktemp("oval")
+    mesh = elliptic_disk_mesh(OUTLINE, 112)
+    pressures = [1e-3 * p for p in KILO]
+    model = BubbleModel(mesh, 0.8, pressures, default_increments(pressures))
+    turn = Rotation.from_euler("z", 20.0, degrees=True).as_matrix().T
+    line = np.linspace(-1, 1, 25)
+    points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
+    points = OUTLINE.places(points[np.hypot(*points.T) < 0.98])
+    sample, inside = SmoothReading.of(mesh).matrix(points)
+    places = np.column_stack([points[inside], np.zeros(inside.sum())]) @ turn + [2.0, -3.0, 600.0]
+    for k, moved in enumerate(MembraneSolver().run(model, LAW_ELLIPTIC_FIT).displacement):
+        table = np.hstack([places, (sample @ moved) @ turn])
+        np.savetxt(place / f"{k}.csv", table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")
+    (place / "project.toml").write_text(OVAL)
+    return place
+
+
+def test_the_moduli_come_back(folder):
+    in_process("bubble", folder / "project.toml", "--out", folder / "out", cwd=folder)
+    result = result_in(folder / "out")
+    law = bf.read_card(folder / "out" / "material.toml").law
+    # The turn of the rim is told to a few tenths of a degree; G12 feels it.
+    for name, modulus, within in (("E1", 700.0, 0.01), ("E2", 300.0, 0.01), ("G12", 15.0, 0.06)):
+        assert float(law.modulus(name, 0.02)) == pytest.approx(modulus, rel=within), name
+    assert result["registration"]["warp_degrees"] == pytest.approx(20.0, abs=0.6)
+    assert result["registration"]["warp"]["clear"] is None
+
+
 FILTER = "[bubble.data.points.filter]\nfacet = 40.0\nsmoothing = 3\nstep = 10.0\n"
 TRUE = {"E1": 800.0, "E2": 500.0, "G12": 80.0}
 
