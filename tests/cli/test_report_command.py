@@ -11,7 +11,7 @@ from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
 
 from ..commands import in_process, one_line
-from ..reports.test_html import drawn, full_report
+from ..reports.test_charts import drawn, full_report
 
 START = {
     "number": 3, "seed": [1, 3], "objective": 0.25, "status": "converged", "analyses": 7,

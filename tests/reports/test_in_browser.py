@@ -10,7 +10,7 @@ from bubblefit.reports.maps import warp_arrow
 
 from .. import needs
 from ..browser import BROWSERS, browser
-from .test_html import PLACES, drawn, full_report
+from .test_charts import PLACES, drawn, full_report
 
 TICKS = (
     "[...document.querySelectorAll('.charts .view')[0].querySelectorAll('.role-axis text')]"
