@@ -46,11 +46,11 @@ def licensed(solver, given):
 
 def in_processes(count, work):
     processes = [FORK.Process(target=work, args=(n,)) for n in range(count)]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join(60)
-        assert process.exitcode == 0
+    for one in processes:
+        one.start()
+    for one in processes:
+        one.join(60)
+        assert one.exitcode == 0
 
 
 @pytest.mark.parametrize("count", [2, None])
@@ -296,9 +296,9 @@ def begun(place):
 
 def members(group):
     count = 0
-    for stat in Path("/proc").glob("[0-9]*/stat"):
+    for file in Path("/proc").glob("[0-9]*/stat"):
         try:
-            said = stat.read_text().rpartition(")")[2].split()
+            said = file.read_text().rpartition(")")[2].split()
         except OSError:
             continue
         count += int(said[2]) == group and said[0] != "Z"
