@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
-from ..files import replacing
+from ..files import is_file, replacing
 from ..materials.card import MaterialCard, State, positive, thickness_difference
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
-from ..readers.sections import ModulusUnit, Number, Section
+from ..readers.sections import ModulusUnit, Number, Section, beside
 from ..solvers.base import History, instability
 
 if TYPE_CHECKING:
@@ -132,6 +132,17 @@ class Place:
     def error(self, field: str, problem: str) -> InputError:
         """Return an error in the section; `field` is the dotted key below it, "" for itself."""
         return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
+
+    def folder(self, named: str) -> Path:
+        """Return the folder of the data: the one that its section names, unless it is given."""
+        return self.data_folder or beside(self.path.parent, named)
+
+    def has(self, file: Path, field: str) -> bool:
+        """Return whether a measured file is there; raises InputError where it is needed."""
+        there = is_file(file)
+        if not there and self.need_data:
+            raise self.error(field, f"there is no file {file}; --data DIR names another folder")
+        return there
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,7 @@ def simulate(
         numbers[name]["ratios"][ratio] = {
             "rms_warp_percent": run.rms[0], "rms_fill_percent": run.rms[1],
             "shown_to_kN_per_m": end,
-            "strain_reached": dict(zip(kinds.STRAINS, run.reached.tolist(), strict=True)),
+            "strain_reached": kinds.by_strain(run.reached),
         }  # fmt: skip
         if len(run.larger):
             lines.append(

@@ -11,10 +11,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
-from ...files import is_file
 from ...materials.card import State
 from ...meshes.strip_models import PatchModel
-from ...readers.sections import Length, Name, Number, Positive, Section, beside
+from ...readers.sections import Length, Name, Number, Positive, Section
 from ..kinds import Place, Reach, Refined, named_format
 from .data import (
     BiaxialPath,
@@ -91,16 +90,12 @@ class BiaxialData:
 
 def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
     """Read the data of a section; none where a file is missing and not needed."""
-    data, folder = section.data, place.data_folder
-    if folder is None:
-        folder = beside(place.path.parent, data.folder)
+    data, folder = section.data, place.folder(section.data.folder)
     columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
     tables, named = [], []
     for path, field, ratio in _listed(place, data, folder):
-        if not is_file(path):
-            if not place.need_data:
-                return BiaxialData((), (), ())
-            raise place.error(field, f"there is no file {path}; --data DIR names another folder")
+        if not place.has(path, field):
+            return BiaxialData((), (), ())
         tables.append(
             read_biaxial_table(
                 path, columns=columns, load_unit=data.load_unit, strain_unit=data.strain_unit,

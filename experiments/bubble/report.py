@@ -40,7 +40,7 @@ from ...reports.maps import (
 )
 from ...reports.vega import save, saved
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, History
-from ..kinds import STRAINS, CardRun, Findings, FittedTest, Output, Shown, Simulation, strains_of
+from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
 from . import findings as wording
 from .findings import fitted_model, objective_of
 from .objective import displacement_offset
@@ -570,7 +570,7 @@ def simulate(
         numbers[name] = {
             "pressure_kPa": kilos.tolist(),
             "apex_mm": heights.tolist(),
-            "strain_reached": dict(zip(STRAINS, strains_of(history).tolist(), strict=True)),
+            "strain_reached": by_strain(strains_of(history)),
         }
         out.write(f"displacement{suffix}.csv", displacement_table(model, history))
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))

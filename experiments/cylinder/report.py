@@ -426,32 +426,28 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
 
 
 def _errors(outcome: CylinderOutcome) -> list[Table]:
+    """Return the tables of what is measured too: quantities, and loads reading by reading."""
     walls = ["wall"] if outcome.band else []
-    rows: list[list[object]] = []
+    places = place_names(run.test for run in outcome.runs)
+    rows, beside = list[list[object]](), list[list[object]]()
     for i, m in outcome.measures.items():
+        run = outcome.runs[i]
+        head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
         if (error := m.error) is not None:
-            run = outcome.runs[i]
-            head = [run.test.name, run.card, *(walls and [run.wall])]
             numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
             rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
+        if m.against is not None:
+            pairs = m.against.stiffness, m.against.knee, *map(m.against.loads.get, places)
+            for pair in pairs:
+                of = None if pair is None else f"{pair[0] / pair[1]:.3f}"
+                head += [None if pair is None else f"{pair[1]:.4g}", of]
+            beside.append(_unbroken(head))
     if not rows:
         return []
     named = ["test", "card", *walls]
     header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
     text = tuple(range(1, len(named)))
-    beside: list[list[object]] = []
-    places = place_names(run.test for run in outcome.runs)
-    for i, m in outcome.measures.items():
-        if m.against is not None:
-            run = outcome.runs[i]
-            cells: list[object] = []
-            pairs = m.against.stiffness, m.against.knee, *map(m.against.loads.get, places)
-            for pair in pairs:
-                cells += (
-                    [None] * 2 if pair is None else [f"{pair[1]:.4g}", f"{pair[0] / pair[1]:.3f}"]
-                )
-            beside.append(_unbroken([run.test.name, run.card, *(walls and [run.wall]), *cells]))
     over = ("stiffness, N/mm", "knee, N", *(f"load at {place}, N" for place in places))
     columns = [*named, *(words for name in over for words in (name, "of it"))]
     low, high = (f"{100 * share:g}" for share in SECANT)

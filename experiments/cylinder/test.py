@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from ...errors import InputError
-from ...files import is_file
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
@@ -418,9 +417,7 @@ def _beam(
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
     """Read every repetition in the files of a section; none where it lists none."""
     names = section.files or []
-    folder = place.data_folder
-    if folder is None:
-        folder = place.path.parent / section.folder
+    folder = place.folder(section.folder)
     format = named_format(place, "measured.format", "machine table", section.format)
     way, load = section.deflection.channel, section.load.channel
     keys = ("repetition", "preload", "zero", "comment", "decimal")
@@ -430,9 +427,6 @@ def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve,
         file, key = folder / name, f"measured.files[{k}]"
         if Path(name) in map(Path, names[:k]):
             raise place.error(key, f"{name!r} is listed twice; it would count double")
-        if not is_file(file):
-            if not place.need_data:
-                continue
-            raise place.error(key, f"there is no file {file}; --data DIR names another folder")
-        curves += read_bending_curves(file, deflection=way, load=load, format=format, **said)
+        if place.has(file, key):
+            curves += read_bending_curves(file, deflection=way, load=load, format=format, **said)
     return tuple(curves)

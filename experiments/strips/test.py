@@ -36,7 +36,7 @@ from ...readers.curves import (
     specimen_deviation,
     split_at_restarts,
 )
-from ...readers.sections import Length, Name, Positive, Section, beside
+from ...readers.sections import Length, Name, Positive, Section
 from ..kinds import Place, Reach, Refined, named_format, state_said
 from .data import Strip
 
@@ -324,9 +324,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     data, length = section.data, place.scales.length
     if (data.polynomials is None) == (data.files is None):
         raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
-    folder = place.data_folder
-    if folder is None:
-        folder = beside(place.path.parent, data.folder)
+    folder = place.folder(data.folder)
     tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
     listed = listed_files(place, data, folder)
     missing = next((file for file in listed if not is_file(file.path)), None)

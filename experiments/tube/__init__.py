@@ -17,12 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, Field
 
 from ...errors import InputError
-from ...files import is_file
 from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
-from ...readers.sections import Length, Name, Positive, Section, beside
+from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
@@ -89,14 +88,11 @@ class TubeTest:
 def read(section: TubeSection, place: Place, name: str) -> TubeTest:
     """Read the section of a test, and its file."""
     radius = 0.5 * section.diameter * place.scales.length
-    folder = place.data_folder or beside(place.path.parent, section.folder)
-    path = folder / section.file
+    path = place.folder(section.folder) / section.file
     noise = None if section.noise is None else section.noise / PERCENT
     loads, strain = np.empty((0, 3)), np.empty((0, 3))
-    if is_file(path):
+    if place.has(path, "file"):
         loads, strain = _columns(path, radius)
-    elif place.need_data:
-        raise place.error("file", f"there is no file {path}; --data DIR names another folder")
     return TubeTest(
         name=name, place=place, weight=section.weight, radius=radius, loads=loads, strain=strain,
         noise=noise, path=path,

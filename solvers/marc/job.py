@@ -101,12 +101,11 @@ COLUMNS = 13
 
 @dataclass(frozen=True)
 class Increment:
-    """A line of the .sts file: load case, increment, iterations, cut-backs, total time."""
+    """A line of the .sts file: load case, increment, iterations, total time."""
 
     case: int
     increment: int
     iterations: int
-    cut_backs: int
     time: float
 
 
@@ -119,8 +118,8 @@ def increments(sts: Path) -> list[Increment]:
         if len(parts) != COLUMNS:
             continue
         try:
-            case, increment, cycles, _, cuts = (int(part) for part in parts[:5])
-            found.append(Increment(case, increment, cycles, cuts, float(parts[10])))
+            case, increment, cycles, *_ = (int(part) for part in parts[:5])
+            found.append(Increment(case, increment, cycles, float(parts[10])))
         except ValueError:
             continue
     return found

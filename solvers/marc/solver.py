@@ -16,7 +16,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.strip_models import UniaxialModel
-from ..bars import BARS, Bar, bar_law, bar_model, checked_stresses, difference, stress_of
+from ..bars import BARS, bar_law, bar_model, checked_stresses, difference, stress_of
 from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark
 from ..settings import KEYS
@@ -98,11 +98,15 @@ class MarcSolver:
     ) -> History:  # fmt: skip
         """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
         settings, repeats, early = self.settings, 0, ""
+        source: str | None = None
+        if settings.law == "hypela2":
+            own, symmetric = settings.own_state, settings.symmetric
+            source = hypela2_source({1: law}, own_state=own, symmetric=symmetric)
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
 
         def once(deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None) -> T:
             nonlocal repeats, early
-            job = Job(deck, units, self._subroutine(law))
+            job = Job(deck, units, source)
             found, end = run_job(job, settings, read, rescue, parent, timeout, self.progress)
             repeats += end.repeated
             early = early or end.problem or ""
@@ -118,31 +122,20 @@ class MarcSolver:
         why = f"{history.early}: {early}" if history.early and early else history.early
         return replace(history, remarks=tuple(remarks), early=why)
 
-    def _subroutine(self, law: HypoelasticLaw) -> str | None:
-        """Return HYPELA2 with the law's constants, where it is the way that was chosen."""
-        settings = self.settings
-        if settings.law != "hypela2":
-            return None
-        return hypela2_source({1: law}, own_state=settings.own_state, symmetric=settings.symmetric)
-
 
 SECONDS = 600.0
 
 
 def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
     """Return the end stresses (MPa) of BARS by this Marc; SolverFailure beyond TOLERANCE."""
-    stresses = tuple(end_stress(solver, bar, timeout) for bar in BARS)
-    return checked_stresses(stresses, "this Marc", solver.name)
-
-
-def end_stress(solver: MarcSolver, bar: Bar, timeout: float | None = None) -> float:
-    """Return the Cauchy stress (MPa) at the end of one bar."""
-    model, law = bar_model(bar), bar_law(bar.model)
-    # The table of the modulus ends with the bar: to the reach of a law without a range its points
-    # would lie so far apart that the warp bar is 2e-4 off.
-    end = float(np.log1p(bar.elongation))
-    history = solver.run(model, replace(law, strain_range=np.full(3, end)), timeout=timeout)
-    return stress_of(model, history)
+    stresses = []
+    for bar in BARS:
+        # The table of the modulus ends with the bar: to the reach of a law without a range its
+        # points would lie so far apart that the warp bar is 2e-4 off.
+        end = np.full(3, float(np.log1p(bar.elongation)))
+        model, law = bar_model(bar), replace(bar_law(bar.model), strain_range=end)
+        stresses.append(stress_of(model, solver.run(model, law, timeout=timeout)))
+    return checked_stresses(tuple(stresses), "this Marc", solver.name)
 
 
 NAMED, FOUND = "named", "PATH"
