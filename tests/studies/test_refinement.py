@@ -2,7 +2,6 @@
 
 import json
 from itertools import product
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -150,7 +149,7 @@ ROOT = np.sqrt((1 + 4) / 2)
 
 def study(runs, noise=1e-7, what="elements"):
     notes = (Note(SNAP, "made up"),)
-    return refinement.Refinement(Path("a.toml"), "soft", "bars", what, {"bar": runs}, noise, notes)
+    return refinement.Refinement(project_of(), "soft", "bars", what, {"bar": runs}, noise, notes)
 
 
 def told(runs, noise=1e-7):
