@@ -1,7 +1,7 @@
-"""Kill fits, bendings and validations at random moments and resume each to its end.
+"""Kill fits and bendings at random moments and resume each to its end.
 
 Kills the command, a worker, or CalculiX. Compares the result with that of a whole run, and looks
-for processes, scratch folders, half-written files and shared memory left. Exit code 1 if any.
+for processes, scratch folders and half-written files left. Exit code 1 if any.
 """
 
 import csv
@@ -10,7 +10,6 @@ import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,13 +18,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
 import psutil
 from common import start_on
 
-#: In the environment of all that a trial starts, and of this process where /dev/shm is its own.
-MARK, OWN = "BUBBLEFIT_KILLS", "BUBBLEFIT_KILLS_OWN"
-SHARED = Path("/dev/shm")
+#: In the environment of all that a trial starts.
+MARK = "BUBBLEFIT_KILLS"
 #: Of result.json and tables: how long it took, how many runs were made now, when and where.
 UNEQUAL = ("wall_s", "seconds", "external_runs", "cached_runs", "provenance")
 #: s; how long what should end may take, and a command as a whole.
@@ -66,26 +63,10 @@ element_size = 60.0
 deflection = 8.0
 frames = 2
 """
-STRIPS = """
-fabric = { thickness = 0.8 }
-fit = { starts = 1, jobs = 2 }
-[law]
-form = "constant"
-nu12 = 0.0
-strain_range = [0.12, 0.14, 0.1]
-bounds = { E1 = [0.02, 2.0], E2 = [0.03, 1.0], G12 = [0.005, 0.2] }
-[[strips]]
-increments = 6
-match = "points"
-warp = { gauge_length = 20, final_length = 22.9 }
-fill = { gauge_length = 20, final_length = 22.9 }
-data = { files = ["points.csv"] }
-"""
 COMMANDS = {
     "fit": (BUBBLE.replace("{starts}", "4"), ("fit",)),
     "fit by CalculiX": (BUBBLE.replace("{starts}", "2"), ("fit", "--solver", "calculix")),
     "bend": (CYLINDERS, ("bend", "--samples", "0")),
-    "validate": (STRIPS, ("validate", "--leave", "specimens", "--starts", "1")),
 }
 
 
@@ -108,8 +89,6 @@ class Trial:
         self.folder, self.out = folder, folder / "out"
         (folder / "tmp").mkdir()
         (folder / "project.toml").write_text(text)
-        if "points.csv" in text:
-            _write_points(folder / "points.csv")
         self.arguments = [command, "project.toml", *options, "--out", "out", "--quiet"]
         self.said = folder / "stderr"
 
@@ -155,7 +134,6 @@ class Trial:
     def left(self):
         places = [*(self.folder / "tmp").iterdir(), *self.folder.rglob(".*.part")]
         places += [path for path in self.out.rglob(".*") if path.is_file()]
-        places += SHARED.iterdir() if OWN in os.environ else ()  # others may use it, too
         return [str(path) for path in places]
 
 
@@ -249,8 +227,6 @@ def one_trial(folder, name, whole, seconds, most, draw, told):
             told.other.append(f"{folder.name}: objective {e:g} instead of {own:g}")
     kept = [path for path in trial.left() if not (failed and "bubblefit-ccx" in path)]
     told.left += [f"{folder.name}: {path}" for path in kept]
-    for path in SHARED.glob("bubblefit-ccx-*") if OWN in os.environ else ():
-        shutil.rmtree(path, ignore_errors=True)
     return count
 
 
@@ -275,11 +251,6 @@ def trials(place, name, kills, seed):
 
 def main(kills=4, seed=1, *commands):
     """Kill each command KILLS times; exit with 1 where anything differs or is left."""
-    if OWN not in os.environ and shutil.which("unshare"):
-        mount = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs tmpfs /dev/shm && "$@"', "sh"]
-        if subprocess.run([*mount, "true"], capture_output=True).returncode == 0:
-            command = [*mount, sys.executable, *sys.argv]
-            sys.exit(subprocess.run(command, env={**os.environ, OWN: "1"}).returncode)
     bad = False
     with tempfile.TemporaryDirectory(prefix="kills-") as place:
         for name in commands or COMMANDS:
@@ -292,21 +263,9 @@ def main(kills=4, seed=1, *commands):
     sys.exit(int(bad))
 
 
-def _write_points(path):
-    elongation = np.linspace(0.2, 2.8, 8)
-    rows = ["direction,specimen,elongation (mm),load (N)"]
-    for direction, moduli in {"warp": (300.0, 360.0), "fill": (200.0, 180.0)}.items():
-        for specimen, modulus in zip("ab", moduli, strict=True):
-            loads = 20 * modulus * np.log1p(elongation / 20)
-            points = zip(elongation.tolist(), loads.tolist(), strict=True)
-            rows += [f"{direction},{specimen},{u!r},{load!r}" for u, load in points]
-    path.write_text("\n".join(rows) + "\n")
-
-
 if __name__ == "__main__":
     import bubblefit.reports.study_pages
     import bubblefit.runs.fit
-    import bubblefit.runs.predictions
-    import bubblefit.runs.validation  # noqa: F401
+    import bubblefit.runs.predictions  # noqa: F401
 
     start_on(main)
