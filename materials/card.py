@@ -172,6 +172,10 @@ class MaterialCard:
     certainty: CardCertainty | None = None
     state: State = ""
 
+    def __post_init__(self) -> None:
+        if not 0.0 < self.thickness < math.inf:
+            raise InputError(None, "thickness", f"must be above zero, got {self.thickness:g} mm")
+
     @property
     def closed_path(self) -> ClosedPath:
         """Return the work of a closed path of strain to the ends of the range, which is none of a

@@ -246,7 +246,7 @@ def predict(
     solver = usable_solver(name, options, project.path, cache=project.run_cache)
     # A test that brings its own material needs no card.
     alone = not cards and not project.cards and all(map(own_card, chosen))
-    pairs = _pairs(project, chosen, {} if alone else chosen_cards(project, cards), solver)
+    pairs = _pairs(chosen, {} if alone else chosen_cards(project, cards), solver)
     sources, settings = [] if alone else card_sources(project, cards), None
     if project.written is not None and sources is not None:
         settings = settings_of_predictions(project, [test.name for test in chosen], sources)
@@ -319,7 +319,7 @@ def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) ->
 
 
 def _pairs(
-    project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
+    tests: Sequence[Test], cards: Mapping[str, MaterialCard], solver: Solver
 ) -> list[PredictedRun]:
     """Return runs to be made: test by test, card by card, end by end of the solver's band."""
     pairs: list[PredictedRun] = []
@@ -327,12 +327,8 @@ def _pairs(
         models: dict[float, Mapping[str, Any]] = {}
         own = own_card(test)
         for name, card in cards.items() if own is None else [(own.name, own)]:
-            try:
-                if card.thickness not in models:
-                    models[card.thickness] = test.models(card.thickness)
-            except InputError as error:
-                where = f"{test.name!r} with card {name!r}, {error.field}"
-                raise InputError(project.path, where, error.problem) from None
+            if card.thickness not in models:
+                models[card.thickness] = test.models(card.thickness)
             (model,) = models[card.thickness].values()
             waiting = PredictedRun(test, name, card, model, RunRecord(0.0, "was not run"))
             band = tuple(solver.band(model)) if isinstance(solver, BandedSolver) else ()

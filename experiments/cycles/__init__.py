@@ -8,7 +8,6 @@ passage of the reference load, as in `evaluation`.
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from ...errors import InputError
-from ...files import is_file
-from ...inference.comparison import Comparison, NoiseIs
+from ...inference.comparison import Comparison
 from ...materials.card import State
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import (
@@ -35,10 +33,12 @@ from ...meshes.strip_models import (
 from ...readers.curves import DIRECTIONS, LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import read_history
-from ...readers.sections import Length, Name, Positive, Section, beside
+from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Kind, MakeSolver, Masks, Place, Predicted, Reach, Studied, Weighting
+from ..kinds import Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
+from ..measured import MeasuredKind
+from ..strips.prepared import LoadObjective
 from .evaluation import EvaluatedHistory, evaluate_history, matched_rows
 
 Array = NDArray[np.float64]
@@ -199,8 +199,7 @@ class CyclesTest:
 
 def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
     """Read the section of a test, and its histories."""
-    length, folder = place.scales.length, place.data_folder
-    folder = beside(place.path.parent, section.folder) if folder is None else folder
+    length, folder = place.scales.length, place.folder(section.folder)
     width = WIDTH if section.width is None else section.width * length
     gauge = GAUGE if section.gauge_length is None else section.gauge_length * length
     grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
@@ -216,10 +215,7 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
     for direction, names in listed.items():
         for k, file in enumerate(names):
             path, key = folder / file, f"files.{direction}[{k}]"
-            if not is_file(path):
-                if place.need_data:
-                    problem = f"there is no file {path}; --data DIR names another folder"
-                    raise place.error(key, problem)
+            if not place.has(path, key):
                 continue
             columns = section.columns.model_dump(exclude_none=True)
             history = read_history(path, columns=columns or None, length=of, **said)
@@ -234,81 +230,32 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
     )  # fmt: skip
 
 
-class HistoryObjective:
+class HistoryObjective(LoadObjective):
     """Residuals (model - measured) / peak of the loads of a history; each branch weighs alike.
 
     kept : (n,) which readings count. The sum of squares is the mean square over the branches.
     """
 
-    unit, columns = "N", 1
-
     def __init__(
         self, one: Specimen, kept: NDArray[np.bool_], weight: float, noise: float | None
     ) -> None:
-        self.rows = np.flatnonzero(kept)
-        self.strain, self.load = one.strain[self.rows], one.load[self.rows]
-        branch, peak = one.branch[self.rows], float(one.load.max())
-        if not len(self.rows):
-            raise InputError(one.evaluated.history.path, "load", "holds no reading to match")
-        _, number, count = np.unique(branch, return_inverse=True, return_counts=True)
-        self.sizes = (len(self.rows),)
+        self.rows, peak = np.flatnonzero(kept), float(one.load.max())
+        self.elongation, self.load = one.strain[self.rows], one.load[self.rows]
+        _, number, count = np.unique(one.branch[self.rows], return_inverse=True, return_counts=True)
+        self.sizes, self.specimens, self.alike = (len(self.rows),), None, 1.0
+        self.sample = np.eye(len(kept))[self.rows]
         self._unit = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
         self.least_noise = NOISE * peak if noise is None else noise
-        self.noise_is: NoiseIs = "assumed" if noise is None else "given"
-
-    @property
-    def scale(self) -> Array:
-        """Return newtons in one unit of each residual, (n,)."""
-        return self._unit
-
-    @property
-    def measured(self) -> Array:
-        """Return the measured loads, (n,) N."""
-        return self.load
-
-    @property
-    def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
-        return self.strain, self.load
+        self.noise_is = "assumed" if noise is None else "given"
 
     @property
     def places(self) -> tuple[Array, ...]:
         """Return the numbers of the readings: neighbours may err as one."""
         return (self.rows[:, None].astype(float),)
 
-    def of_points(self, values: Array) -> Array:
-        """Return values for each residual from values for each reading."""
-        return values
-
-    def modelled(self, history: History) -> Array:
-        """Return the model's loads, (n,) N."""
-        return np.asarray(history.load[self.rows])
-
-    def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return the block, (n,)."""
-        return np.asarray((self.modelled(history) - self.load) / self._unit)
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (n, parameters) from the history's load slope."""
-        if history.load_slope is None:
-            raise InputError(None, "history", "the solver gives no derivatives of the load")
-        return np.asarray(history.load_slope[self.rows] / self._unit[:, None])
-
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (n, 0): a history has no nuisance unknowns of its own."""
-        if names:
-            raise InputError(None, "nuisance", f"a load history knows no {', '.join(names)}")
-        return np.empty((len(self.load), 0))
-
-    def shifted(self, here: History, there: History) -> HistoryObjective:
-        """Return the objective of a model that carries `here` where this one carries `there`."""
-        other = copy.copy(self)
-        other.load = self.load - (self.modelled(here) - self.modelled(there))
-        return other
-
-    def rms(self, history: History) -> float:
-        """Return the RMS error, N."""
-        return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))
+    def causes(self, history: History) -> dict[str, Array]:
+        """Return nothing: offsets are in the passage of the reference load."""
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,21 +338,19 @@ class PreparedCycles:
         return files
 
 
-class CyclesKind:
+class CyclesKind(MeasuredKind):
     """Strips, straps or cords through loading, unloading and reloading."""
 
     name: str = "cycles"
     title: str = "strips through loading, unloading and reloading"
     section: type[BaseModel] = CyclesSection
     folder_key: str = "folder"
-    fitted: bool = True
-    predicted: Predicted | None = None
-    studied: Studied | None = None
+    prepared = PreparedCycles
     read = staticmethod(read)
 
     def prepare(
         self, test: CyclesTest, law: HypoelasticLaw, make_solver: MakeSolver
-    ) -> PreparedCycles:
+    ) -> PreparedTest:
         """Return the test, which was read with its data; raises InputError: no memory."""
         if law.memory is None:
             problem = (
@@ -413,7 +358,7 @@ class CyclesKind:
                 "shear), or numbers"
             )
             raise InputError(test.place.path, "law.memory", problem)
-        return PreparedCycles(test)
+        return super().prepare(test, law, make_solver)
 
 
 KIND: Kind = CyclesKind()

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from ...errors import SolverFailure
-from ...files import replacing
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
@@ -74,15 +73,14 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write cycles.csv and the figure."""
-    with replacing(out.path(TABLE)) as path:
-        residuals(prepared, fitted).to_csv(path, index=False, float_format="%.9g")
     charts = _drawn(prepared.test, {"model": _by_specimen(prepared, fitted)}, out)
     rows: list[list[object]] = [
         [name, cycle, error] for name, own in found.numbers["rms_N"].items()
         for cycle, error in own.items()
     ]  # fmt: skip
     table = Table("Misfit of the load cycles", ["specimen", "", "RMS error, N"], rows, text=(1,))
-    files = [(out.name(TABLE), "loads, measured and modelled"), (out.name(FIGURE), CAPTION)]
+    loads = out.write(TABLE, residuals(prepared, fitted), "loads, measured and modelled")
+    files = [loads, (out.name(FIGURE), CAPTION)]
     return Exhibit(tables=[table], files=files, parts=[charts])
 
 

@@ -117,7 +117,7 @@ class LoadObjective:
         """Return (n, parameters) from the history's load slope."""
         if history.load_slope is None:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
-        return np.asarray(self.sample @ history.load_slope / self._unit)
+        return np.asarray(self.sample @ history.load_slope / np.reshape(self._unit, (-1, 1)))
 
     @property
     def measured_rms(self) -> float:
@@ -146,7 +146,7 @@ class LoadObjective:
 
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
-#: the published strips have 1.6, 1.2 and 1.1 (benchmarks/bench_certainty.py strips).
+#: the published strips have 1.6, 1.2 and 1.1.
 PLACES = 1.25
 #: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
 SPECIMENS = 5

@@ -74,9 +74,8 @@ def test_tests_and_cards_by_name(project):
     done = predict(project, "cylinder", {"mine": mine}, jobs=1)
     assert [(run.test.name, run.card) for run in done.each] == [(name, "mine") for name in TESTS]
     assert "there is no test 'low'" in complaint(predict, project, ["low"])
-    none = {"of nothing": replace(mine, thickness=0.0)}
-    said = complaint(predict, project, ["high"], none, jobs=1)
-    assert said.startswith(f"{project.path}: 'high' with card 'of nothing', ")
+    said = complaint(replace, mine, thickness=0.0)
+    assert said == "thickness: must be above zero, got 0 mm"
 
 
 @pytest.mark.parametrize(("asked", "said", "some"), [(3, 5, 3), (None, 5, 5), (None, None, 7)])
