@@ -499,8 +499,15 @@ def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:
     return [] if words is None else [Note(THICKNESS, run)]
 
 
-#: How strips say that they were not conditioned; and rates that differ by more are no longer one.
-NONE, RATES = frozenset(("none", "no", "0", "without", "keine", "ohne")), 2.0
+#: How strips say that they were not conditioned; rates or holds that differ by more are not one.
+NONE, ALIKE = frozenset(("none", "no", "0", "without", "keine", "ohne")), 2.0
+#: Fields of a `Pace`, in words, unit and its number, the least that matters, and what it may do.
+PACES = (
+    ("rate", "rate of strain", "%/min", 6000.0, 0.0,
+     "coated fabrics are the stiffer the faster they are pulled, and one law lies between"),
+    ("hold", "longest hold", "s", 1.0, 10.0,
+     "the fabric creeps in a hold, which a law without time takes for softness or permanent set"),
+)  # fmt: skip
 
 
 def state_said(conditioning: str | None) -> State:
@@ -518,17 +525,20 @@ def state_of(tests: Sequence[Test]) -> State:
 
 
 def notes_of_states(tests: Iterable[Test]) -> list[Note]:
-    """Note tests that are fitted together in different states of the fabric or at other rates."""
+    """Note tests that are fitted together in other states, at other rates or with other holds."""
     every = list(tests)
     states = {t.name: said for t in every if (said := getattr(t, "state", ""))}
-    rates = {t.name: rate for t in every if (rate := getattr(t, "rate", None))}
     found = []
     if len({*states.values()}) > 1:
         words = ", ".join(f"{name}: {said}" for name, said in states.items())
         found.append(Note(STATES, f"joined tests differ in state ({words}): one law is not both"))
-    if rates and max(rates.values()) > RATES * min(rates.values()):
-        words = ", ".join(f"{name}: {rate:g} mm/min" for name, rate in rates.items())
-        found.append(Note(STATES, f"joined tests differ in rate ({words})"))
+    paces = {t.name: pace for t in every if (pace := getattr(t, "pace", None))}
+    for field_, what, unit, number, least, effect in PACES:
+        each = {name: number * getattr(pace, field_) for name, pace in paces.items()}
+        each = {name: value for name, value in each.items() if np.isfinite(value)}
+        if each and max(each.values()) > max(ALIKE * min(each.values()), least):
+            words = ", ".join(f"{name}: {value:.3g} {unit}" for name, value in each.items())
+            found.append(Note(STATES, f"joined tests differ in {what} ({words}): {effect}"))
     return found
 
 

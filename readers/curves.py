@@ -31,8 +31,9 @@ DIRECTIONS = ("warp", "fill", "bias")
 class LoadCurve:
     """Load (n,) N of the whole strip over elongation (n,) mm of one specimen or series.
 
-    time : (n,) where asked for. frame : (n,) numbers from 0, of a strain gauge. between_grips : the
-    column where it is the machine's travel. cut : rows left out after the largest load.
+    time : (n,) where the file has it. frame : (n,) numbers from 0, of a strain gauge.
+    between_grips : the column where it is the machine's travel. cut : rows left out after the
+    largest load.
     """
 
     direction: str
@@ -113,7 +114,9 @@ def read_load_curves(
         raise InputError(path, f"line {found.header}, column {said!r}", problem)
     grips = said if tables.is_between_grips(said, "elongation" in named) else ""
     asked = {"elongation": length_unit, "load": load_unit}
-    time = found.table.numbers(column["time"]) if column["time"] else None
+    time = machine_tables.called_times(found, named)
+    if column["time"]:
+        time = found.table.numbers(column["time"])
     labels = _labels(found, column, wanted)
     if (found.units[said] or length_unit) in tables.STRAIN_UNITS:
         gauges = gauge_length or {}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -30,6 +31,8 @@ BACK, AGAIN, FLOOR = 0.7, 0.2, 0.005
 PLAIN = 0.5
 #: A hold: a way along the curve slower than this share of the cycle's usual speed.
 SLOW, FEWEST = 0.2, 4
+#: Of the peak: the loads between which the rate of strain of a loading is taken.
+RISE = (0.4, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +183,33 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
             if last - first >= FEWEST and not before and all(h.last < first for h in found):
                 found.append(Hold(c.number, "top" if top else "bottom", first, last))
     return found
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a test was: rate of strain on loading, 1/s, and longest hold, s; NaN: not known."""
+
+    rate: float = math.nan
+    hold: float = math.nan
+
+
+def pace_of(histories: Iterable[LoadHistory]) -> Pace:
+    """Return the median of the mean rates of all loadings, and the longest hold at a top."""
+    rates, holds = [], [0.0]
+    for h in histories:
+        if h.time is None:
+            continue
+        cycles = find_cycles(h.load)
+        for c in cycles:
+            up = slice(c.start, c.peak + 1)
+            levels = [share * h.load[c.peak] for share in RISE]
+            (a, b), (begin, end) = (
+                [passage(h.load[up], x[up], level)[1] for level in levels]
+                for x in (h.strain, h.time)
+            )
+            rates += [(b - a) / (end - begin)] * (end > begin)
+        holds += [h.time[k.last] - h.time[k.first] for k in find_holds(h, cycles) if k.at == "top"]
+    return Pace(float(np.median(rates)), float(max(holds))) if rates else Pace()
 
 
 def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:

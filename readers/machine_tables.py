@@ -187,7 +187,12 @@ def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
     """Return the column of times in s that never falls, None where the table has none."""
     names = [str(name) for name in found.table.cells.columns]
     for i in tables.columns_of(names, "time", named):
-        values = _times(found, {"time": names[i]}, ("time",))
+        try:
+            values = _times(found, {"time": names[i]}, ("time",))
+        except InputError:
+            if "time" in named:
+                raise
+            continue
         if (np.diff(values) >= 0).all():
             return values
     return None

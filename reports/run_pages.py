@@ -147,7 +147,7 @@ def write_check(check: Check, folder: Path) -> Path:
         warnings=[
             words for j in check.judgements
             for words in (*(f"{j.test}: {d.text}" for d in j.errors), *(n.line for n in j.notes))
-        ],
+        ] + [note.line for note in check.joined],
         sections=[
             Section("Doubts", [doubts]),
             Section("What was seen", [

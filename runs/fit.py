@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, NoFeasibleStart, SolverFailure, checked
-from ..experiments.kinds import DataFile, Expected, Fabric, Judgement, files_of
+from ..errors import InputError, NoFeasibleStart, Note, SolverFailure, checked
+from ..experiments.kinds import (
+    DataFile,
+    Expected,
+    Fabric,
+    Judgement,
+    files_of,
+    notes_of_states,
+)
 from ..experiments.own import OwnTest
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
@@ -448,13 +455,18 @@ class Check:
             for j in self.judgements
         }  # fmt: skip
         return {"command": "check", "version": __version__, "sound": self.sound, "tests": tests,
-                "choices": self.choices,
+                "joined": [str(note) for note in self.joined], "choices": self.choices,
                 "estimate": None if self.estimate is None else self.estimate.result}  # fmt: skip
 
     @property
     def choices(self) -> dict[str, list[str]]:
         """Return choices in reading the files of each test, and rows left out, in words."""
         return {one.test.name: _choices(files_of(one)) for one in self.setup.tests}
+
+    @property
+    def joined(self) -> list[Note]:
+        """Return notes on tests that differ in state, rate or hold."""
+        return notes_of_states(one.test for one in self.setup.tests)
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Return (test, severity, doubt, text): a row a doubt, one for none; choices as notes."""
@@ -468,6 +480,7 @@ class Check:
             if not judgement.doubts:
                 rows.append((judgement.test, "fine", "", NOTHING))
             rows += [(judgement.test, "note", "", words) for words in choices[judgement.test]]
+        rows += [("all tests", "warning", "", str(note)) for note in self.joined]
         return rows
 
     def lines(self) -> list[str]:

@@ -28,6 +28,7 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame, frame_files
+from bubblefit.readers.histories import Pace
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
 from bubblefit.runs.poisson import vary_nu12
@@ -309,8 +310,8 @@ def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
 def notes_of_states(*_: Any) -> list[Note]:
     said = {"bubble": "first loading", "one": state_said("3 cycles to 5 kN/m"), "two": "",
             "three": state_said("None")}  # fmt: skip
-    rates = {"one": 100.0, "two": 10.0, "three": None}
-    tests: Any = [SimpleNamespace(name=n, state=s, rate=rates.get(n)) for n, s in said.items()]
+    paces = {"one": Pace(0.01, 0.0), "two": Pace(0.001, 60.0), "three": Pace()}
+    tests: Any = [SimpleNamespace(name=n, state=s, pace=paces.get(n)) for n, s in said.items()]
     return kinds.notes_of_states(tests)
 
 

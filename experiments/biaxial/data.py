@@ -61,7 +61,7 @@ QUANTITIES: Mapping[str, str] = {name.replace(" ", "_"): name for name in PAIRS}
 
 @dataclass(frozen=True, eq=False)
 class BiaxialTable:
-    """The rows of a file: loads (n, 2) N/mm and strains (n, 2) along warp and fill, (n,) ratios."""
+    """Rows of a file: loads (n, 2) N/mm, strains (n, 2) along warp and fill, (n,) ratios; s."""
 
     path: Path
     load: Array
@@ -69,6 +69,7 @@ class BiaxialTable:
     ratio: tuple[str, ...] | None
     lines: NDArray[np.intp]
     source: FrameSource
+    time: Array | None = None
 
 
 def read_biaxial_table(
@@ -123,7 +124,8 @@ def read_biaxial_table(
                 at = f"line {line}, column {column['ratio']!r}"
                 raise InputError(path, at, error.problem) from None
         ratio = tuple(names)
-    return BiaxialTable(path, load, strain, ratio, found.table.lines, source)
+    time = machine.called_times(found, asked)
+    return BiaxialTable(path, load, strain, ratio, found.table.lines, source, time)
 
 
 #: Of the range of loads of a phase: a smaller turn is none.

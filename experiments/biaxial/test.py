@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 from ...errors import InputError
 from ...materials.card import State
 from ...meshes.strip_models import PatchModel
+from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Number, Positive, Section
 from ..kinds import Place, Reach, Refined, named_format
 from .data import (
@@ -159,6 +160,14 @@ class BiaxialTest:
         """Return "conditioned" where a cycle before those that are evaluated was not the first."""
         later = any(path.cycle.count > 1 for path in self.data.paths)
         return "conditioned" if later else "first loading"
+
+    @property
+    def pace(self) -> Pace:
+        """Return rate of strain and hold by the files' times, of the larger load and strain."""
+        return pace_of(
+            LoadHistory(t.path, t.load.max(axis=1), t.strain.max(axis=1), t.time)
+            for t in self.data.tables
+        )
 
     @property
     def reads_files(self) -> bool:

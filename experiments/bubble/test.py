@@ -17,6 +17,7 @@ from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
+from ...readers.histories import LoadHistory, Pace, pace_of
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
@@ -121,6 +122,18 @@ class BubbleTest:
     registration: Mapping[str, float] = field(default_factory=dict)
     kind: str = "bubble"
     state: ClassVar[State] = "first loading"
+
+    @property
+    def pace(self) -> Pace:
+        """Return rate of strain, that of a spherical cap, and hold by the log and its frames."""
+        recorded = self.data.recorded if isinstance(self.data, PointFiles) else None
+        clock = None if recorded is None else recorded.clock
+        if clock is None:
+            return Pace()
+        known = np.isfinite(clock.pressure + clock.heights)
+        strain = 2.0 / 3.0 * (clock.heights[known] / self.radius) ** 2
+        path, pressure = self.place.path, clock.pressure[known]
+        return pace_of([LoadHistory(path, pressure, strain, clock.times[known])])
 
     @property
     def radius(self) -> float:

@@ -32,7 +32,7 @@ from ...meshes.strip_models import (
 )
 from ...readers.curves import DIRECTIONS, LengthUnit
 from ...readers.frames import FrameSource
-from ...readers.histories import read_history
+from ...readers.histories import Pace, pace_of, read_history
 from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
@@ -171,6 +171,11 @@ class CyclesTest:
             end = float(np.log1p(one.strain.max())) * (2 if one.direction == "bias" else 1)
             ends[one.direction] = max(end, ends.get(one.direction, 0.0))
         return Reach((ends.get("warp"), ends.get("fill"), ends.get("bias")))
+
+    @property
+    def pace(self) -> Pace:
+        """Return rate of strain and hold by the files' times."""
+        return pace_of(one.evaluated.history for one in self.specimens.values())
 
     def models(
         self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0

@@ -36,6 +36,7 @@ from ...readers.curves import (
     specimen_deviation,
     split_at_restarts,
 )
+from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Positive, Section
 from ..kinds import Place, Reach, Refined, named_format, state_said
 from .data import Strip
@@ -130,7 +131,7 @@ class StripsSection(Section):
 class StripsTest:
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
     strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
-    unknown. rate : mm a minute, and conditioning in words: for the report only."""
+    unknown. rate : mm a minute between the grips. conditioning : in words."""
 
     name: str
     place: Place
@@ -154,6 +155,16 @@ class StripsTest:
     def state(self) -> State:
         """Return "first loading" or "conditioned", as the key `conditioning` says; else ""."""
         return state_said(self.conditioning)
+
+    @property
+    def pace(self) -> Pace:
+        """Return rate of strain and hold by the files' times, else the rate by its key."""
+        found = pace_of(
+            LoadHistory(Path(), curve.load, curve.elongation / strip.gauge_length, curve.time)
+            for strip in self.strips.values() for curve in strip.curves
+        )  # fmt: skip
+        by_key = Pace() if self.rate is None else Pace(self.rate / 60.0 / self.grip_distance)
+        return found if math.isfinite(found.rate) else by_key
 
     @property
     def thickness(self) -> float:

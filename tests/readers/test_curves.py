@@ -107,7 +107,6 @@ def test_what_machines_export(scratch, encoding):
         np.testing.assert_allclose(curve.elongation, [-0.01, 0.25], rtol=1e-14)
         np.testing.assert_allclose(curve.load, [-0.02, 100.5], rtol=1e-14)
         assert (curve.direction, curve.specimen, curve.path) == ("warp", "strip 3", scratch)
-        assert curve.time is None
 
 
 def test_the_measured_points_need_no_options(shared_data):
