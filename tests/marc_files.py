@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -94,3 +95,22 @@ def sts_text(
     if number is not None:
         text += f"\n Job ends with exit number :    {number}\n total wall time:  3.11\n"
     return text
+
+
+def bending_marc(folder: Path, model, frames, number=3004, increments=None) -> Path:
+    """Write a run_marc that fills a cylinder well, and whose bending gives `frames` and ends so."""
+    filled = frames[: len(model.inflation) + 1]
+    for name, given, end in (("inflation", filled, 3004), ("bending", frames, number)):
+        (folder / name).mkdir()
+        text = t19_text(model.mesh.points, model.mesh.quads, given, ended=end == 3004)
+        (folder / name / "job.t19").write_text(text)
+        times = [time for time, _ in given[1:]]
+        text = sts_text(times, end, increments if name == "bending" else None)
+        (folder / name / "job.sts").write_text(text)
+    path = folder / "run_marc"
+    path.write_text(
+        f"#!/bin/sh\nif grep -q '^contact' job.dat; then cp {folder}/bending/* .\n"
+        f"else cp {folder}/inflation/* .; fi\n"
+    )
+    path.chmod(0o755)
+    return path

@@ -51,7 +51,7 @@ from . import load_cycles
 from .bars import BarKind, BarSolver, BarTest, project_of
 from .inference import cases
 from .inference.cases import MODEL
-from .marc_files import sts_text, t19_text
+from .marc_files import bending_marc, t19_text
 from .places import KNOWN
 from .projects import constant_strips, small
 from .solvers.marc.test_marc_deck import frames_of
@@ -181,21 +181,8 @@ def notes_of_marc_bending(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[N
     model = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0, 60.0, 100.0])
     frames, _ = frames_of(model, model.mesh.points * [0.05, 0.05, 0.0], last=2)
     frames[-1][1]["Contact Normal Force"][may_touch(model)["supports"]] = 0.0
-    filled = len(model.inflation)
-    for name, given in (("inflation", frames[: filled + 1]), ("bending", frames)):
-        ended, times = name == "inflation", [time for time, _ in given[1:]]
-        (folder / name).mkdir()
-        text = t19_text(model.mesh.points, model.mesh.quads, given, ended=ended)
-        (folder / name / "job.t19").write_text(text)
-        numbers = [*range(1, len(times)), len(times) - 1]
-        text = sts_text(times) if ended else sts_text(times, 3015, numbers)
-        (folder / name / "job.sts").write_text(text)
-    program = folder / "run_marc"
-    program.write_text(
-        f"#!/bin/sh\nif grep -q '^contact' job.dat; then cp {folder}/bending/* .\n"
-        f"else cp {folder}/inflation/* .; fi\n"
-    )
-    program.chmod(0o755)
+    count = len(frames) - 1
+    program = bending_marc(folder, model, frames, 3015, [*range(1, count), count - 1])
     return MarcSolver(marc=program, scratch=str(folder / "scratch")).run(model, LINEAR).remarks
 
 

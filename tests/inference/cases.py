@@ -16,6 +16,7 @@ from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
+from bubblefit.solvers.base import SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..published_laws import TABLE_4_2
@@ -104,6 +105,36 @@ class Failing(MembraneSolver):
             raise SolverFailure("on purpose")
         history, rates = super()._analyse(*arguments)
         return replace(history, displacement=history.displacement * np.nan), rates * np.nan
+
+
+class Thicker:
+    """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes.
+
+    Loads of strips are wavy, too. fails : numbers of the runs that do. unstable_from : the first
+    whose equilibrium is not stable.
+    """
+
+    name, external, progress, identity = "thicker", True, None, "thicker"
+
+    def __init__(self, digits=12, fails=(), unstable_from=1000):
+        self.digits, self.fails, self.runs = digits, fails, 0
+        self.unstable_from = unstable_from
+        self.membrane = MembraneSolver(1e-10)
+
+    def run(self, model, law, *unused):
+        self.runs += 1
+        if self.runs in self.fails:
+            raise SolverFailure("on purpose", self.name)
+        history = self.membrane.run(replace(model, thickness=1.02 * model.thickness), law)
+        unstable = () if self.runs < self.unstable_from else ("300 kPa",)
+        wave = 0.01 * np.sin(np.arange(len(history.load))) * hasattr(model, "elongations")
+        return replace(
+            history, load=(1 + wave) * history.load, unstable=unstable,
+            displacement=np.round(history.displacement, self.digits),
+        )  # fmt: skip
+
+    def check(self):
+        return SolverCheck(self.name, True, "1", True)
 
 
 def levenberg_marquardt(fit, start, tolerance, most):

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import nlopt
 import numpy as np
 import pytest
-from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference import linear, methods
 from bubblefit.inference.assessment import moduli_error
@@ -40,7 +39,6 @@ from bubblefit.inference.unknowns import (
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs import best as budget
-from bubblefit.solvers.base import SolverCheck
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.stats import qmc
 
@@ -53,6 +51,7 @@ from .cases import (
     NEAR,
     PRESSURES,
     Failing,
+    Thicker,
     levenberg_marquardt,
     problem,
     reference,
@@ -424,32 +423,6 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
     # Or the error of the mesh is all that is left.
     limit = Limit(np.zeros_like(y), quiet.residual, np.zeros_like(best.residual))
     assert budget._certainty(fit, best, law, np.full(3, 0.08), limit).order is None
-
-
-class Thicker:
-    """Stands for another finite element program: 2 % thicker, rounded to `digits`, no slopes.
-
-    fails : numbers of the runs that do. unstable_from : the first whose equilibrium is not stable.
-    """
-
-    name, external, progress, identity = "thicker", True, None, "thicker"
-
-    def __init__(self, digits=12, fails=(), unstable_from=1000):
-        self.digits, self.fails, self.runs = digits, fails, 0
-        self.unstable_from = unstable_from
-        self.membrane = MembraneSolver()
-
-    def run(self, model, law, *unused):
-        self.runs += 1
-        if self.runs in self.fails:
-            raise SolverFailure("on purpose", self.name)
-        history = self.membrane.run(replace(model, thickness=1.02 * model.thickness), law)
-        unstable = () if self.runs < self.unstable_from else ("300 kPa",)
-        displacement = np.round(history.displacement, self.digits)
-        return replace(history, displacement=displacement, unstable=unstable)
-
-    def check(self):
-        return SolverCheck(self.name, True, "1", True)
 
 
 def led(solver):

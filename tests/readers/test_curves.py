@@ -10,7 +10,6 @@ import pytest
 from bubblefit.experiments.bubble.registration import axes_angle, in_all_quarters, line_angle
 from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_restarts
 from bubblefit.readers.formats import workbook as xlsx
-from bubblefit.readers.formats.machine_text import cells_of, find_blocks
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.tables import split_unit
@@ -470,21 +469,6 @@ def test_the_clock_on_the_wall(scratch, name, first, second, start, end):
     assert log.time.tolist() == [start, end] and log.pressure == pytest.approx([0.01, 0.02])
     scratch.write_text(scratch.read_text() + "14.2;1;0,3\n")
     assert f"line 4, column '{name}': expected a time" in complaint(read_times, scratch)
-
-
-NEEDED = ("elongation", "load")
-
-
-def rows(*texts: str) -> list[tuple[int, list[str]]]:
-    return [(line, cells_of(text, ",")) for line, text in enumerate(texts, start=11)]
-
-
-def blocks(*texts: str):
-    found = find_blocks(Path("a.csv"), rows(*texts), 0, {}, NEEDED)
-    return {
-        names: [(b.line, b.units, [line for line, _ in b.rows]) for b in each]
-        for names, each in found.items()
-    }
 
 
 @pytest.mark.parametrize(

@@ -122,18 +122,6 @@ def test_a_bomb_in_a_mat_file(tmp_path):
     assert "cannot be read; is it damaged?" in complaint(read_variables, path, ["X"])
 
 
-def assert_same(read, value):
-    if isinstance(value, dict):
-        (read,) = read
-        assert set(read) == set(value)
-        for key in value:
-            assert_same(read[key], value[key])
-    elif isinstance(value, str):
-        assert read == value
-    else:
-        np.testing.assert_array_equal(read, np.atleast_2d(value))
-
-
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
     (secret,) = dic_exports.istra4d(tmp_path, FRAMES)
     secret, path = secret.rename(tmp_path / "secret.hdf5"), tmp_path / "a.hdf5"

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.findings import registration_numbers
 from bubblefit.experiments.bubble.registration import (
     UNKNOWN,
     Placement,
@@ -120,10 +121,18 @@ def test_the_plane_goes_through_the_clamp_where_it_was_seen_and_its_motion_is_re
     assert found.motions[2].angle == pytest.approx(
         np.degrees(Rotation.from_euler("xyz", [0.4, -0.2, 0.6], degrees=True).magnitude()), abs=1e-3
     )
+    numbers = registration_numbers(found)
+    assert numbers["plane"] == {"of": "clamp", "deviation_mm": found.flatness}
+    assert numbers["centre"] == {"error_mm": found.rim.error}
+    assert numbers["warp"] == {"error_degrees": found.warp.error, "clear": found.warp.clear}
+    turns = [motion.angle for motion in found.motions]
+    told = {"removed": True, "shift_mm": pytest.approx(shift), "turn_degrees": turns}
+    assert numbers["clamp_motion"] == told
     options = RegistrationOptions(remove_clamp_motion=False)
     left, found = register(frames, (RADIUS, RADIUS), options)
     assert np.abs(left[2].displacement - BEYOND[2].displacement).max() > 1.0
     assert found.motions[2].angle > 0.5
+    assert not registration_numbers(found)["clamp_motion"]["removed"]
 
 
 def test_what_is_given_is_taken():
@@ -133,6 +142,8 @@ def test_what_is_given_is_taken():
     moved, found = register(FRAMES, (RADIUS, RADIUS), options)
     assert found.warp is None and found.rim is None and found.plane_of == "camera"
     assert found.warp_angle == pytest.approx(30.0)
+    said = registration_numbers(found)
+    assert (said["centre"], said["warp"]) == ("given", "given")
     expected = turned(30.0).places(FRAMES[0].points - (3.0, -2.0, 0.0))
     np.testing.assert_allclose(moved[0].points, expected, atol=1e-9)
     assert "not both" in complaint(RegistrationOptions, warp=1.0, warp_points=marks)

@@ -7,9 +7,6 @@ import pytest
 from bubblefit.readers.frames import FrameOptions, columns_of, heading_of, read_frames
 from bubblefit.readers.tables import decimal_mark, is_number, read_table, write_table
 from bubblefit.readers.text_frames import (
-    _quick,
-    _slow,
-    cells_of,
     find_layout,
     quantity_columns,
     read_numbers,
@@ -25,18 +22,6 @@ def layout(folder: Path, text: str, comment: str = "#", **named: str):
     path = folder / "a.txt"
     path.write_text(text)
     return find_layout(path, WANTED, named, comment)
-
-
-@pytest.mark.parametrize(
-    ("text", "separator", "cells"),
-    [
-        ("1 ;  2;", ";", ["1", "2", ""]), (" 1   2\t3 ", None, ["1", "2", "3"]),
-        ('"a;b"; "c" ;3', ";", ["a;b", "c", "3"]), ('"a b"  2 ', None, ["a b", "2"]),
-        ('"a";;"c"', ";", ["a", "", "c"]), ('"a;2', ";", None),
-    ],
-)  # fmt: skip
-def test_cells_of_a_line(text, separator, cells):
-    assert cells_of(text, separator) == cells
 
 
 @pytest.mark.parametrize(
@@ -173,26 +158,6 @@ def test_columns_that_cannot_be_told(tmp_path):
 
 ROWS = "x{0}y{0}dx{0}dy{0}dz{0}ok\n1{0}2{0}3{0}4{0}5{0}1\n6{0}7{0}{1}{0}9{0}10{0}0\n"
 COLUMNS = {"x": 0, "dx": 2}
-
-
-def numbers(way, found, flags=()):
-    done = way(found, COLUMNS, flags)
-    return done if done is None else ({k: v.tolist() for k, v in done[0].items()}, done[1].tolist())
-
-
-@pytest.mark.parametrize(
-    ("separator", "number"), [(",", "8.5"), (";", "8.5"), (";", "8,5"), ("\t", "8,5"), (" ", "8.5")]
-)
-def test_the_quick_way_reads_what_the_slow_one_does(tmp_path, separator, number):
-    found = layout(tmp_path, ROWS.format(separator, number))
-    expected = {"x": [1.0, 6.0], "dx": [3.0, 8.5]}
-    assert numbers(_quick, found) == (expected, [True, True])
-    slow, _ = _slow(Path("a"), found, COLUMNS, [])
-    assert {key: value.tolist() for key, value in slow.items()} == expected
-    for values, good in ((None, [True, False]), ((0,), [False, True]), ((0, 1), [True, True])):
-        kept = {key: [v for v, g in zip(e, good, strict=True) if g] for key, e in expected.items()}
-        assert numbers(_quick, found, [(5, values)]) == (kept, good)
-        assert _slow(Path("a"), found, COLUMNS, [(5, values)])[1].tolist() == good
 
 
 def test_rows_of_another_length_name_their_line(tmp_path):

@@ -26,8 +26,6 @@ from ..places import EXAMPLES, ROOT
 from ..projects import constant_strips, small, with_form
 
 RANGE = (0.13, 0.12, 0.1)
-LINE = """form = "spline"
-knots = 2"""
 
 
 class Line(Form):
@@ -150,20 +148,6 @@ def test_other_functions_become_cubics_that_are_near_enough():
     np.testing.assert_allclose(law.E1(strain), 400.0 * share + 150.0 * (1 - share), 2e-5)
     np.testing.assert_allclose(law.G12(strain), 10.0, 1e-12)
     assert not law.jumps and form.labels[0] == "G12 1" and form.modulus_of.count("E2") == 2
-
-
-def test_an_objective_and_its_optimum_do_not_depend_on_who_wrote_the_form(tmp_path):
-    built_in = easy(tmp_path, LINE)
-    own = built_in.with_form(Line)
-    (ours, y), (theirs, same) = (at_known(prepared(p)) for p in (built_in, own))
-    np.testing.assert_allclose(y, same, 1e-12)
-    one, other = ours.evaluate(y, True), theirs.evaluate(y, True)
-    assert other.value == pytest.approx(one.value, rel=1e-12)
-    np.testing.assert_allclose(other.jacobian, one.jacobian, rtol=1e-9, atol=1e-12)
-    first, second = bf.fit(built_in), bf.fit(own)
-    assert second.objective == pytest.approx(first.objective, rel=1e-9)
-    np.testing.assert_allclose(second.law.beta, first.law.beta, rtol=1e-7)
-    assert list(second.coefficients()["unknown"]) == list(second.law.form.labels)
 
 
 def test_a_card_is_read_without_the_class(tmp_path):

@@ -50,9 +50,9 @@ def fields():
     return MembraneSolver().run(MODEL, KNOWN).displacement
 
 
-def build(solver=None):
+def build():
     data = [FieldTarget(p, u) for p, u in zip(MODEL.pressures, fields(), strict=True)]
-    comparison = Comparison("bubble", MODEL, solver or MembraneSolver(), FieldObjective(data))
+    comparison = Comparison("bubble", MODEL, MembraneSolver(), FieldObjective(data))
     unknowns = Unknowns.of(Polynomial(0), KNOWN.nu12, [0.13] * 3, BOUNDS, [comparison])
     return FitProblem((comparison,), KNOWN, unknowns)
 
@@ -81,33 +81,10 @@ def test_jobs_and_order_do_not_change_a_start():
     assert study_with(1, [2])[2] == alone[2]
 
 
-class Dying(MembraneSolver):
-    def _analyse(self, *arguments):
-        os._exit(9)
-
-
-class Broken(MembraneSolver):
-    def _analyse(self, *arguments):
-        raise InputError("mesh.vtu", "quads", "made to fail")
-
-
-def build_failing():
-    raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
-
-
 def test_a_process_that_dies_is_noticed():
     with pytest.raises(BubblefitError, match="--resume") as caught:
-        list(run_starts(lambda: build(Dying()), FitOptions(), 1, [0, 1], 2))
+        list(run_tasks(lambda: lambda number, tell: os._exit(9), [0, 1], 2))
     assert caught.value.exit_code == 4
-
-
-def test_errors_cross_the_process_border_whole():
-    with pytest.raises(SolverFailure, match="no licence") as failure:
-        list(run_starts(build_failing, FitOptions(), 1, [0, 1], 2))
-    assert failure.value.exit_number == 3004 and failure.value.scratch == Path("/tmp/scratch")
-    with pytest.raises(InputError, match=r"mesh.vtu: quads: made to fail") as caught:
-        list(run_starts(lambda: build(Broken()), FitOptions(), 1, [0, 1], 2))
-    assert caught.value.field == "quads"
 
 
 def test_no_shared_memory_is_needed(monkeypatch):
@@ -290,13 +267,23 @@ def test_a_start_that_is_given_up_is_run_again_on_going_on(monkeypatch):
     assert record == lost
 
 
-def test_an_error_of_a_task_is_an_error_here(scheduler):
+@pytest.mark.parametrize("where", ["here", "on a cluster"])
+def test_errors_cross_the_process_border_whole(request, where):
     def task(number, tell):
-        raise InputError("mesh.vtu", "quads", "made to fail")
+        if number:
+            raise InputError("mesh.vtu", "quads", "made to fail")
+        raise SolverFailure("no licence", "marc", 3004, "last line", Path("/tmp/scratch"))
 
-    with pytest.raises(InputError, match=r"^mesh.vtu: quads: made to fail$") as caught:
-        tasks(scheduler, always(task), 2)
-    assert caught.value.field == "quads"
+    scheduler = None if where == "here" else request.getfixturevalue("scheduler")
+    for number, kind in enumerate((SolverFailure, InputError)):
+        with pytest.raises(kind) as caught:
+            list(Executor(2, scheduler).run_tasks(lambda: task, [number]))
+        if number:
+            assert str(caught.value) == "mesh.vtu: quads: made to fail"
+            assert caught.value.field == "quads"
+        else:
+            assert caught.value.exit_number == 3004
+            assert caught.value.scratch == Path("/tmp/scratch")
 
 
 def test_a_scheduler_that_goes_is_an_error_soon():

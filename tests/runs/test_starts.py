@@ -175,11 +175,6 @@ def fitted(folder):
     return fit
 
 
-@pytest.fixture(scope="module")
-def strips(strips_project):
-    return bf.fit(strips_project.with_fit(coarse_to_fine=True), jobs=1)
-
-
 def test_one_start_of_an_optimum_goes_on_to_the_full_mesh(fitted):
     first, *others = fitted.best.records
     assert [r.number for r in (first, *others)] == list(range(STARTS))

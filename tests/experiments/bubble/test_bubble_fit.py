@@ -18,14 +18,12 @@ from bubblefit.experiments.bubble import objective as places
 from bubblefit.experiments.bubble import prepared as preparation
 from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
-from bubblefit.experiments.bubble import test as bubble_test
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
-from bubblefit.experiments.bubble.point_files import PointFiles
-from bubblefit.experiments.bubble.prepared import INWARD, _same_steps_and_mesh, _sample, resampled
+from bubblefit.experiments.bubble.prepared import resampled
 from bubblefit.experiments.bubble.report import left_at_nodes, write_series
 from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
-from bubblefit.experiments.kinds import CardRun, Fabric, Output, Place, Weighting
+from bubblefit.experiments.kinds import CardRun, Output, Weighting
 from bubblefit.inference.comparison import Blocks
 from bubblefit.inference.noise import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
@@ -34,7 +32,6 @@ from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.meshes.mesh import Facet, FacetReading, SmoothReading
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
-from bubblefit.readers.frames import FrameOptions
 from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.runs.setup import prepare_fit
@@ -108,55 +105,6 @@ def test_what_a_study_looks_at():
     )
 
 
-AT = "p.toml: bubble[0].data.points"
-PLACE = Place(Path("p.toml"), "bubble[0]", Fabric("a fabric", 0.8))
-
-
-def made(match_by: str = "surfaces") -> Any:
-    return SimpleNamespace(
-        place=PLACE, pressures=(0.1,), outline="rim", match_by=match_by, match_degree=2
-    )
-
-
-@pytest.mark.parametrize(
-    ("stage", "error", "expected"),
-    [
-        ("read_fields", InputError(None, "files", "odd"), f"{AT}.files"),
-        ("read_fields", InputError("a.csv", "line 3", "odd"), "a.csv: line 3"),
-        ("register_fields", InputError(None, "", "far"), f"{AT}.registration"),
-        ("register_fields", InputError(None, "centre", "far"), f"{AT}.registration.centre"),
-    ],
-)
-def test_what_cannot_be_read_or_registered_names_its_key(monkeypatch, stage, error, expected):
-    files: Any = PointFiles(("a.csv",), FrameOptions(), "x", "asked")  # type: ignore[arg-type]
-
-    def failing(*_: Any, **__: Any) -> None:
-        raise error
-
-    monkeypatch.setattr(bubble_test, "read_fields", lambda *_, **__: ())
-    where = bubble_test if stage == "read_fields" else preparation
-    monkeypatch.setattr(where, stage, failing)
-    test = SimpleNamespace(**vars(made()), data=files, of_clamp=False)
-    assert complaint(preparation.read_measured, test).startswith(f"{expected}: ")
-
-
-@pytest.mark.parametrize(
-    ("steps", "elements", "same"),
-    [
-        ((0.1, 0.2), 48, True), ((0.1 * (1 + 1e-10), 0.2), 48, True), ((0.1, 0.2, 0.3), 48, False),
-        ((0.1,), 48, False), ((0.1 * (1 + 1e-8), 0.2), 48, False), ((1e-9, 0.2), 48, False),
-        ((0.1, 0.2), 108, False),
-    ],
-)  # fmt: skip
-def test_data_of_this_model_are_told_from_others(steps, elements, same):
-    test: Any = SimpleNamespace(
-        elements=48, increments=(0.1, 0.2),
-        model=lambda elements: SimpleNamespace(mesh=disk_mesh(100.0, elements)),
-    )  # fmt: skip
-    data: Any = SimpleNamespace(elements=elements, increments=steps)
-    assert _same_steps_and_mesh(test, data) is same
-
-
 def direct_e(model, data, shift=0.0):
     """Return e by Eqs 4.5 to 4.8 as they are printed."""
     total = 0.0
@@ -220,27 +168,6 @@ def test_the_same_places_from_other_nodes():
         np.testing.assert_allclose(here, there, atol=1.01e-2)
     inside = np.hypot(*OWN.points[:, :2].T) < 90.0
     np.testing.assert_allclose(every.at(OTHER.points)[inside], OWN.points[inside], atol=1e-9)
-
-
-def test_places_beyond_the_polygon_are_looked_for_farther_and_farther_in():
-    places = np.array([[50.0, 0.0], [100.0, 0.0]])
-
-    def tried(within):
-        asked = []
-
-        def look(at):
-            asked.append(at.copy())
-            return "matrix", at[:, 0] < within
-
-        assert _sample(SimpleNamespace(matrix=look), places) == "matrix"
-        assert all(at[0, 0] == 50.0 for at in asked) and places[1, 0] == 100.0
-        return [at[1, 0] for at in asked]
-
-    # Where the polygon has few edges (the sag of four in a quarter is 2 % of the radius).
-    every = [100.0, 99.99, 99.9, 99.0, 95.0, 100 * INWARD[-1]]
-    for within, count in ((101.0, 1), (99.95, 3), (99.5, 4), (97.0, 5), (91.0, 6)):
-        assert tried(within) == pytest.approx(every[:count])
-    assert "1 places" in complaint(tried, 90.0)
 
 
 @pytest.mark.parametrize("factor", [2.0, 1.6])

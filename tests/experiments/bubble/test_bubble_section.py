@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble import point_files
 from bubblefit.experiments.bubble.objective import (
     at_points,
     at_rest,
@@ -147,22 +146,6 @@ def test_bad_input_names_file_and_field(edit, tmp_path, old, new, words):
 )
 def test_bad_point_files(edit, old, new, words):
     complaint_with(words, edit, old, new, source=VALMEX / "test1-linear.toml", need_data=False)
-
-
-def test_files_that_cannot_be_had_are_named_with_what_to_do(tmp_path):
-    def section(*files):
-        return SimpleNamespace(files=list(files), pattern=None, indices=None, folder="")
-
-    place = replace(PLACE, path=tmp_path / "p.toml")
-    words = [f"{tmp_path / 'p.toml'}: bubble[0].data.points.files", "--data DIR"]
-    complaint_with([*words, "f*.csv"], point_files._files, section("f*.csv"), place)
-    (tmp_path / "f1.csv").write_text("")
-    both = section("f1.csv", "f*.csv")
-    complaint_with([*words, "f1.csv is given twice"], point_files._files, both, place)
-    # A forward analysis does without a pattern's files, not without sense.
-    place = replace(place, need_data=False)
-    assert point_files._files(section("g*.csv"), place) == ()
-    complaint(point_files._files, both, place)
 
 
 PLACE = Place(Path("p.toml"), "bubble[0]", Fabric("a fabric", 0.8))
@@ -365,7 +348,7 @@ class Other(MembraneSolver):
 @pytest.mark.parametrize(
     ("said", "crime"),
     [('solver = "membrane"\nelements = 48\nsymmetry = "full"\n', True), ("elements = 108\n", False),
-     ('solver = "other"\n', False)],
+     ('solver = "other"\n', False), ("increments = [6, 41]\n", False)],
 )  # fmt: skip
 def test_the_inverse_crime(tmp_path, monkeypatch, said, crime):
     monkeypatch.setitem(registry.SOLVERS, "other", Other)

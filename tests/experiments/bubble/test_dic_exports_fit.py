@@ -8,7 +8,6 @@ import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import KIND
-from bubblefit.experiments.bubble.findings import registration_numbers
 from bubblefit.experiments.bubble.point_files import PointFiles
 from bubblefit.experiments.bubble.report import ASKED, correlation_table
 from bubblefit.experiments.bubble.section import CorrelationSection
@@ -118,43 +117,6 @@ def test_bad_settings_are_named(seen, more, key):
         KIND.prepare(test, law_of(project, [test.reach]), MembraneSolver)
 
     assert f"bubble[0].data.points.registration{key}" in complaint(prepare)
-
-
-MOTIONS = (
-    SimpleNamespace(points=9, shift=np.array([0.3, 0.4, 0.0]), angle=0.25),
-    SimpleNamespace(points=0, shift=np.array([9.0, 9.0, 9.0]), angle=9.0),
-    SimpleNamespace(points=4, shift=np.array([0.0, 0.0, 0.1]), angle=0.75),
-)
-
-
-def found(**other: Any) -> Any:
-    said = {
-        "placement": SimpleNamespace(
-            origin=np.array([1.234, -5.678, 600.0]), axes=np.eye(3), tilt=1.456
-        ),
-        "rim": SimpleNamespace(error=0.123), "warp": SimpleNamespace(error=0.456, clear=0.87),
-        "warp_angle": 12.346, "plane_of": "clamp", "flatness": 0.0678, "motions": MOTIONS,
-        "options": SimpleNamespace(remove_clamp_motion=True, warp_is_stiff=True),
-    }  # fmt: skip
-    return SimpleNamespace(**(said | other))
-
-
-def test_numbers():
-    assert registration_numbers(found()) == {
-        "origin_mm": [1.234, -5.678, 600.0], "axes": np.eye(3).tolist(),
-        "plane": {"of": "clamp", "deviation_mm": 0.0678}, "tilt_degrees": 1.456,
-        "centre": {"error_mm": 0.123}, "warp_degrees": 12.346,
-        "warp": {"error_degrees": 0.456, "clear": 0.87},
-        "clamp_motion": {
-            "removed": True, "shift_mm": pytest.approx([0.5, 0.1]), "turn_degrees": [0.25, 0.75],
-        },
-    }  # fmt: skip
-    left = SimpleNamespace(remove_clamp_motion=False, warp_is_stiff=True)
-    bare = registration_numbers(found(rim=None, warp=None, options=left))
-    assert (bare["centre"], bare["warp"]) == ("given", "given")
-    assert bare["clamp_motion"]["removed"] is False
-    unseen = registration_numbers(found(motions=MOTIONS[1:2]))["clamp_motion"]
-    assert unseen == {"removed": False, "shift_mm": [], "turn_degrees": []}
 
 
 def read(seen, more: str) -> bf.Project:

@@ -383,6 +383,3 @@ def test_curves_end_where_the_range_of_the_card_does(tmp_path, drawn, monkeypatc
     ((_, _, (panel,)),) = drawn["loads"]
     assert [len(model[1]) for model in panel.models] == [shown] * bool(shown)
     assert len(pd.read_csv(tmp_path / "loads.csv")) == 2
-
-
-# Cards that the membrane runs

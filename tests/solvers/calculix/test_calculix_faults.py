@@ -19,7 +19,6 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.process import Outcome
 
 from ...commands import interrupted
-from ...complaints import complaint
 from ...projects import BUBBLE
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
@@ -71,10 +70,7 @@ def gone(pid, seconds=5.0):
     return False
 
 
-def test_programs_that_are_none(tmp_path, monkeypatch):
-    assert "no such file" in complaint(CalculixSolver(ccx=tmp_path / "none").run, model(), LAW)
-    with pytest.raises(SolverFailure, match="cannot load material libraries"):
-        CalculixSolver(ccx="/bin/true").run(model(), LAW)
+def test_a_program_of_another_machine(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "material_library", lambda: tmp_path / "libBUBBLEFIT.so")
     (tmp_path / "ccx").write_bytes(b"\x00\x01\x02 of another machine")
     (tmp_path / "ccx").chmod(0o755)
@@ -202,15 +198,6 @@ def test_progress_is_told_while_it_runs(fake, results, tmp_path):
     (tmp_path / "job.sta").write_text(STA[:-40])
     assert [i.increment for i in increments(tmp_path / "job.sta")] == [1]
     assert increments(tmp_path / "none.sta") == []
-
-
-def test_a_law_that_cannot_converge(ccx, tmp_path):
-    beta = LAW.beta.copy()
-    beta[10:12] = -8e4, 800.0
-    with pytest.raises(SolverFailure) as found:
-        CalculixSolver(element="S4", scratch=tmp_path).run(model(), HypoelasticLaw(beta))
-    assert "did not converge at" in found.value.reason
-    assert found.value.exit_number == 201 and found.value.scratch.parent == tmp_path
 
 
 PROJECT = f"""{BUBBLE}
