@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -102,28 +102,13 @@ def source_of(
 
 
 def measured(
-    found: MachineTable, column: str, kind: str, units: dict[str, float], asked: str | None
+    found: MachineTable, column: str, kind: str, units: Mapping[str, float], asked: str | None
 ) -> Array:
     """Return a column (rows,) in mm or N; `asked`, the caller's unit, must be the file's."""
-    path, at, known = found.table.path, f"line {found.header}, column {column!r}", ", ".join(units)
     if asked is not None and asked not in units:
+        known = ", ".join(units)
         raise InputError(None, f"{kind}_unit", f"expected one of {known}, got {asked!r}")
-    unit = found.units[column]
-    if not unit and asked is None:
-        problem = f"the file does not name the unit; say {kind}_unit, one of {known}"
-        raise InputError(path, at, problem)
-    scale = tables.scale_of(unit or asked or "", units)
-    if scale is None:
-        problem = f"unit {unit[:20]!r} is not one of {known}; convert the column"
-        raise InputError(path, at, problem)
-    if asked is not None and scale != units[asked]:
-        problem = f"the file says {unit!r}, {kind}_unit says {asked!r}; correct one of them"
-        raise InputError(path, at, problem)
-    with np.errstate(over="ignore"):
-        value = found.table.numbers(column) * scale
-    if not np.isfinite(value).all():
-        raise InputError(path, at, f"numbers too large; is the unit {unit or asked!r} right?")
-    return value
+    return channel_values(found, column, Channel(unit=asked), units, f"{kind}_unit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,18 +154,8 @@ def read_times(
 
 
 def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
-    """Return the column of times in s; where no unit is named, they are seconds."""
-    name = column_of(found, "time", named, needed)
-    at_the_end = re.search(rf"[_\s]({'|'.join(tables.TIME_UNITS)})$", name)
-    unit = found.units[name] or (at_the_end[1] if at_the_end else "s")
-    if unit not in tables.TIME_UNITS:
-        at = f"line {found.header}, column {name!r}"
-        problem = (
-            f"unit {unit[:20]!r} is not one of {', '.join(tables.TIME_UNITS)}; convert the column"
-        )
-        raise InputError(found.table.path, at, problem)
-    stamps = found.table.stamps(name)
-    return found.table.numbers(name) * tables.TIME_UNITS[unit] if stamps is None else stamps
+    column = column_of(found, "time", named, needed)
+    return channel_values(found, column, AS_FOUND, tables.TIME_UNITS)
 
 
 def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
@@ -213,19 +188,28 @@ AS_FOUND = Channel()
 
 
 def channel_values(
-    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float]
+    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float], key: str = ""
 ) -> Array:
-    """Return a column (rows,), converted by the table `units`."""
-    path, at = found.table.path, f"line {found.header}, column {column!r}"
-    if units is tables.TIME_UNITS and (stamps := found.table.stamps(column)) is not None:
-        return stamps
-    return in_unit(found.table.numbers(column), found.units[column], channel, units, path, at)
+    """Return a column (rows,), converted by the table `units`; times without a unit are in s."""
+    own, at = found.units[column], f"line {found.header}, column {column!r}"
+    if units is tables.TIME_UNITS:
+        if (stamps := found.table.stamps(column)) is not None:
+            return stamps
+        at_the_end = re.search(rf"[_\s]({'|'.join(units)})$", column)
+        own = own or (at_the_end[1] if at_the_end else "")
+        channel = channel if own or channel.unit else replace(channel, unit="s")
+    readings = found.table.numbers(column)
+    return in_unit(readings, own, channel, units, found.table.path, at, key)
 
 
 def in_unit(
-    readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str
-) -> Array:
-    """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units."""
+    readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str,
+    key: str = "",
+) -> Array:  # fmt: skip
+    """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units.
+
+    key : the caller's name of the channel's unit.
+    """
     known, said = ", ".join(units), tables.scale_of(own, units) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
@@ -234,12 +218,16 @@ def in_unit(
     unit = channel.unit or ("" if raw and said is None else own)
     if not unit:
         what = "after scaling" if raw else "of the readings"
-        raise InputError(path, at, f"say the unit {what}, one of {known}")
+        raise InputError(path, at, f"say {key or 'the unit'} {what}, one of {known}")
     scale = tables.scale_of(unit, units)
     if scale is None:
         advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
         raise InputError(path, at, f"unit {unit[:20]!r} is not one of {known}; {advice}")
     if channel.unit and own and (not raw or said is not None) and said != scale:
-        problem = f"the file says {own!r}, the project {channel.unit!r}; correct one of them"
-        raise InputError(path, at, problem)
-    return (factor * readings + channel.offset) * scale
+        asked = f"{key or 'the project'} {channel.unit!r}"
+        raise InputError(path, at, f"the file says {own!r}, {asked}; correct one of them")
+    with np.errstate(over="ignore"):
+        value = (factor * readings + channel.offset) * scale
+    if not np.isfinite(value).all():
+        raise InputError(path, at, f"numbers too large; is the unit {unit!r} right?")
+    return np.asarray(value)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -67,10 +67,8 @@ def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> Pressur
     found = read_machine_table(path, asked, options.format)
     columns = {key: column_of(found, key, named, asked.quantities) for key in channels}
     pressure = channel_values(found, columns["pressure"], options.pressure, tables.PRESSURE_UNITS)
-    column, clock = columns["time"], options.time
-    if not found.units[column] and clock.unit is None:
-        clock = replace(clock, unit="s")
-    time = channel_values(found, column, clock, tables.TIME_UNITS)
+    column = columns["time"]
+    time = channel_values(found, column, options.time, tables.TIME_UNITS)
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         at = f"line {found.table.lines[back[0] + 1]}, column {column!r}"
@@ -85,10 +83,6 @@ def apex_height(frame: Frame) -> float:
     moved = np.linalg.norm(frame.displacement, axis=1)
     moved = moved[np.isfinite(moved)]
     return float(np.quantile(moved, APEX)) if len(moved) else float("nan")
-
-
-def apex_heights(frames: Sequence[Frame]) -> Array:
-    return np.array([apex_height(frame) for frame in frames])
 
 
 #: So many frames tell something, and so large a share of them lies within the log.
@@ -462,15 +456,14 @@ VOLTS, LONGEST = ("V", "mV"), 1000
 def values_in_file(path: Path, channel: Channel, units: Mapping[str, float]) -> Array:
     """Return what `channel.column` names: a column, or a line above the numbers."""
     name = channel.column or ""
-    lines = tables.read_lines(
-        path, "", any_encoding=True
-    )  # with comments: a value may stand in one
+    # With comments: a value may stand in one.
+    lines = tables.read_lines(path, "", any_encoding=True)
     found = _in_column(path, lines, name) or _above(path, lines, name, (*units, *VOLTS))
     if found is None:
         says = f"neither a column {name!r} nor a line above the numbers that says {name!r}"
         raise InputError(path, "", f"{says} and a value")
     values, unit, at = found
-    return np.asarray(in_unit(np.array(values), unit, channel, units, path, at))
+    return in_unit(np.array(values), unit, channel, units, path, at)
 
 
 def _in_column(path: Path, lines: Lines, name: str) -> tuple[list[float], str, str] | None:

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date
-from io import StringIO
 from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -150,24 +149,19 @@ def read_table(path: Path | str, comment: str = "#") -> TextTable:
     if len(numbered) < 2:
         found = "only a header line" if numbered else "nothing"
         raise InputError(path, "", f"expected a header line and rows of numbers, found {found}")
-    letters = sum(len(text) for _, text in numbered)
-    check_width(path, numbered[0][0], numbered[0][1].count(",") + 1, len(numbered), letters)
-    lines = np.array([number for number, _ in numbered])
-    body = StringIO("\n".join(text for _, text in numbered))
-    try:
-        # Everything as text: what is not a number is then found with its line. header=None:
-        # with a header, pandas takes surplus first cells for row names and shifts the rest.
-        # C engine, and no quoting across lines, so that rows and lines stay in step.
-        cells = pd.read_csv(
-            body, header=None, dtype=str, keep_default_na=False, skip_blank_lines=False
-        )
-    except (ValueError, OverflowError) as error:
-        raise InputError(path, *_complaint(error, lines)) from None
-    if len(cells) != len(lines):
-        raise InputError(path, "", "a quotation mark that is opened and not closed on its line")
-    cells = cells.fillna("")
-    header = [str(name).strip() for name in cells.iloc[0]]
-    return TextTable(path, cells.iloc[1:].set_axis(header, axis=1), lines[1:])
+    rows = []
+    for number, text in numbered:
+        try:
+            rows.append(next(csv.reader([text], strict=True)))
+        except csv.Error as error:
+            problem = f"a quotation mark that is not closed, or too long a cell ({error})"
+            raise InputError(path, f"line {number}", problem) from None
+        check_row(path, number, rows[-1], len(rows[0]), ",", "the header")
+    lines, header = np.array([number for number, _ in numbered]), [name.strip() for name in rows[0]]
+    width = len(header)
+    check_width(path, lines[0], width, len(rows), sum(len(text) for _, text in numbered))
+    whole = [(row + [""] * width)[:width] for row in rows[1:]]
+    return TextTable(path, pd.DataFrame(whole, columns=header, dtype=str), lines[1:])
 
 
 def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> list[tuple[int, str]]:
@@ -192,19 +186,6 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
         raise InputError(path, "", f"is not a text file; {save}")
     kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
-
-
-def _complaint(error: Exception, lines: NDArray[np.intp]) -> tuple[str, str]:
-    """Return place and problem of an error of pandas, which counts the lines it was given."""
-    text, at = " ".join(str(error).split()), ""
-    if found := re.search(r"(line|row) (\d+)", text):
-        index = int(found[2]) - (found[1] == "line")  # "row" counts from 0, "line" from 1
-        at = f"line {lines[min(max(index, 0), len(lines) - 1)]}"
-    if found := re.search(r"Expected (\d+) fields in line \d+, saw (\d+)", text):
-        return at, f"expected {found[1]} cells as in the header, found {found[2]}"
-    if "EOF inside string" in text:
-        return at, "a quotation mark that is opened and not closed"
-    return at, f"is not a comma-separated table ({text[:200]})"
 
 
 def write_table(

@@ -48,7 +48,7 @@ def pressures_by_log(
     for one in files:
         # One file at a time: all frames of a test need not be in memory at once.
         frames = read_frames([one], options, format)
-        risen = pressure_log.apex_heights(frames).tolist()
+        risen = [pressure_log.apex_height(frame) for frame in frames]
         own += [frame.number for frame in frames]
         heights += risen
         several = [f"{one.name}, frame {i + 1}" for i in range(len(risen))]

@@ -8,7 +8,6 @@ blocks with the same names.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,28 +20,15 @@ from ...errors import InputError
 from .. import tables
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
+from ..text_frames import SEPARATORS, cells_of
 
 #: Line number from 1 and cells.
 Rows = list[tuple[int, list[str]]]
-SEPARATORS = ("\t", ";", ",")
 UNITS = {*tables.LENGTH_UNITS, *tables.LOAD_UNITS, *tables.TIME_UNITS, *tables.OTHER_NAMES}
 #: Rows between the names and the first numbers: units, and sometimes channels or types.
 BETWEEN = 2
 _LETTERS = re.compile(r"[^\W\d_]")
 _LETTER = re.compile(r"[^\W\d_eE]")
-
-
-def cells_of(text: str, separator: str) -> list[str]:
-    """Return the cells of one line; a blank stands for any number of blanks."""
-    if separator == " ":
-        return text.split()
-    # Line by line: a quotation mark left open must not swallow the rest of the file.
-    if '"' not in text:
-        return [cell.strip() for cell in text.split(separator)]
-    try:
-        return [cell.strip() for cell in next(csv.reader([text], delimiter=separator))]
-    except csv.Error:
-        return [text]
 
 
 def find_header(rows: Rows, named: Mapping[str, str], quantities: Sequence[str]) -> int | None:
@@ -179,11 +165,11 @@ def nothing_found(
     problem = f"no header row with the columns {what}; name them with columns"
     for index, ((number, text), (_, below)) in enumerate(pairwise(lines)):
         for separator in SEPARATORS:
-            names, row = cells_of(text, separator), cells_of(below, separator)
+            names, row = (cells_of(line, separator) or [line] for line in (text, below))
             if sum(map(tables.is_number, row)) >= 2:
-                higher = cells_of(lines[index - 1][1], separator) if index else []
+                higher = cells_of(lines[index - 1][1], separator) if index else None
                 # Names stand above their units.
-                if len(higher) == len(names) and any(c in UNITS for c in _units_in(names)):
+                if higher and len(higher) == len(names) and UNITS & {*_units_in(names)}:
                     number, names = lines[index - 1][0], higher
                 heads = ", ".join(name for name in names if name)[:200]
                 return f"{problem}; line {number}, above the first numbers, has: {heads}"
@@ -194,11 +180,11 @@ def read(path: Path, options: TableOptions) -> MachineTable:
     """Read the first table with all quantities asked for; InputError: none, or in doubt."""
     named, quantities = options.columns, options.quantities
     lines = tables.read_lines(path, options.comment, any_encoding=True)
-    found: list[tuple[int, Rows, int, str]] = []
-    for separator in (*SEPARATORS, " "):
-        if found and separator == " ":
+    found: list[tuple[int, Rows, int, str | None]] = []
+    for separator in SEPARATORS:
+        if found and separator is None:
             break
-        rows = [(number, cells_of(text, separator)) for number, text in lines]
+        rows = [(number, cells_of(text, separator) or [text]) for number, text in lines]
         index = find_header(rows, named, quantities)
         if index is not None:
             found.append((len(rows[index][1]), rows, index, separator))
@@ -209,7 +195,7 @@ def read(path: Path, options: TableOptions) -> MachineTable:
 
 
 def table_of(
-    path: Path, rows: Rows, index: int, options: TableOptions, separator: str | None = None
+    path: Path, rows: Rows, index: int, options: TableOptions, separator: str | None = ";"
 ) -> MachineTable:
     """Return the table whose names stand in the row `index`, or one below that has more rows."""
     import pandas as pd
@@ -223,9 +209,7 @@ def table_of(
     if not rest:
         raise InputError(path, f"line {header}", "no rows of numbers below these names")
     for number, row in rest:
-        blanks = separator == " "
-        own = None if blanks else separator
-        tables.check_row(path, number, row, width, own, f"line {header}", short=blanks)
+        tables.check_row(path, number, row, width, separator, f"line {header}", short=True)
     tables.check_width(path, header, width, len(rest), sum(len(row) for _, row in rest))
     rest = [(number, (row + [""] * width)[:width]) for number, row in rest]
     above = dict(rows).get(max((n for n, _ in rows if n < header), default=0), [])
