@@ -28,45 +28,29 @@ from typing import Any, ClassVar
 import numpy as np
 
 from .base import EVEN, Array, Offer, register_form
-from .spline import Spline, spline_named
+from .spline import Spline, knots_of
 
-GAINS, CRIMP = ("dE2", "dE1"), ("T1", "T2", "S")
 #: The steepest slope of a yarn without load: 45 degrees would be 0.7 in this measure.
 STEEPEST = 0.5
 
 
-@dataclass(frozen=True)
-class _MoreThanSpline:
-    """A spline, followed by what `more` names."""
+class _MoreThanSpline(Spline):
+    """A spline, followed by what `more` names, each of a modulus or bound in `of_more`."""
 
-    spline: Spline
-
-    more: ClassVar[tuple[str, ...]] = ()
+    more: ClassVar[tuple[str, ...]]
+    of_more: ClassVar[tuple[str, ...]]
 
     @property
     def size(self) -> int:
-        return self.spline.size + len(self.more)
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        return tuple(range(self.size))
+        return super().size + len(self.more)
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return (*self.spline.labels, *self.more)
+        return (*super().labels, *self.more)
 
-    def piece_map(self) -> Array:
-        whole = self.spline.piece_map()
-        return np.concatenate([whole, np.zeros((*whole.shape[:-1], len(self.more)))], axis=-1)
-
-    def uppers(self) -> Array:
-        return self.spline.uppers()
-
-    def grid(self, component: int, end: float) -> Array:
-        return self.spline.grid(component, end)
-
-    def to_card(self) -> dict[str, Any]:
-        return self.spline.to_card()
+    @property
+    def modulus_of(self) -> tuple[str, ...]:
+        return (*super().modulus_of, *self.of_more)
 
 
 @dataclass(frozen=True)
@@ -74,11 +58,7 @@ class SplineRatio(_MoreThanSpline):
     """A spline at equal loads, followed by the gains of E2 and E1 by their load ratios."""
 
     name = "spline-ratio"
-    more = GAINS
-
-    @property
-    def modulus_of(self) -> tuple[str, ...]:
-        return (*self.spline.modulus_of, "E2", "E1")
+    more, of_more = ("dE2", "dE1"), ("E2", "E1")
 
     def by_load_ratio(self) -> Array:
         whole = np.zeros((2, self.size))
@@ -88,14 +68,14 @@ class SplineRatio(_MoreThanSpline):
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from moduli at the knots, and at rest where one yarn carries all."""
         whole, share = np.eye(self.size), 1.0 / (1.0 - EVEN)
-        first = self.spline.modulus_of.index
+        first = self.modulus_of.index
         for place, name in ((-2, "E2"), (-1, "E1")):
             whole[place, first(name)], whole[place, place] = -share, share
         return whole
 
     def describe(self) -> str:
         return (
-            f"{self.spline.describe()} E2 and E1 are those at equal loads; dE2 and dE1 are what "
+            f"{super().describe()} E2 and E1 are those at equal loads; dE2 and dE1 are what "
             "they gain where their load ratio n / sqrt(n1^2 + n2^2) goes from 0 to 1."
         )
 
@@ -105,15 +85,11 @@ class SplineCrimp(_MoreThanSpline):
     """A spline of yarns without exchange, followed by T1, T2 and S of their crimp interchange."""
 
     name = "spline-crimp"
-    more = CRIMP
+    more, of_more = ("T1", "T2", "S"), ("T", "T", "S")
     #: Least and largest, MPa: of slopes times S, and of S.
     own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
         "T": (0.01, 30.0), "S": (0.5, 200.0)
     }  # fmt: skip
-
-    @property
-    def modulus_of(self) -> tuple[str, ...]:
-        return (*self.spline.modulus_of, "T", "T", "S")
 
     def by_crimp(self) -> Array:
         return np.eye(self.size)[-3:]
@@ -130,7 +106,7 @@ class SplineCrimp(_MoreThanSpline):
 
     def describe(self) -> str:
         return (
-            f"{self.spline.describe()} E2 and E1 are those without exchange of crimp; then T1 and "
+            f"{super().describe()} E2 and E1 are those without exchange of crimp; then T1 and "
             "T2, slopes of the yarns times S, and S, the stress of the bed of the crossings."
         )
 
@@ -139,8 +115,8 @@ for _form in (SplineRatio, SplineCrimp):
 
     def _named(
         name: str, settings: Mapping[str, Any], strain_range: Sequence[float],
-        made: type[_MoreThanSpline] = _form,
-    ) -> _MoreThanSpline:  # fmt: skip
-        return made(spline_named(name, settings, strain_range))
+        made: type[Spline] = _form,
+    ) -> Spline:  # fmt: skip
+        return made.at(knots_of(settings, strain_range))
 
-    register_form(Offer(_form.name, _named, ("knots",), of_load_ratio=True))  # type: ignore[arg-type]
+    register_form(Offer(_form.name, _named, ("knots",), of_load_ratio=True))

@@ -1,6 +1,6 @@
 """Moduli in pieces: splines by knots; tri-linear (Ambroziak and Klosowski); forms of one's own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -141,28 +141,30 @@ def _increasing(row: Any) -> bool:
     return bool(row[0] == 0 and rising and row[-1] < UNLIMITED)
 
 
-def spline_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Spline:
-    """Return the form of `knots`: a number, strains, or either by direction."""
+def knots_of(settings: Mapping[str, Any], strain_range: Sequence[float]) -> list[list[float]]:
+    """Return the rows of `knots`: a number, strains, or either by direction."""
     given = settings.get("knots")
     if given is None:
         raise InputError(None, "knots", "a spline needs knots = 6, or {warp = [0, ...], ...}")
-    if isinstance(given, Mapping):
-        for key in given:
-            if key not in STRAIN_NAMES:
-                problem = f"unknown direction; allowed: {', '.join(STRAIN_NAMES)}"
-                raise InputError(None, f"knots.{key}", problem)
-    rows = []
-    for key, end in zip(STRAIN_NAMES, strain_range, strict=True):
-        own, field = (
-            (given.get(key), f"knots.{key}") if isinstance(given, Mapping) else (given, "knots")
-        )
-        rows.append(_row(own, field, float(end)))
-    return Spline.at(rows)
+    if not isinstance(given, Mapping):
+        return [_row(given, "knots", float(end)) for end in strain_range]
+    ends = zip(_by_direction("knots", given), strain_range, strict=True)
+    return [_row(own, f"knots.{key}", float(end)) for (key, own), end in ends]
+
+
+def _by_direction(name: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield direction and value of each strain; InputError: one is missing, or not known."""
+    for key in given:
+        if key not in STRAIN_NAMES:
+            problem = f"unknown direction; allowed: {', '.join(STRAIN_NAMES)}"
+            raise InputError(None, f"{name}.{key}", problem)
+    for key in STRAIN_NAMES:
+        if key not in given:
+            raise InputError(None, f"{name}.{key}", "this key is missing")
+        yield key, given[key]
 
 
 def _row(own: Any, field: str, end: float) -> list[float]:
-    if own is None:
-        raise InputError(None, field, "this key is missing")
     if isinstance(own, int) and not isinstance(own, bool):
         if not 2 <= own <= MOST_KNOTS:
             raise InputError(None, field, f"expected 2 to {MOST_KNOTS} knots, got {own}")
@@ -179,6 +181,11 @@ def _row(own: Any, field: str, end: float) -> list[float]:
         problem = f"expected at most {MOST_KNOTS} knots, the last at the end {end:g} of the range"
         raise InputError(None, field, f"{problem} or before it, got {own}")
     return [float(x) for x in own]
+
+
+def spline_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Spline:
+    """Return the spline of `knots`."""
+    return Spline.at(knots_of(settings, strain_range))
 
 
 register_form(Offer("spline", spline_named, ("knots",)))
@@ -202,21 +209,16 @@ class TriLinear:
     modulus_of = tuple(name for name in ORDER for _ in range(3))
 
     @classmethod
-    def at(cls, breaks: ArrayLike) -> Self:
+    def at(cls, breaks: Sequence[Sequence[float]]) -> Self:
         """Return the form with breaks (3, 2); raise InputError unless positive and increasing."""
-        try:
-            pairs = np.array(breaks, dtype=float)
-        except (TypeError, ValueError):
-            pairs = np.empty(0)
-        good = pairs.shape == (3, 2) and np.isfinite(pairs).all()
-        if not good or not (pairs[:, 0] > 0).all() or not (np.diff(pairs) > 0).all():
-            raise InputError(
-                None,
-                "breaks",
-                "expected two positive, increasing strains for each of (eps1, eps2, gamma12), "
-                f"got {' '.join(str(breaks).split())}",
-            )
-        first, second, third = ((float(a), float(b)) for a, b in pairs)
+        if len(breaks) != 3:
+            raise InputError(None, "breaks", f"expected those of 3 strains, got {len(breaks)}")
+        for key, pair in zip(STRAIN_NAMES, breaks, strict=True):
+            two = isinstance(pair, (list, tuple, np.ndarray)) and len(pair) == 2
+            if not two or not _increasing([0.0, *pair]):
+                problem = f"expected [first, second], 0 < first < second, got {pair}"
+                raise InputError(None, f"breaks.{key}", problem)
+        first, second, third = ((float(a), float(b)) for a, b in breaks)
         return cls((first, second, third))
 
     @property
@@ -264,27 +266,7 @@ def trilinear_named(
     if not isinstance(breaks, Mapping):
         problem = "a trilinear law needs breaks = {warp = [first, second], fill = ..., shear = ...}"
         raise InputError(None, "breaks", problem)
-    for key in breaks:
-        if key not in STRAIN_NAMES:
-            problem = f"unknown direction; allowed: {', '.join(STRAIN_NAMES)}"
-            raise InputError(None, f"breaks.{key}", problem)
-    pairs = []
-    for key in STRAIN_NAMES:
-        if key not in breaks:
-            raise InputError(None, f"breaks.{key}", "this key is missing")
-        pair = breaks[key]
-        if not _rising(pair):
-            problem = f"expected [first, second], 0 < first < second, got {pair}"
-            raise InputError(None, f"breaks.{key}", problem)
-        pairs.append(pair)
-    return TriLinear.at(pairs)
-
-
-def _rising(pair: Any) -> bool:
-    numbers = isinstance(pair, (list, tuple)) and len(pair) == 2
-    if not numbers or not all(type(x) in (int, float) for x in pair):
-        return False
-    return bool(0 < pair[0] < pair[1] < UNLIMITED)
+    return TriLinear.at([pair for _, pair in _by_direction("breaks", breaks)])
 
 
 register_form(Offer("trilinear", trilinear_named, ("breaks",)))

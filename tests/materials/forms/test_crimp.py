@@ -19,7 +19,7 @@ from scipy.integrate import quad
 from ...complaints import complaint
 from .test_forms import follow
 
-FORM = SplineCrimp(Spline.at([[0.0, 0.06, 0.12]] * 3))
+FORM = SplineCrimp.at([[0.0, 0.06, 0.12]] * 3)
 #: MPa: G12, E2 and E1 at three knots; T1, T2 and S.
 BETA = np.array([20.0, 25.0, 30.0, 300.0, 250.0, 400.0, 500.0, 450.0, 600.0, 1.5, 2.5, 12.0])
 STIFF = np.array([20.0] * 3 + [300.0] * 3 + [500.0] * 3 + [1.5, 2.5, 12.0])
@@ -60,7 +60,7 @@ def test_a_yarn_pulled_alone_gains_what_it_has_and_two_stiffen_each_other():
     alone = biaxial_response(law_of(), [[0.0, 5.0]], 1.0).strain[-1, 1]
     assert biaxial_response(law_of(), [[5.0, 5.0]], 1.0).strain[-1, 1] < 0.7 * alone
     none = law_of([*BETA[:-3], 1e-9, 1e-9, 12.0])
-    plain = HypoelasticLaw(BETA[:-3], 0.2, [0.12] * 3, form=FORM.spline)
+    plain = HypoelasticLaw(BETA[:-3], 0.2, [0.12] * 3, form=Spline(FORM.knots))
     path = np.random.default_rng(1).normal(0.0, 0.02, (6, 3))
     np.testing.assert_allclose(follow(none, path), follow(plain, path), rtol=1e-7)
 

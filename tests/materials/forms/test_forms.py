@@ -97,7 +97,7 @@ LAWS = {
     ),
     "spline-ratio": HypoelasticLaw(
         np.array([*OF_STRAIN["spline"].beta, 40.0, -150.0]), 0.24, RANGE,
-        form=SplineRatio(Spline.at(KNOTS)),
+        form=SplineRatio.at(KNOTS),
     ),
 }  # fmt: skip
 FORMS = pytest.mark.parametrize("name", LAWS)
@@ -242,7 +242,7 @@ BAD = [
     *(("spline", {"knots": {"warp": 4, "fill": wrong, "shear": 4}}, "knots.fill")
       for wrong in ([0.01, 0.1], [0.0, 0.1, 0.1], [0.0], [0.0, float("nan")])),
     ("trilinear", {}, "breaks"), ("trilinear", {"breaks": [[0.1, 0.2]] * 3}, "breaks"),
-    ("trilinear", {"breaks": {"warp": [0.1, 0.2], "fill": [0.2, 0.1]}}, "breaks.fill"),
+    ("trilinear", {"breaks": {"warp": [0.1, 0.2], "fill": [0.2, 0.1]}}, "breaks.shear"),
 ]  # fmt: skip
 
 

@@ -31,10 +31,10 @@ KNOTTED, ENDS = spline(), np.full(3, 0.13)
 LAWS = LAWS | {
     "load ratio": HypoelasticLaw(np.array([30.0, 800.0, 400.0, 1000.0, -300.0]), form=LoadRatio()),
     "spline, load ratio": HypoelasticLaw(
-        np.array([*KNOTTED.beta, 40.0, -30.0]), 0.24, ENDS, form=SplineRatio(KNOTTED.form)
+        np.array([*KNOTTED.beta, 40.0, -30.0]), 0.24, ENDS, form=SplineRatio(KNOTTED.form.knots)
     ),
     "spline, crimp": HypoelasticLaw(
-        np.array([*KNOTTED.beta, 1.5, 2.5, 12.0]), 0.24, ENDS, form=SplineCrimp(KNOTTED.form)
+        np.array([*KNOTTED.beta, 1.5, 2.5, 12.0]), 0.24, ENDS, form=SplineCrimp(KNOTTED.form.knots)
     ),
 }
 

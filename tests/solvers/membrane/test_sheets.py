@@ -7,7 +7,6 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.forms.ratio import SplineCrimp, SplineRatio
-from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import (
@@ -123,11 +122,11 @@ MODELS = {
 TIGHT = 1e-11
 STRAIN_RATIO_LAW = HypoelasticLaw(
     [12.0, 14.0, 240.0, 160.0, 600.0, 400.0, 120.0, -150.0], 0.24, [0.1, 0.1, 0.3],
-    form=SplineRatio(Spline.at([[0.0, 0.1], [0.0, 0.1], [0.0, 0.3]])),
+    form=SplineRatio.at([[0.0, 0.1], [0.0, 0.1], [0.0, 0.3]]),
 )  # fmt: skip
 CRIMP_LAW = HypoelasticLaw(
     [*STRAIN_RATIO_LAW.beta[:-2], 0.6, 1.5, 8.0], 0.24, [0.1, 0.1, 0.3],
-    form=SplineCrimp(STRAIN_RATIO_LAW.form.spline),
+    form=SplineCrimp(STRAIN_RATIO_LAW.form.knots),
 )  # fmt: skip
 
 
