@@ -8,7 +8,6 @@ without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 import functools
 import json
 import math
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -18,12 +17,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import tomli_w
 from numpy.typing import ArrayLike
-from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
+from pydantic import AfterValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from ..errors import InputError, checked
 from ..files import toml_of, write_text
-from ..readers.sections import MODULUS_UNITS, ModulusUnit, Section, first_error
+from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
 from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
@@ -266,46 +265,24 @@ def _bands_text(sure: CardCertainty | None, scale: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _numbers(value: Any) -> list[float]:
-    if not isinstance(value, list) or not all(map(_is_number, value)):
-        raise PydanticCustomError("numbers", "a list of finite numbers")
-    return [float(x) for x in value]
-
-
-def _end(value: Any) -> float:
-    good = isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))
-    if not good or value[0] != 0 or not value[1] > 0:
+def _from_zero(ends: list[float]) -> list[float]:
+    if ends[0] != 0 or not ends[1] > 0:
         raise PydanticCustomError("range", "[0, end]")
-    return float(value[1])
+    return ends
 
 
-def _thickness(value: Any) -> float:
-    if not _is_number(value) or not value > 0:
-        raise PydanticCustomError("thickness", "a number > 0")
-    return float(value)
-
-
-def _is_number(value: Any) -> bool:
-    # TOML integers have no largest; beyond a double they are no numbers to us.
-    real = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return real and abs(value) <= sys.float_info.max
-
-
-_LIST = WithJsonSchema({"type": "array", "items": {"type": "number"}})
-Numbers = Annotated[list[float], PlainValidator(_numbers), _LIST]
-End = Annotated[float, PlainValidator(_end), _LIST]
-Thickness = Annotated[float, PlainValidator(_thickness), WithJsonSchema({"type": "number"})]
+Ends = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_from_zero)]
 
 
 class ValidStrain(Section):
     """[0, end] of each log strain; a direction left out has no end."""
 
-    warp: End = base.UNLIMITED
-    fill: End = base.UNLIMITED
-    shear: End = base.UNLIMITED
+    warp: Ends = Field(default=[0.0, base.UNLIMITED])
+    fill: Ends = Field(default=[0.0, base.UNLIMITED])
+    shear: Ends = Field(default=[0.0, base.UNLIMITED])
 
 
-Band = Annotated[list[Numbers], Field(min_length=3, max_length=3)]
+Band = Annotated[list[list[float]], Field(min_length=3, max_length=3)]
 
 
 class BandFile(Section):
@@ -320,17 +297,17 @@ class CertaintyFile(Section):
     """Steps of the free coefficients, one standard deviation each, and the band, in `unit`."""
 
     of: str = ""
-    directions: list[Numbers]
+    directions: list[list[float]]
     band: BandFile | None = None
 
 
 class MemoryFile(Section):
     """Permanent set, unloading, reloading and saturation of warp, fill and shear."""
 
-    permanent_set: Numbers
-    unloading: Numbers
-    reloading: Numbers
-    saturation: Numbers
+    permanent_set: list[float]
+    unloading: list[float]
+    reloading: list[float]
+    saturation: list[float]
 
 
 class CardFile(Section):
@@ -342,9 +319,9 @@ class CardFile(Section):
     law: str = ""
     form: str | None = None
     unit: ModulusUnit
-    beta: Numbers
+    beta: list[float]
     nu12: float
-    thickness_mm: Thickness
+    thickness_mm: Positive
     thickness_change: ThicknessChange = "constant"
     valid_strain: ValidStrain = Field(default_factory=ValidStrain)
     certainty: CertaintyFile | None = None
@@ -378,7 +355,7 @@ def _card(content: Mapping[str, Any]) -> MaterialCard:
     form = base.form_named(name, settings, [base.UNLIMITED] * 3)
     if len(mpa) != form.size:
         raise InputError(None, "beta", f"expected {form.size} coefficients, got {len(mpa)}")
-    ends = np.array([file.valid_strain.warp, file.valid_strain.fill, file.valid_strain.shear])
+    ends = np.array([end for _, (_, end) in file.valid_strain])
     if file.format < WITH_HISTORY and (file.state or file.memory):
         problem = f"a card that has it is of format = {WITH_HISTORY}"
         raise InputError(None, "memory" if file.memory else "state", problem)
