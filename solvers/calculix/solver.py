@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
-import re
-import subprocess
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import BubblefitError, InputError, OutputError, SolverFailure
-from ...files import render
+from ...errors import BubblefitError, InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import PatchModel, UniaxialModel
-from ..bars import BARS, INCREMENTS, bar_law, checked_stresses, difference
+from ..bars import checked_stresses, difference, strip_stresses
 from ..base import Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import in_words, templates_mark
 from ..process import Watch, run_process
@@ -36,7 +32,7 @@ from .executable import (
     increments,
     reason,
 )
-from .library import MATERIAL, STATE_VARIABLES, constants, law_files, material_library
+from .library import law_files, material_library
 
 log = logging.getLogger(__name__)
 
@@ -132,7 +128,8 @@ class CalculixSolver:
             log_file, sta, frd = (folder / f"{JOB}.{end}" for end in ("log", "sta", "frd"))
             counts = ("OMP_NUM_THREADS", "CCX_NPROC_STIFFNESS", "CCX_NPROC_EQUATION_SOLVER")
             environment = dict.fromkeys(counts, str(self.threads))
-            environment["LD_LIBRARY_PATH"] = str(library.parent)
+            search = (str(library.parent), os.environ.get("LD_LIBRARY_PATH"))
+            environment["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, search))
             watch = None if self.progress is None else Watch(lambda: increments(sta), self.progress)
             command: list[str | Path] = [program, "-i", JOB]
             outcome = run_process(command, folder, log_file, timeout, environment, watch)
@@ -158,84 +155,6 @@ class CalculixSolver:
 
 SECONDS = 120.0
 
-#: Corners of a bar, in the order of C3D8.
-NODES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
-
-
-def bar_deck() -> str:
-    """Return the deck: every bar pulled along x, its direction of the fabric turned there."""
-    bars = [
-        {
-            "index": index,
-            "elongation": bar.elongation,
-            "constants": constants(
-                bar_law(bar.model), angle=0.0 if bar.direction == "warp" else -90.0
-            ),
-        }
-        for index, bar in enumerate(BARS)
-    ]
-    return render(
-        "calculix/bars.inp.j2", bars=bars, nodes=NODES, increments=INCREMENTS, material=MATERIAL,
-        states=STATE_VARIABLES,
-    )  # fmt: skip
-
-
-def prove(ccx: Path, library: Path | None = None, timeout: float = SECONDS) -> tuple[float, ...]:
-    """Return the end stresses (MPa) of BARS by this ccx; SolverFailure beyond TOLERANCE."""
-    library = material_library() if library is None else library
-    try:
-        with tempfile.TemporaryDirectory(prefix="bubblefit-bars-") as folder:
-            stresses = _run(ccx, library, Path(folder), timeout)
-    except OSError as error:
-        problem = f"cannot be used: {error.strerror}; choose another TMPDIR"
-        raise OutputError(f"{tempfile.gettempdir()}: {problem}") from None
-    return checked_stresses(stresses, str(ccx), "calculix")
-
-
-def _run(ccx: Path, library: Path, folder: Path, timeout: float) -> tuple[float, ...]:
-    files = {"bars.inp": bar_deck()}
-    for bar in BARS:
-        files |= law_files(bar_law(bar.model))
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    paths = [str(library.parent), os.environ.get("LD_LIBRARY_PATH", "")]
-    search = os.pathsep.join(path for path in paths if path)
-    variables = {**os.environ, "LD_LIBRARY_PATH": search, "OMP_NUM_THREADS": "1"}
-    try:
-        done = subprocess.run(
-            [ccx, "bars"], cwd=folder, env=variables, timeout=timeout, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        raise SolverFailure(f"{ccx}: four bars took more than {timeout:g} s", "calculix") from None
-    except OSError as error:
-        raise SolverFailure(f"{ccx} cannot be started: {error.strerror}", "calculix") from None
-    tail = "\n".join(done.stdout.decode(errors="replace").splitlines()[-25:])
-    printed = folder / "bars.dat"
-    if done.returncode != 0 or not printed.is_file():
-        problem = f"{ccx} did not end well on four bars"
-        raise SolverFailure(problem, "calculix", done.returncode, tail)
-    stresses = _end_stresses(printed.read_text(encoding="utf-8", errors="replace"))
-    if len(stresses) != len(BARS):
-        raise SolverFailure(f"{ccx} printed no end stresses", "calculix", done.returncode, tail)
-    return stresses
-
-
-def _end_stresses(text: str) -> tuple[float, ...]:
-    """Return sxx (MPa) of the bars from a .dat file at the end of the step; empty without it."""
-    found: dict[int, float] = {}
-    for block in re.split(r"(?m)^\s*stresses ", text)[1:]:
-        head, *rows = block.splitlines()
-        time = re.search(r"time\s+(\S+)", head)
-        if time is None or abs(float(time[1]) - 1) > 1e-6:
-            continue
-        for row in rows:
-            numbers = row.split()
-            # element, point, six components
-            if len(numbers) == 8:
-                found[int(numbers[0])] = float(numbers[2])
-    return tuple(found[element] for element in sorted(found))
-
 
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return all there are (`named`: one more); an absent one, expected if named, has no path."""
@@ -259,7 +178,8 @@ def _tried(ccx: Executable) -> Diagnosis:
         advice = f"cannot load material libraries; {ADVICE}"
     else:
         try:
-            stresses = prove(ccx.path)
+            found = strip_stresses(CalculixSolver(ccx.path, timeout=SECONDS))
+            stresses = checked_stresses(found, str(ccx.path), "calculix")
             usable, off = True, difference(stresses)
         except BubblefitError as error:
             advice = str(error).splitlines()[0]
