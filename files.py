@@ -402,9 +402,7 @@ class Compiled:
         before = settings.CACHE_DIR
         settings.CACHE_DIR = str(folder or before)
         try:
-            # Where it is not said, a function takes `fastmath` of whichever calls it first.
-            options = {"fastmath": False, **self.options}
-            made = numba.njit(cache=folder is not None, **options)(self.function)
+            made = numba.njit(cache=folder is not None, **self.options)(self.function)
         finally:
             settings.CACHE_DIR = before
         names[self.function.__name__] = made

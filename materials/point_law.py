@@ -5,10 +5,10 @@ Cauchy-Green components C11, C22, C12 in the (warp, fill) frame enter through m 
 (C11 - C22)/2, c = C12. Strains are (eps1, eps2, gamma12); Green-Lagrange strain E = ((C11-1)/2,
 (C22-1)/2, C12), so that dm = dE1 + dE2, dq = dE1 - dE2, dc = dE3.
 
-`pieces` (3, P, 5) are as `pieces_of` writes them. Nothing here is compiled with FAST, so that a
-law gives the same stress bit by bit whichever kernel calls it. An increment takes a modulus'
-MEAN, (F(x) - F(x_old))/(x - x_old), F its integral: a bar is exact in any number of increments,
-and d(stress)/d(strain) is the modulus at the END.
+`pieces` (3, P, 5) are as `pieces_of` writes them. An increment takes a modulus' MEAN, (F(x) -
+F(x_old))/(x - x_old), F its integral: a bar is exact in any number of increments, and
+d(stress)/d(strain) is the modulus at the END. Nothing here is compiled with `fastmath`, which gains no
+time: results are the same bit by bit, whichever function was compiled first.
 """
 
 import math
@@ -125,10 +125,6 @@ def mean_ratio(
         slopes[AHEAD + i] += slopes[BEHIND + i]
         slopes[AHEAD + 2 + i] += slopes[BEHIND + 2 + i]
     return True
-
-
-# NaN must stay visible (a failed iterate is recognised by it), so no "nnan"/"ninf".
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 @compiled()

@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...files import compiled
 from ...materials.memory import BY_X, ON, RECALLED, remember
 from ...materials.pieces import by_pieces
-from ...materials.point_law import BEFORE3, CRIMPED, FAST, G12, SLOPES, membrane_stress, stress_rate
+from ...materials.point_law import BEFORE3, CRIMPED, G12, SLOPES, membrane_stress, stress_rate
 from ...materials.wrinkles import relaxed_membrane_stress
 
 # mypy does not see through numba; the shapes are in the docstrings.
@@ -41,7 +41,7 @@ NATURAL = 0.25 * np.stack(
 )
 
 
-@compiled(fastmath=FAST, inline="always")
+@compiled(inline="always")
 def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
     """Write f (2, 3), the images of the unit warp and fill vectors; x (4, 3), slopes (2, 4)."""
     for i in range(2):
@@ -54,7 +54,7 @@ def base_vectors(x, slopes, f):  # type: ignore[no-untyped-def]
             )
 
 
-@compiled(fastmath=FAST, inline="always")
+@compiled(inline="always")
 def metric(f):  # type: ignore[no-untyped-def]
     """Return m, q, c of the Cauchy-Green components (see materials/point_law.py)."""
     c11 = f[0, 0] ** 2 + f[0, 1] ** 2 + f[0, 2] ** 2
@@ -63,7 +63,7 @@ def metric(f):  # type: ignore[no-untyped-def]
     return 0.5 * (c11 + c22), 0.5 * (c11 - c22), c12
 
 
-@compiled(fastmath=FAST)
+@compiled()
 def assemble(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure,
     pieces, coupling, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
@@ -228,7 +228,7 @@ def reference_elements(
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
 
 
-@compiled(fastmath=FAST)
+@compiled()
 def explicit(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pieces, coupling, power,
     h_old, s_old, rows, by_coupling, push, dh_old, ds_old, ds_new, point, rate,
@@ -324,7 +324,7 @@ def explicit(  # type: ignore[no-untyped-def]
                     rate[3 * quads[e, n] + k, j] += local[3 * n + k, j]
 
 
-@compiled(fastmath=FAST)
+@compiled()
 def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
     """Add the part of the displacement derivatives du (3 n, np) to dh and ds (in place)."""
     count = du.shape[1]
@@ -359,7 +359,7 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                     strain[i, j] += record[POINT + i - 3] * strain[i % 3, j]
 
 
-@compiled(fastmath=FAST)
+@compiled()
 def by_sheet(  # type: ignore[no-untyped-def]
     position, quads, values, slopes, area, thickness, pressure, pieces, coupling, power, h_old,
     s_old, surface, slopes_by, area_by, green, rate,
