@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.polynomial.legendre import legval
-from scipy.special import chdtr, chdtrc, fdtri
 
 from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.forms.base import Array
@@ -350,7 +350,7 @@ def discrepancy(
         return None
     steeper = float(np.exp(STEEPER * np.sqrt((1.0 - 1.0 / together) / independent)))
     ratio = (smooth[0] / free) / (following[0] / following[1])
-    largest = float(fdtri(free, following[1], 1 - FALSE_ALARMS)) * steeper
+    largest = float(scipy.special.fdtri(free, following[1], 1 - FALSE_ALARMS)) * steeper
     rms = np.sqrt(max(left - steeper * of_next, 0.0) / values)
     return Discrepancy(float(ratio), largest, float(rms), unit)
 
@@ -478,7 +478,7 @@ def alike_in_all(
         return None  # specimens that differ by a factor only, or not at all
     square = specimens * float(mean @ np.linalg.solve(spread, mean))
     ratio = square * (specimens - count) / (count * (specimens - 1))
-    largest = float(fdtri(count, specimens - count, 1 - FALSE_ALARMS))
+    largest = float(scipy.special.fdtri(count, specimens - count, 1 - FALSE_ALARMS))
     why = ranked_causes(common, whole, causes or {}, effect)
     return Discrepancy(ratio, largest, rms, unit, specimens=specimens, causes=why)
 
@@ -527,12 +527,12 @@ class NoiseTest:
     @property
     def above(self) -> float:
         """Return the probability that such noise leaves as much, or more."""
-        return float(chdtrc(self.free, self.square))
+        return float(scipy.special.chdtrc(self.free, self.square))
 
     @property
     def below(self) -> float:
         """Return the probability that it leaves as little, or less."""
-        return float(chdtr(self.free, self.square))
+        return float(scipy.special.chdtr(self.free, self.square))
 
     @property
     def note_kind(self) -> NoteKind | None:

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 import quadprog
-from scipy.linalg import solve_triangular
+import scipy
 
 from ..files import compiled
 from ..materials.forms.base import Array, modulus_rows
@@ -194,7 +194,7 @@ def _root(factor: Array) -> Array:
     """Return a root of the inverse of factor' factor, which would lose all digits if formed."""
     upper: Array = np.linalg.qr(factor).R
     upper *= np.where(np.diag(upper) < 0, -1.0, 1.0)[:, None]
-    return np.asarray(solve_triangular(upper, np.eye(len(upper))))
+    return np.asarray(scipy.linalg.solve_triangular(upper, np.eye(len(upper))))
 
 
 def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[float, Array, Array]:

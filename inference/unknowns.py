@@ -12,8 +12,8 @@ from itertools import islice
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from ..errors import InputError
 from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, own_bounds
@@ -250,7 +250,9 @@ class Unknowns:
         for row, (up, back) in enumerate(pairs, start=2 * extra):
             box[row, [up, back]] = 1.0, -1.0
         low, high = self.nuisance.bounds
-        return block_diag(law, box), np.concatenate([*c, low, -high, np.zeros(len(pairs))])
+        return scipy.linalg.block_diag(law, box), np.concatenate(
+            [*c, low, -high, np.zeros(len(pairs))]
+        )
 
     @cached_property
     def stability_rows(self) -> Array:
@@ -302,7 +304,7 @@ def _between(modulus_of: Sequence[str]) -> Array:
         few = min(count, MOST_VALUES)
         at = np.linspace(0.0, few - 1.0, count)
         blocks.append(np.column_stack([np.interp(at, range(few), row) for row in np.eye(few)]))
-    return np.asarray(block_diag(*blocks))
+    return np.asarray(scipy.linalg.block_diag(*blocks))
 
 
 def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:

@@ -7,8 +7,8 @@ Cauchy-Green components C11, C22, C12 in the (warp, fill) frame enter through m 
 
 `pieces` (3, P, 5) are as `pieces_of` writes them. An increment takes a modulus' MEAN, (F(x) -
 F(x_old))/(x - x_old), F its integral: a bar is exact in any number of increments, and
-d(stress)/d(strain) is the modulus at the END. Nothing here is compiled with `fastmath`, which gains no
-time: results are the same bit by bit, whichever function was compiled first.
+d(stress)/d(strain) is the modulus at the END. Nothing here is compiled with `fastmath`, which
+gains no time: results are the same bit by bit, whichever function was compiled first.
 """
 
 import math

@@ -54,7 +54,7 @@ ONE_OF = re.compile(r"constrained-\w+$|literal\[")
 class Section(BaseModel):
     """A table of a project file: no unknown keys, no text for numbers, no NaN."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 def beside(folder: Path, given: str) -> Path:

@@ -98,7 +98,8 @@ KNOWN = "examples/bubble-known-solution/project.toml"
         ("import bubblefit; [getattr(bubblefit, name) for name in bubblefit.__all__]",
          {"click", "bubblefit.cli"}),
         (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{KNOWN}')",
-         {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas"}),
+         {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
+          "scipy.spatial", "scipy.linalg"}),
     ],
 )  # fmt: skip
 def test_start_up_loads_only_what_it_needs(code, absent):

@@ -14,10 +14,9 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...inference.comparison import NoiseIs
@@ -52,7 +51,7 @@ class FieldTarget:
 
     pressure: float
     displacement: Array
-    sample: sp.csr_matrix | None = None
+    sample: scipy.sparse.csr_matrix | None = None
     places: NDArray[np.intp] | None = None
     frame: int | None = None
     since: int | None = None
@@ -448,7 +447,7 @@ def at_rest(fields: Sequence[DisplacementField], since: int) -> list[Displacemen
     other = fields[since + 1 if since + 1 < len(fields) else since - 1]
     powers = [field.pressure**POWER for field in (first, other)]
     moved = other.displacement[:, :2] * (powers[0] / (powers[1] - powers[0]))
-    tree = cKDTree(other.points)
+    tree = scipy.spatial.cKDTree(other.points)
     return [replace(f, points=f.points - moved[tree.query(f.points)[1]]) for f in fields]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
@@ -300,7 +300,7 @@ def resampled(
 ) -> tuple[FieldTarget, ...]:  # fmt: skip
     """Return the targets at the same places of another mesh; its reading is smooth unless given."""
     reading = reading or SmoothReading.of(other)
-    found: list[tuple[Array, sp.csr_matrix]] = []
+    found: list[tuple[Array, scipy.sparse.csr_matrix]] = []
     moved = []
     for target in targets:
         rest = target.at(own.points)[:, :2] if target.at_rest is None else target.at_rest
@@ -331,7 +331,7 @@ def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     return starts
 
 
-def _sample(reading: SmoothReading | FacetReading, places: Array) -> sp.csr_matrix:
+def _sample(reading: SmoothReading | FacetReading, places: Array) -> scipy.sparse.csr_matrix:
     at, inside = places.copy(), np.zeros(len(places), dtype=bool)
     for share in INWARD:
         at[~inside] = share * places[~inside]
@@ -356,8 +356,8 @@ def kept_targets(
         frame = k if target.frame is None else target.frame
         whole = target.sample
         if whole is None and not own.all():
-            whole = sp.identity(len(own), format="csr")
-        sample = None if whole is None else sp.csr_matrix(whole[own])
+            whole = scipy.sparse.identity(len(own), format="csr")
+        sample = None if whole is None else scipy.sparse.csr_matrix(whole[own])
         kept.append(replace(target.only(own), sample=sample, frame=frame))
     return kept
 
