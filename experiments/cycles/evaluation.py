@@ -9,7 +9,7 @@ between 40 and 90 % of the cycle's peak.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -243,8 +243,9 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
     return EvaluatedHistory(history, level, zero, tuple(values), holds, stable, doubts)
 
 
-#: Knots of the tangent of a loading curve; its bounds, of the mean stiffness; largest U and R.
-KNOTS, BOUNDS, MOST = 6, (1e-4, 1e2), 1.99
+#: Knots of the tangent of a loading curve; its bounds, of the mean stiffness; largest U and R; of
+#: the largest strain, least and most slip, and a step; points along a branch that is predicted.
+KNOTS, BOUNDS, MOST, SLIPS, STEP, FINE = 8, (1e-4, 1e2), 1.99, (-0.1, 0.3), 1e-7, 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,21 +254,48 @@ class FittedCycles:
 
     knots (k,) strains and stiffness (k,) N, the tangent of the loading curve there, above the
     reference load; memory (4,) : set, unloading, reloading, saturation, in the order of
-    `memory.QUANTITIES`; sigma (k + 4,) one standard deviation each, of independent readings. rows :
-    readings that are followed; load : modelled, N. rms : N, of those that were fitted.
+    `memory.QUANTITIES`; slip : strain that the extensometer lost before each later cycle; sigma
+    (k + 4 + slips,) one standard deviation each, of independent readings. rows : readings that are
+    followed, at strains of the law; load : modelled, N. rms : N, of those that were fitted.
     """
 
     knots: Array
     stiffness: Array
     memory: Array
+    slip: Mapping[int, float]
     sigma: Array
     rows: NDArray[np.intp]
+    strain: Array
     load: Array
     rms: float
+    law: HypoelasticLaw
 
-    def kept(self, largest: float) -> float:
-        """Return the permanent strain after a largest strain."""
-        return float(self.memory[0] * largest / (1.0 + self.memory[3] * largest))
+    @property
+    def remembered(self) -> list[tuple[str, float, float]]:
+        """Return name, value and one sigma of each constant of the memory."""
+        sigma = self.sigma[len(self.knots) :].tolist()
+        return list(zip(QUANTITIES, self.memory.tolist(), sigma, strict=False))
+
+    def driven(self, before: int, peak: float, level: float) -> tuple[Array, ...]:
+        """Return strain and load of a loading to a peak (N) and of the unloading after it.
+
+        before : number of the readings that precede it. Only the load is given, as to a machine;
+        level : N, at which strains and loads of the law begin.
+        """
+        path, found = self.strain[:before], list[Array]()
+        for end in (self.law.strain_range[0], 0.0):
+            way = np.linspace(path[-1], end, FINE)
+            load = _stress(self.law, np.r_[path, way[1:]])[len(path) - 1 :] + level
+            i, turn = passage(load, way, peak if end else -np.inf)
+            if i >= 0:
+                way, load = np.r_[way[: i + 1], turn], np.r_[load[: i + 1], peak]
+            found += [way, load]
+            path = np.r_[path, way[1:]]
+        return tuple(found)
+
+
+def _stress(law: HypoelasticLaw, strain: Array) -> Array:
+    return own_stress(law.pieces, law.coupling, 0, strain, *law_slopes(law, [], 1.0))[0]
 
 
 def matched_rows(one: EvaluatedHistory) -> tuple[int, int]:
@@ -282,82 +310,97 @@ def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> Fit
     """Fit a loading curve and a memory to all cycles but `leave`; each branch has one weight.
 
     The readings count from the first passage of the reference load to the last, in strain and load.
+    What an extensometer has lost by slip before a later cycle is an unknown; a cycle that is left
+    out has that of the next one.
     """
     from scipy.optimize import least_squares
 
     h, values, level = one.history, one.values, one.reference
-    last, (start, end) = values[-1].cycle, matched_rows(one)
+    last, (start, end) = len(values), matched_rows(one)
     rows = np.arange(start, end + 1)
-    strain, load = np.maximum(h.strain[rows] - one.zero, 0.0), h.load[rows] - level
+    strain, load = h.strain[rows] - one.zero, h.load[rows] - level
+    number = np.searchsorted([v.cycle.start for v in values], rows, "right")
     weight, none = np.zeros(len(rows)), [0.0, 1.0]
     for v in values:
-        stop = len(h.load) if v.cycle is last else values[v.cycle.number].cycle.start
-        for a, b in ((v.cycle.start, v.cycle.peak), (v.cycle.peak, stop)):
-            own = (rows >= a) & (rows < b) & (v.cycle.number != leave)
+        for side in (rows < v.cycle.peak, rows >= v.cycle.peak):
+            own = side & (number == v.cycle.number) & (v.cycle.number != leave)
             weight[own] = 1.0 / (v.peak * math.sqrt(max(int(own.sum()), 1)))
+    slipped = [k for k in range(2, last + 1) if k != (leave if leave == last else leave + 1)]
+    later = (number[:, None] >= slipped).astype(float)
     top = float(strain[weight > 0].max())
     form = Spline.at([np.linspace(0.0, top, knots).tolist(), none, none])
     free = [form.size - knots + k for k in range(knots)]  # E1 comes last
     names = [*(f"beta_{i}" for i in free), *NAMES[: len(QUANTITIES)]]
-    mean = float(load.max()) / top
+    mean, shared = float(load.max()) / top, knots + len(QUANTITIES)
 
-    def modelled(x: Array) -> tuple[Array, Array]:
+    def law_at(x: Array) -> HypoelasticLaw:
         # By the share of U - 1 that R - 1 is, so that R stays below U; strains over the largest.
-        kept, up, share, fade = x[knots:]
+        kept, up, share, fade = x[knots:shared]
         memory = Memory.of([kept, up, 1.0 + share * (up - 1.0), fade / top, *[0, 1, 1, 0] * 2])
         beta = np.r_[np.full(form.size - knots, mean), mean * x[:knots]]
-        law = HypoelasticLaw(beta, 0.0, np.array([top, 1, 1]), form=form, memory=memory)
-        slopes = law_slopes(law, names, 1.0)
-        found, by = own_stress(law.pieces, law.coupling, 0, strain, *slopes)
+        return HypoelasticLaw(beta, 0.0, np.array([top, 1, 1]), form=form, memory=memory)
+
+    def strain_at(x: Array) -> Array:
+        return np.maximum(strain + top * later @ x[shared:], 0.0)
+
+    def slopes(x: Array) -> Array:
+        law, moved = law_at(x), strain_at(x)
+        by = own_stress(law.pieces, law.coupling, 0, moved, *law_slopes(law, names, 1.0))[1]
+        up, share = x[knots + 1 : knots + 3]
         chain = np.diag([*[mean] * knots, 1.0, 1.0, up - 1.0, 1.0 / top])
         chain[knots + 2, knots + 1] = share
-        return found, by @ chain
+        ends = [[_stress(law, strain_at(x + s * e)) for s in (STEP, -STEP)]
+                for e in np.eye(len(x))[shared:]]  # fmt: skip
+        of_slip = [(a - b) / (2 * STEP) for a, b in ends]
+        return weight[:, None] * np.column_stack([by @ chain, *of_slip])
 
-    low = [*[BOUNDS[0]] * knots, 0.0, 1.0, 0.0, 0.0]
-    high = [*[BOUNDS[1]] * knots, 0.99, MOST, 1.0, 100.0]
-    begin = [*[1.0] * knots, 0.3, 1.4, 0.4, 0.1]
+    many = len(slipped)
+    low = [*[BOUNDS[0]] * knots, 0.0, 1.0, 0.0, 0.0, *[SLIPS[0]] * many]
+    high = [*[BOUNDS[1]] * knots, 0.99, MOST, 1.0, 100.0, *[SLIPS[1]] * many]
+    begin = [*[1.0] * knots, 0.3, 1.4, 0.4, 0.1, *[0.0] * many]
     best = least_squares(
-        lambda x: weight * (modelled(x)[0] - load), begin,
-        lambda x: weight[:, None] * modelled(x)[1], bounds=(low, high),
-        xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400,
+        lambda x: weight * (_stress(law_at(x), strain_at(x)) - load), begin, slopes,
+        bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400,
     )  # fmt: skip
-    found, _ = modelled(best.x)
-    fitted = weight > 0
+    law, moved, fitted = law_at(best.x), strain_at(best.x), weight > 0
+    found = _stress(law, moved)
     spread = 2 * best.cost / max(int(fitted.sum()) - len(begin), 1)
-    _, up, share, fade = best.x[knots:]
-    scale = np.r_[np.full(knots, mean), 1.0, 1.0, up - 1.0, 1.0 / top]
+    up = best.x[knots + 1]
+    scale = np.r_[np.full(knots, mean), 1.0, 1.0, up - 1.0, 1.0 / top, np.full(many, top)]
     sigma = scale * np.sqrt(spread * np.diag(np.linalg.pinv(best.jac.T @ best.jac)))
     rms = float(np.sqrt(np.mean((found - load)[fitted] ** 2)))
-    memory = np.array([best.x[knots], up, 1.0 + share * (up - 1.0), fade / top])
-    stiffness = mean * best.x[:knots]
-    return FittedCycles(np.array(form.knots[0]), stiffness, memory, sigma, rows, found + level, rms)
+    slip = dict(zip(slipped, (top * best.x[shared:]).tolist(), strict=True))
+    memory = np.array(law.memory.constants[: len(QUANTITIES)]) if law.memory else np.empty(0)
+    return FittedCycles(
+        np.array(form.knots[0]), mean * best.x[:knots], memory, slip, sigma, rows, moved,
+        found + level, rms, law,
+    )  # fmt: skip
 
 
 def left_out(one: EvaluatedHistory, knots: int = KNOTS) -> pd.DataFrame:
     """Return each cycle beside its prediction by a fit to the others: a row a cycle.
 
-    Predicted are loads at the measured strains, so stiffness, and the permanent strain. A cycle
-    that alone reaches its largest strain, and the first, have no others that could predict them.
+    Predicted are strains at the loads, as a machine that follows loads would find them: stiffness
+    and permanent strain, without slip. A cycle that alone reaches its load, and the first, have no
+    others that could predict them.
     """
     import pandas as pd
 
-    table, largest = [], 0.0
-    tops = [v.top for v in one.values]
+    table = []
     for v in one.values:
-        largest, number = max(largest, v.top), v.cycle.number
-        others = [top for k, top in enumerate(tops, start=1) if k != number]
-        if number == 1 or v.top > max(others) or math.isnan(v.permanent):
+        number = v.cycle.number
+        others = [w.peak for w in one.values if w is not v]
+        if number == 1 or v.peak > (1 + SAME) * max(others) or math.isnan(v.permanent):
             continue
         fitted = fit_cycles(one, knots, leave=number)
-        load = one.history.load.copy()
-        load[fitted.rows] = fitted.load
-        parts = slice(v.cycle.start, v.cycle.peak + 1), slice(v.cycle.peak, v.cycle.end + 1)
+        before = int(np.searchsorted(fitted.rows, v.cycle.start))
+        up, rising, down, falling = fitted.driven(before, v.peak, one.reference)
         row: dict[str, Any] = {"file": one.history.path.name, "cycle": number}
-        for name, rows in zip(("EA_loading", "EA_unloading"), parts, strict=True):
-            predicted = _slope(load[rows], one.history.strain[rows], v.peak)
+        for name, way, load in (("EA_loading", up, rising), ("EA_unloading", down, falling)):
+            predicted = _slope(load, way, v.peak)
             row |= {f"{name}_N": getattr(v, name), f"{name}_predicted_N": predicted}
             row[f"{name}_off_percent"] = 100 * (predicted / getattr(v, name) - 1)
-        kept = fitted.kept(largest)
+        kept = passage(falling, down, one.reference)[1]
         row |= {"permanent_strain": v.permanent, "permanent_strain_predicted": kept}
         table.append(row | {"permanent_strain_off": kept - v.permanent})
     return pd.DataFrame(table)
@@ -442,9 +485,9 @@ class Cycles:
         table = []
         for one, fitted in zip(self.histories, self.fits, strict=True):
             row: dict[str, Any] = {"file": one.history.path.name, "rms_N": fitted.rms}
-            pairs = zip(fitted.memory.tolist(), fitted.sigma[-4:].tolist(), strict=True)
-            for name, (value, sigma) in zip(QUANTITIES, pairs, strict=True):
+            for name, value, sigma in fitted.remembered:
                 row |= {name: value, f"{name}_sigma": sigma}
+            row |= {f"slip_{cycle}": value for cycle, value in fitted.slip.items()}
             for k, knot in enumerate(fitted.knots.tolist(), start=1):
                 row |= {f"strain_{k}": knot, f"EA_{k}_N": float(fitted.stiffness[k - 1])}
             table.append(row)
@@ -461,8 +504,9 @@ class Cycles:
         """Return the fits, and the cycles that were left out, as lines for the terminal."""
         said = []
         for one, f in zip(self.histories, self.fits, strict=True):
-            pairs = zip(QUANTITIES, f.memory.tolist(), f.sigma[-4:].tolist(), strict=True)
-            words = ", ".join(f"{name} {value:.3g} +- {sigma:.2g}" for name, value, sigma in pairs)
+            words = ", ".join(f"{name} {v:.3g} +- {sigma:.2g}" for name, v, sigma in f.remembered)
+            slip = ", ".join(f"{100 * v:.2g} % before cycle {k}" for k, v in f.slip.items())
+            words += f"; slip of the extensometer: {slip}" if slip else ""
             said.append(f"{one.history.path.name}: memory: {words}; RMS error {f.rms:.3g} N")
         for row in self.left_out.to_dict("records"):
             off = row["EA_loading_off_percent"], row["EA_unloading_off_percent"]
