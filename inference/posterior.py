@@ -105,19 +105,20 @@ def _walked(
     slopes[np.abs(slopes) < NONE] = NONE
     away = np.tile(start - centre, (count, 1))
     room = np.minimum(least - rows @ start, 0.0)
-    _walk(away, room, ways, slopes, random.random((count, steps)))
+    _walk(away, room, ways, slopes, 1.0 / slopes, random.random((count, steps)))
     return np.asarray(centre + away)
 
 
 @compiled(fastmath=True)
-def _walk(away, begin, ways, slopes, share):  # type: ignore[no-untyped-def]
+def _walk(away, begin, ways, slopes, inverse, share):  # type: ignore[no-untyped-def]
     """Walk from `away` (count, n), in place, along ways (steps, n) of unit length.
-    begin : (m,) least less rows @ place, at most zero. slopes : (steps, m) rows @ way. share :
-    (count, steps) between 0 and 1, of the probability on each line."""
+    begin : (m,) least less rows @ place, at most zero. slopes : (steps, m) rows @ way, inverse
+    1/slopes. share : (count, steps) between 0 and 1, of the probability on each line."""
     steps, n = ways.shape
-    inverse, room = 1.0 / slopes, np.empty(len(begin))
+    room = np.empty(len(begin))
     for d in range(len(away)):
-        room[:] = begin
+        for i in range(len(begin)):
+            room[i] = begin[i]
         for s in range(steps):
             ahead, behind = FAR, -FAR
             for i in range(len(room)):

@@ -6,11 +6,15 @@ bar has the exact stress in any number of increments, a modulus that jumps gives
 not, and d(stress)/d(strain) is the modulus at the END of the increment.
 """
 
+import numpy as np
+
 from ..files import compiled
 from .forms.base import Array
 
 #: An increment of strain across the end of a piece is not divided by where it is smaller.
 TINY = 1e-12
+#: Components, of a type that numba does not compile each function for anew, as it does literals.
+WARP, FILL, SHEAR = (np.int64(k) for k in range(3))
 
 
 @compiled()
@@ -67,10 +71,11 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
     if abs(change) < TINY:
         return point_modulus(pieces, component, 0.5 * (x + x_old)), 0.0, 0.0
     if component == 2 and x * x_old < 0.0:
-        whole = integral_of(pieces, 2, 0.0, abs(x)) + integral_of(pieces, 2, 0.0, abs(x_old))
+        whole = integral_of(pieces, component, 0.0, abs(x))
+        whole += integral_of(pieces, component, 0.0, abs(x_old))
     elif component == 2:
         a, b = abs(x), abs(x_old)
-        whole = integral_of(pieces, 2, min(a, b), max(a, b))
+        whole = integral_of(pieces, component, min(a, b), max(a, b))
     else:
         whole = integral_of(pieces, component, min(x, x_old), max(x, x_old))
     mean = whole / abs(change)
@@ -161,8 +166,8 @@ def by_pieces(
         held = min(max(abs(low) if turns else low, 0.0), pieces[component, stop - 1, 0])
         _add(weights, stop - 1, 1.0, held, held)
     elif turns:
-        _add_way(pieces, 2, 0.0, high, whole, weights)
-        _add_way(pieces, 2, 0.0, -low, whole, weights)
+        _add_way(pieces, component, 0.0, high, whole, weights)
+        _add_way(pieces, component, 0.0, -low, whole, weights)
     else:
         _add_way(pieces, component, low, high, whole, weights)
     return first, stop

@@ -16,7 +16,7 @@ import math
 from ..files import compiled
 from .forms.base import EVEN, Array
 from .memory import Coupling, recalled_modulus
-from .pieces import increment_modulus
+from .pieces import FILL, SHEAR, WARP, increment_modulus
 
 #: Entries of the vector that `stress_update` leaves for the sensitivities (`stress_rate`); four
 #: from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
@@ -338,13 +338,13 @@ def stress_update(
     B b of it altogether, b the change of s_old; CRIMP.. (2, 3) what r is by T1, T2 and S. False
     when a modulus, or 1 - nu12 nu21, is not positive, and as `exchange`.
     """
-    warp, warp_slope, warp_before = increment_modulus(pieces, 0, h[0], h_old[0])
-    fill, fill_slope, fill_before = increment_modulus(pieces, 1, h[1], h_old[1])
-    shear, shear_slope, shear_before = increment_modulus(pieces, 2, h[2], h_old[2])
+    warp, warp_slope, warp_before = increment_modulus(pieces, WARP, h[0], h_old[0])
+    fill, fill_slope, fill_before = increment_modulus(pieces, FILL, h[1], h_old[1])
+    shear, shear_slope, shear_before = increment_modulus(pieces, SHEAR, h[2], h_old[2])
     if len(coupling) > CRIMPED:
-        warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, 0, h, h_old)
-        fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, 1, h, h_old)
-        shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, 2, h, h_old)
+        warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, WARP, h, h_old)
+        fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, FILL, h, h_old)
+        shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, SHEAR, h, h_old)
     dh0, dh1, dh2 = h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]
     slopes[RATIO1:] = 0.0
     slopes[TAKEN1], slopes[TAKEN2], slopes[AHEAD], slopes[AHEAD + 3] = dh0, dh1, 1.0, 1.0

@@ -17,7 +17,7 @@ import numpy as np
 from ..files import compiled
 from .forms.base import Array
 from .memory import Coupling
-from .pieces import increment_modulus
+from .pieces import FILL, SHEAR, WARP, increment_modulus
 from .point_law import SLOPES, log_strain, referred_stress, stress_update
 
 ITERATIONS = 25
@@ -250,13 +250,13 @@ def relaxed_update(
         ):  # fmt: skip
             return -1
     nu = coupling[0]
-    warp = increment_modulus(pieces, 0, 0.0, 0.0)[0]
-    fill = increment_modulus(pieces, 1, 0.0, 0.0)[0]
+    warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
+    fill = increment_modulus(pieces, FILL, 0.0, 0.0)[0]
     rest = np.zeros((3, 3))
     rest[0, 0] = share * warp / (1.0 - nu * nu * fill / warp)
     rest[1, 1] = rest[0, 0] * fill / warp
     rest[0, 1] = rest[1, 0] = nu * rest[1, 1]
-    rest[2, 2] = share * increment_modulus(pieces, 2, 0.0, 0.0)[0]
+    rest[2, 2] = share * increment_modulus(pieces, SHEAR, 0.0, 0.0)[0]
     total = np.zeros((3, 3))
     for i in range(3):
         carried[i] = s_new[i]
