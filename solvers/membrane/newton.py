@@ -29,7 +29,8 @@ MOST_ITERATIONS, MOST_BACKTRACKS = 40, 8
 # Below this residual, a step that shrank the residual this much is followed by a chord step
 # (no new tangent): it costs a quarter of a Newton step and still gains one to two digits.
 CHORD_BELOW, CHORD_GAIN = 1e-2, 0.15
-# Below this residual, steps that gain no digits are rounding (fine meshes at low pressure).
+# Below this residual, steps that gain no digits are rounding (fine meshes at low pressure), unless
+# the residual falls from step to step (a tangent that is nearly singular).
 ROUNDING_BELOW, MOST_IDLE = 1e-6, 3
 # Where a modulus jumps full steps go to and fro: after this many, every step has to gain.
 MOST_FRUITLESS = 3
@@ -132,7 +133,7 @@ class Membrane:
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             if norm < self.tolerance:
                 return u
-            idle = idle + 1 if 0.5 * least < norm < ROUNDING_BELOW else 0
+            idle = idle + (norm > 0.5 * last) if 0.5 * least < norm < ROUNDING_BELOW else 0
             if idle >= MOST_IDLE:
                 return u
             fruitless = fruitless + 1 if jumps and norm > 0.5 * least else 0

@@ -96,9 +96,12 @@ def test_bad_meshes_and_models_are_named():
 def test_the_homogeneous_strip(direction, thickness_change, law, increments, distort):
     """Load, width and length by the integral of the modulus, in any number of increments.
 
-    In the fill test E1 is held at its value at zero strain, because the warp gets shorter.
+    In the fill test E1 is held at its value at zero strain, because the warp gets shorter. At the
+    whole elongation another equilibrium is near that of the fill strip in one increment: the least
+    eigenvalue of its tangent is 0.2 N/mm there, and 2.7 N/mm at 0.98 of the elongation.
     """
     model, law = straight(direction, increments), replace(law, thickness_change=thickness_change)
+    model = replace(model, elongations=tuple(0.98 * np.array(model.elongations)))
     if distort:
         points = model.mesh.points.copy()
         x, y = points[:, 0], points[:, 1]
