@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..errors import InputError
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
-from .kinds import Array, MakeSolver, Predicted, PreparedTest, Studied, Weighting
+from .kinds import Array, FittedTest, MakeSolver, Predicted, PreparedTest, Studied, Weighting
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
@@ -31,6 +32,27 @@ class MeasuredKind:
         """Return the test, which was read with its data."""
         prepared: PreparedTest = self.prepared(test)
         return prepared
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPart:
+    """One part of a finished fit: its data (a strip, a path) and the best law's response."""
+
+    data: Any
+    model: Any
+    objective: Any
+    history: History
+
+    @property
+    def rms(self) -> Any:
+        """Return the RMS error, or those of its columns, in the unit of the data."""
+        return self.objective.rms(self.history)
+
+
+def fitted_parts(data: Iterable[Any], fitted: FittedTest) -> tuple[FittedPart, ...]:
+    """Return the data of each comparison of a fit, in their order, with what was found."""
+    every = zip(data, fitted.comparisons, fitted.histories, strict=True)
+    return tuple(FittedPart(own, c.model, c.objective, history) for own, c, history in every)
 
 
 class StrainsPrepared:
@@ -78,12 +100,10 @@ class StrainObjective:
 
     @property
     def scale(self) -> Array:
-        """Return % of strain in one unit of each residual."""
         return PERCENT * np.repeat(self._unit, self.sizes[0])
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
         return self.load, self.strain
 
     def modelled(self, history: History) -> Array:
@@ -95,7 +115,6 @@ class StrainObjective:
         return self.in_blocks(self.modelled(history) - self.measured)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, parameters) from the slope of the displacements."""
         raise NotImplementedError
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
@@ -105,7 +124,6 @@ class StrainObjective:
         return np.empty((sum(self.sizes), 0))
 
     def shifted(self, here: History, there: History) -> StrainObjective:
-        """Return the objective of a model that shows `here` where this one shows `there`."""
         other = copy.copy(self)
         other.strain = self.strain - (self.modelled(here) - self.modelled(there))
         return other

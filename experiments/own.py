@@ -194,7 +194,6 @@ class OwnKind:
         return kinds.Findings(numbers, (), (words,), words, words)
 
     def residuals(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> Any:
-        """Return the table of every matched value."""
         import pandas as pd
 
         test, modelled = prepared.test, fitted.histories[0].load

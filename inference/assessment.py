@@ -259,7 +259,6 @@ class Verdict:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the entry of result.json."""
         return {
             "value": self.value, "unit": self.unit, "sigma": self.sigma,
             "bounds": [self.lower, self.upper], "prior": self.prior, "on_bound": self.on or None,

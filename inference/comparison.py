@@ -79,7 +79,6 @@ class NuisanceOf:
 
     @property
     def begin(self) -> Array:
-        """Return where a fit begins."""
         return np.array([n.start if n.begin is None else n.begin for n in self.all])
 
     @property

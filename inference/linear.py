@@ -195,7 +195,6 @@ class Order:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the entry of result.json."""
         return {
             "order": 2 if self.used else 1, "why": self.why, "change_of_sigma": dict(self.change),
             "directions": self.directions, "analyses": self.analyses,

@@ -555,7 +555,6 @@ class NoiseTest:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the entry of result.json."""
         return {
             "values": self.values, "independent": self.independent, "chi_square": self.square,
             "degrees_of_freedom": self.free, "probability_of_more": self.above,

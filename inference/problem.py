@@ -207,7 +207,6 @@ class WeightedProblem(FitProblem):
         return cls(comparisons, problem.law, problem.unknowns, factors=factors)
 
     def evaluate(self, y: Array, with_jacobian: bool, warm: bool = True) -> Evaluation | None:
-        """Run every comparison at unknowns y; None when one did not end well."""
         point = super().evaluate(y, with_jacobian, warm)
         return None if point is None else self.seen(point)
 

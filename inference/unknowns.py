@@ -260,11 +260,6 @@ class Unknowns:
         names = np.concatenate([[name] * len(rows) for name, rows in self.moduli.items()])
         return self.inequalities[0][: len(names)][names == SHEAR]
 
-    def is_positive(self, coefficients: Array) -> bool:
-        """Return whether every modulus is above its margin on the grid (Eq. 4.9), (size,) MPa."""
-        grid, margin = self.positivity
-        return bool((grid @ coefficients >= margin).all())
-
 
 MOST_VALUES = 4  # values of one modulus that are drawn
 

@@ -101,7 +101,6 @@ class GapObjective:
         return self.jacobian(history, history.displacement[..., None])[:, 0]
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, parameters) from the solver's slope of the displacements."""
         flat = slope.reshape(len(self.roots), -1, slope.shape[-1])
         return np.asarray((self.roots @ (self.shape.fields.T @ flat)).reshape(-1, flat.shape[-1]))
 

@@ -216,7 +216,6 @@ class BiaxialPath:
 
     @property
     def ratio(self) -> str:
-        """Return the ratio of the loads."""
         return self.cycle.ratio
 
     @property

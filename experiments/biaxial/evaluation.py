@@ -11,13 +11,12 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, rows
 from ...inference.assessment import UNCERTAIN
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
-from ..kinds import UNMATCHED, UNSTABLE
+from ..kinds import UNMATCHED, UNSTABLE, Array
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialTest
@@ -25,7 +24,6 @@ from .test import BiaxialTest
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 #: Of a loading's range: how near both loads must be to those of the first row.
 BACK = 0.01
 

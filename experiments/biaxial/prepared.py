@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison
@@ -18,12 +17,18 @@ from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Doubt, Expected, FittedTest, MakeSolver, Masks, Planning, Weighting
-from ..measured import PERCENT, USUAL_NOISE, StrainObjective, StrainsPrepared
+from ..kinds import Array, Doubt, Expected, FittedTest, MakeSolver, Masks, Planning, Weighting
+from ..measured import (
+    PERCENT,
+    USUAL_NOISE,
+    FittedPart,
+    StrainObjective,
+    StrainsPrepared,
+    fitted_parts,
+)
 from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
 from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
 
-Array = NDArray[np.float64]
 #: Strains at the end of a path: no coated fabric ends below or above.
 LEAST_END, MOST_END = 5e-4, 0.5
 #: kN/m: a cruciform of a coated fabric is loaded by more, and by less.
@@ -58,28 +63,11 @@ class PathObjective(StrainObjective):
         return np.asarray(own - own[0])
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (2 n, parameters) from the slope of the displacements."""
         own = elongations(slope)
         return self.in_blocks(own - own[0])
 
     def of_points(self, values: Array) -> Array:
-        """Return values for each residual from values for each load of the path."""
         return np.tile(values[1:], 2)
-
-
-@dataclass(frozen=True, eq=False)
-class FittedPath:
-    """One ratio of a finished fit: measured data and the best law's response."""
-
-    path: BiaxialPath
-    objective: PathObjective
-    history: History
-
-    @property
-    def rms(self) -> tuple[float, float]:
-        """Return the RMS errors of the strains along warp and fill, %."""
-        warp, fill = self.objective.rms(self.history).tolist()
-        return warp, fill
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,18 +114,11 @@ class PreparedBiaxial(StrainsPrepared):
             found.append(Comparison(*own, contracts=True))
         return tuple(found)
 
-    def fitted_paths(self, fitted: FittedTest) -> tuple[FittedPath, ...]:
-        """Return the ratios with the best law's response."""
-        known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
-        found = []
-        for path in self.test.data.paths:
-            comparison, history = known[self.part(path.ratio)]
-            assert isinstance(comparison.objective, PathObjective)
-            found.append(FittedPath(path, comparison.objective, history))
-        return tuple(found)
+    def fitted_paths(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
+        """Return the ratios that a fit matched."""
+        return fitted_parts(self.test.data.paths, fitted)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        """Return the files, with the number of rows on matched paths."""
         used = {id(table): 0 for table in self.test.data.tables}
         for path in self.test.data.paths:
             used[id(path.table)] += len(path.load)
@@ -149,7 +130,6 @@ class PreparedBiaxial(StrainsPrepared):
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the paths."""
         paths = self.test.data.paths
         found = [doubt for path in paths for doubt in _of_path(path)]
         for path in paths if expected.moduli else ():

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ...errors import Note, SolverFailure
 from ...materials.card import MaterialCard
@@ -19,13 +18,12 @@ from ...reports.content import Exhibit, Table
 from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import saved
 from .. import kinds
-from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
 from .data import BiaxialPath
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
-from .prepared import PERCENT, FittedPath, PreparedBiaxial
+from .prepared import PERCENT, FittedPart, PreparedBiaxial
 from .test import BiaxialTest
 
-Array = NDArray[np.float64]
 YARNS = ("warp", "fill")
 #: Of the tables of `bubblefit biaxial`.
 CONTENT = {
@@ -36,12 +34,12 @@ CONTENT = {
 }
 
 
-def misfit_table(paths: Sequence[FittedPath]) -> Table:
+def misfit_table(paths: Sequence[FittedPart]) -> Table:
     """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
-        [p.path.ratio, *p.rms, f"{p.path.cycle.number} of {p.path.cycles}", len(p.path.load),
-         *p.path.larger[[0, -1]].tolist(), *(PERCENT * p.path.residual).tolist()]
-        for p in paths
+        [own.ratio, *rms.tolist(), f"{own.cycle.number} of {own.cycles}", len(own.load),
+         *own.larger[[0, -1]].tolist(), *(PERCENT * own.residual).tolist()]
+        for own, rms in ((p.data, p.rms) for p in paths)
     ]  # fmt: skip
     header = [
         "ratio", "RMS error warp, %", "RMS error fill, %", "cycle", "points matched",
@@ -153,16 +151,16 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
     paths, numbers = prepared.fitted_paths(fitted), {}
     for p in paths:
-        warp, fill = p.rms
-        numbers[p.path.ratio] = {
-            "rms_warp_percent": warp, "rms_fill_percent": fill, "matched": len(p.path.load),
-            "cycle": p.path.cycle.number, "cycles": p.path.cycles,
-            "end_load_warp_kN_per_m": float(p.path.load[-1, 0]),
-            "end_load_fill_kN_per_m": float(p.path.load[-1, 1]),
-            "residual_warp_percent": 100 * float(p.path.residual[0]),
-            "residual_fill_percent": 100 * float(p.path.residual[1]),
+        warp, fill = p.rms.tolist()
+        numbers[p.data.ratio] = {
+            "rms_warp_percent": warp, "rms_fill_percent": fill, "matched": len(p.data.load),
+            "cycle": p.data.cycle.number, "cycles": p.data.cycles,
+            "end_load_warp_kN_per_m": float(p.data.load[-1, 0]),
+            "end_load_fill_kN_per_m": float(p.data.load[-1, 1]),
+            "residual_warp_percent": 100 * float(p.data.residual[0]),
+            "residual_fill_percent": 100 * float(p.data.residual[1]),
         }  # fmt: skip
-    errors = ", ".join(f"{p.path.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
+    errors = ", ".join(f"{p.data.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
     warnings = tuple(_warnings(prepared.test))
     return Findings({"ratios": numbers}, warnings, (summary,), summary, summary)
@@ -172,9 +170,9 @@ def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
     """Return charts of strain over load, measured and modelled."""
     panels = []
     for p in prepared.fitted_paths(fitted):
-        curve = ("model", p.path.larger, PERCENT * p.objective.modelled(p.history))
+        curve = ("model", p.data.larger, PERCENT * p.objective.modelled(p.history))
         strain = PERCENT * p.objective.strain
-        panels.append(BiaxialPanel(p.path.ratio, p.path.larger, strain, (curve,)))
+        panels.append(BiaxialPanel(p.data.ratio, p.data.larger, strain, (curve,)))
     caption = "Strain over the larger load: measured and modelled"
     return biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
 
@@ -191,10 +189,10 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
         own = p.objective.strain, p.objective.modelled(p.history)
         columns = zip(("strain_percent", "model_percent"), own, strict=True)
         strains = [_columns(PERCENT * values, name) for name, values in columns]
-        parts.append(pd.concat([_columns(p.path.load, "load_kN_per_m"), *strains], axis=1))
-        parts[-1].insert(0, "ratio", p.path.ratio)
+        parts.append(pd.concat([_columns(p.data.load, "load_kN_per_m"), *strains], axis=1))
+        parts[-1].insert(0, "ratio", p.data.ratio)
     charts = fitted_paths(prepared, fitted)
-    facts = [("ratios matched", ", ".join(p.path.ratio for p in paths))]
+    facts = [("ratios matched", ", ".join(p.data.ratio for p in paths))]
     files = [
         out.write(
             "paths.csv", pd.concat(parts), "loads and strains of every ratio, measured and modelled"
@@ -234,8 +232,8 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
         columns = {"measured": measured, "modelled": modelled, "difference": modelled - measured}
         for k, yarn in enumerate(YARNS):
-            table = _columns(p.path.load[1:], "load_kN_per_m")
-            table.insert(0, "part", p.path.ratio)
+            table = _columns(p.data.load[1:], "load_kN_per_m")
+            table.insert(0, "part", p.data.ratio)
             own = {name: values[1:, k] for name, values in columns.items()}
             parts.append(table.assign(quantity=f"{yarn}_strain", **own, unit="%"))
     return pd.concat(parts, ignore_index=True)

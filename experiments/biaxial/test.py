@@ -187,7 +187,6 @@ class BiaxialTest:
         return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}
 
     def settings(self) -> Mapping[str, object]:
-        """Return the settings that a result depends on; data count by themselves."""
         return {"weight": self.weight, "noise": self.noise}
 
 

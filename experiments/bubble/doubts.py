@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
-from ..kinds import Doubt, Expected
+from ..kinds import Array, Doubt, Expected
 from . import registration
 from .sheet import fit_disk_polynomial
 
-Array = NDArray[np.float64]
 #: Of the highest rise: a centre that sinks by more while the pressure rises is no noise.
 SINKS = 0.02
 #: Between two pressures ln(rise) grows by so large a part of what it does in the others (of ln(p),
@@ -170,7 +169,7 @@ class View:
         return [(f.points, f.displacement[:, 2]) for f in high]
 
     @cached_property
-    def clamp(self) -> registration.ClampEdge | None:
+    def clamp(self) -> registration.Rim | None:
         """Find the edge of the clamp; None where no points stand still around the disk."""
         outline = self.outline
         return registration.clamp_of_motion(

@@ -22,10 +22,9 @@ from ...errors import InputError
 from ...inference.comparison import NoiseIs
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface
-from ...solvers.base import History
+from ...solvers.base import Array, History
 from .test import BubbleTest
 
-Array = NDArray[np.float64]
 Unknowns = Mapping[str, float]
 #: Nuisance of a measured field: a rigid displacement, mm.
 OFFSETS = ("offset_x", "offset_y", "offset_z")
@@ -104,12 +103,10 @@ class FieldObjective:
 
     @property
     def scale(self) -> Array:
-        """Return (m,) millimetres in one unit of each residual."""
         return np.repeat(np.concatenate(self.scales), self.sizes)
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
         places = [t.sample.data for t in self.targets if t.sample is not None]
         return (*(t.displacement for t in self.targets), *places)
 
@@ -130,7 +127,6 @@ class FieldObjective:
         return np.concatenate([np.tile(own, 3) for own in np.split(values, ends)])
 
     def shifted(self, here: History, there: History) -> FieldObjective:
-        """Return the objective of a model that moves as `here` where this one moves as `there`."""
         other = copy.copy(self)
         by = here.displacement - there.displacement
         other.targets = tuple(
@@ -221,7 +217,6 @@ class FieldObjective:
         return np.asarray(mean)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, parameters) from d displacement (frames, nodes, 3, parameters)."""
         return self._columns([target.of(slope, k) for k, target in enumerate(self.targets)])
 
     def _columns(self, parts: list[Array]) -> Array:

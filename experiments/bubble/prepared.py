@@ -74,14 +74,12 @@ class PreparedBubble:
 
     @property
     def objective_is(self) -> str:
-        """Describe the objective."""
         own = OBJECTIVES[self.test.objective]
         unknown = self.test.sheet.modes or self.test.sheet.slack
         return f"{own}, and what is known of the sheet" if unknown else own
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return nothing: a bubble is one specimen."""
         return {}
 
     @property
@@ -214,7 +212,6 @@ class PreparedBubble:
         return replace(own, model=model, objective=moved, prolong=prolong)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        """Return the files of the measured fields; none where they were computed."""
         recorded = self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
         logs = () if recorded is None else recorded.logs
         if isinstance(self.test.data, PointFiles) and self.test.data.options.reference:
@@ -253,7 +250,6 @@ class PreparedBubble:
         return View(self.fields, test.outline, test.thickness, registered, flat, numbers)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the measured fields; none where they were computed."""
         return () if self.known is not None else doubts_of(self.view, expected)
 
 

@@ -9,7 +9,7 @@ centre, clamp motion and warp together."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import factorial
 from typing import Literal
@@ -229,13 +229,16 @@ HIGH = 0.5
 class Rim:
     """The clamped edge in the plane of the sheet: centre x, y and its standard error, mm.
     angle : of the first semi-axis from x towards y, degrees (0 for a circle). turn_error : of an
-    angle that was found, degrees; 0 where it was not looked for."""
+    angle that was found, degrees; 0 where it was not looked for. scale : of the semi-axes that were
+    said. still : points beyond it that stand still, where it was found by these."""
 
     x: float
     y: float
     angle: float
     error: float
     turn_error: float = 0.0
+    scale: float = 1.0
+    still: int = 0
 
 
 def rim_of_motion(
@@ -256,42 +259,43 @@ def rim_of_motion(
     guess = np.array([*start, _long_axis(*surfaces[-1], semi_axes) if free else fixed])
     few = [_on_disk(*one, guess, semi_axes) for one in surfaces[-FRAMES:]]
 
+    def terms(points: Array, place: Array) -> Array:
+        return _terms(_local(points, np.append(place, fixed)[:3], semi_axes))
+
+    count = 3 if free else 2
+    scale = [semi_axes[0], semi_axes[0], 60.0][:count]
+    place, covariance = _followed(few, terms, [guess[:count]], scale, np.full(count, np.inf))
+    error = float(np.sqrt(np.trace(covariance[:2, :2])))
+    turn = float(place[2]) % 180.0 if free else fixed
+    turn_error = float(np.sqrt(covariance[2, 2])) if free else 0.0
+    return Rim(float(place[0]), float(place[1]), turn, error, turn_error)
+
+
+def _followed(
+    few: Sequence[tuple[Array, Array]], terms: Callable[[Array, Array], Array],
+    starts: Sequence[Array], scale: Sequence[float], reach: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return the place whose terms (n, k) at the points follow the rises best; its covariance.
+    few : points and rises. starts : of which the best is taken. reach : from there, at most."""
+
     def left(place: Array) -> Array:
-        at = place if free else np.array([*place, fixed])
         parts = []
         for points, rise in few:
-            orthogonal, _ = np.linalg.qr(_terms(_local(points, at, semi_axes)))
+            orthogonal, _ = np.linalg.qr(terms(points, place))
             parts.append(rise - orthogonal @ (orthogonal.T @ rise))
         return np.concatenate(parts)
 
-    count = 3 if free else 2
     from scipy.optimize import least_squares  # heavy: where it is used
 
-    best = least_squares(left, guess[:count], x_scale=[semi_axes[0], semi_axes[0], 60.0][:count])
+    start = min(starts, key=lambda place: np.linalg.norm(left(place)))
+    best = least_squares(left, start, x_scale=scale, bounds=(start - reach, start + reach))
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
-    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
-    error = float(np.sqrt(np.trace(covariance[:2, :2])))
-    turn = float(best.x[2]) % 180.0 if free else fixed
-    turn_error = float(np.sqrt(covariance[2, 2])) if free else 0.0
-    return Rim(float(best.x[0]), float(best.x[1]), turn, error, turn_error)
-
-
-@dataclass(frozen=True)
-class ClampEdge:
-    """The edge of the clamp by the points that stand still: a centre x, y, mm, and its size.
-    scale : of the semi-axes that were said. error : standard error of the centre, mm. still :
-    points beyond the edge."""
-
-    x: float
-    y: float
-    scale: float
-    error: float
-    still: int
+    return best.x, variance * np.linalg.pinv(best.jac.T @ best.jac)
 
 
 def clamp_of_motion(
     surfaces: Sequence[tuple[Array, Array]], semi_axes: tuple[float, float], angle: float = 0.0
-) -> ClampEdge | None:
+) -> Rim | None:
     """Find the edge beyond which points stand still; None where too few around the disk do.
     The rise of every frame is a polynomial times a factor that is zero from the edge on, whose
     centre and size are looked for. surfaces, semi_axes, angle : as those of `rim_of_motion`."""
@@ -307,22 +311,15 @@ def clamp_of_motion(
     def local(points: Array, place: Array) -> Array:
         return _local(points, np.array([*place[:2], angle]), semi_axes) / place[2]
 
-    def left(place: Array) -> Array:
-        parts = []
-        for points, rise in few:
-            orthogonal, _ = np.linalg.qr(_terms(local(points, place), still=True))
-            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
-        return np.concatenate(parts)
+    def terms(points: Array, place: Array) -> Array:
+        return _terms(local(points, place), still=True)
 
     # Too large a circle hides in the points that stand still: the best of several is the start.
-    start = min((np.array([0.0, 0.0, s]) for s in SIZES), key=lambda a: np.linalg.norm(left(a)))
+    starts = [np.array([0.0, 0.0, size]) for size in SIZES]
     ends = np.array([0.5 * semi_axes[1], 0.5 * semi_axes[1], 0.2])
-    scale = [semi_axes[0], semi_axes[0], 1.0]
-    from scipy.optimize import least_squares  # heavy: where it is used
-
-    best = least_squares(left, start, x_scale=scale, bounds=(start - ends, start + ends))
+    place, covariance = _followed(few, terms, starts, [semi_axes[0], semi_axes[0], 1.0], ends)
     points, rise = few[-1]
-    places = local(points, best.x)
+    places = local(points, place)
     beyond = np.hypot(*places) > BEYOND
     if beyond.sum() < LEAST or not in_all_quarters(places[:, beyond].T):
         return None
@@ -330,11 +327,9 @@ def clamp_of_motion(
     level = np.median(rise[beyond])
     if np.median(np.abs(rise[beyond] - level)) > STILL:
         return None
-    variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
-    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
     error = float(np.sqrt(np.trace(covariance[:2, :2])))
-    x, y, size = map(float, best.x)
-    return ClampEdge(x, y, size, error, int(beyond.sum()))
+    x, y, size = map(float, place)
+    return Rim(x, y, angle, error, scale=size, still=int(beyond.sum()))
 
 
 #: Rounds of the search for a circle, and the change of its size after which it ends.
@@ -343,7 +338,7 @@ ROUNDS, ENDED = 8, 1e-4
 
 def clamp_radius(
     fields: Sequence[DisplacementField], options: RegistrationOptions | None = None
-) -> tuple[float, ClampEdge]:
+) -> tuple[float, Rim]:
     """Return the radius (mm) of the circle beyond which points stand still, and its edge.
     fields : by rising pressure. options : of the registration, None for fields in the test's
     coordinates. Raises InputError where too few points around the disk stand still."""

@@ -39,7 +39,7 @@ from ...reports.maps import (
     write_vtu,
 )
 from ...reports.vega import save, saved
-from ...solvers.base import STRAIN_DATA, STRESS_DATA, History
+from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
 from . import findings as wording
 from .findings import fitted_model, objective_of
@@ -51,7 +51,6 @@ from .section import DIRECTIONS, Sheet
 from .sheet import at_nodes, states
 from .test import PART, BubbleTest, apex_heights
 
-Array = NDArray[np.float64]
 #: What each choice of the plane means.
 PLANES = {
     "clamp": "through the points beyond the rim",

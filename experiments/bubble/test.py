@@ -142,7 +142,6 @@ class BubbleTest:
 
     @property
     def thickness(self) -> float:
-        """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
 
     @property
@@ -152,7 +151,6 @@ class BubbleTest:
 
     @property
     def reads_files(self) -> bool:
-        """Return whether its data are measured, not computed."""
         return isinstance(self.data, PointFiles)
 
     def model(
@@ -186,7 +184,6 @@ class BubbleTest:
         return {PART: self.model(thickness, increments=steps)}
 
     def settings(self) -> Mapping[str, object]:
-        """Return everything but names and places of files."""
         names = (
             "elements", "symmetry", "generator", "pressures", "increments", "match_by",
             "match_degree", "objective", "displacement_offset", "pressure_offset", "weight",

@@ -17,13 +17,11 @@ from ...meshes.cylinder_model import CurveReading, CylinderModel
 from ...meshes.mesh import Mesh, surface_strain
 from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
-from ..kinds import STRAINS, PredictedRun, RunRecord, Studied, band_of
+from ..kinds import STRAINS, Array, PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,7 +336,6 @@ class CylinderOutcome:
 
     @cached_property
     def measures(self) -> Mapping[int, BendingMeasures]:
-        """Return the numbers of those runs."""
         return {
             i: bending_measures(self.runs[i].model, run, self.runs[i].test.measured)
             for i, run in self.bent.items()
@@ -418,12 +415,10 @@ class CylinderOutcome:
         return f"stopped at {reached:g} of {whole:g} mm: {record.early}"
 
     def error(self, number: int) -> float | None:
-        """Return RMS of model less reading over the largest load read; None where there is none."""
         measures = self.measures.get(number)
         return None if measures is None or measures.error is None else measures.error.relative
 
     def numbers(self, number: int) -> Mapping[str, Any]:
-        """Return the numbers of a run that did not fail, for result.json."""
         m = self.measures[number]
         around = self.runs[number].around if number in self.spreads else None
         return {
@@ -448,7 +443,6 @@ class CylinderOutcome:
         }
 
     def columns(self, number: int) -> Mapping[str, object]:
-        """Return a row of the table of runs; None where a number is unknown or a run failed."""
         m = self.measures.get(number)
         row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
         for name in ("knee", "limit", "wrinkles"):
@@ -477,7 +471,6 @@ class CylinderOutcome:
         return row
 
     def curve(self, number: int) -> pd.DataFrame:
-        """Return the run frame by frame; no rows where it failed."""
         import pandas as pd
 
         run = self.bent.get(number)
@@ -491,7 +484,6 @@ class CylinderOutcome:
         return curve
 
     def test_numbers(self, test: CylinderTest) -> Mapping[str, Any]:
-        """Return the numbers of a cylinder, for result.json."""
         return {
             "diameter_mm": test.diameter,
             "pressure_kPa": 1e3 * test.pressure,
@@ -559,7 +551,6 @@ class CylinderPredicted:
     outcome = CylinderOutcome
 
     def depends_on(self, model: CylinderModel | BeamModel) -> Sequence[object]:
-        """Return all of a model that its result depends on."""
         mesh = model.mesh
         if isinstance(model, BeamModel):
             beam = {f.name: getattr(model, f.name) for f in fields(model) if f.name != "mesh"}
@@ -571,7 +562,6 @@ class CylinderPredicted:
         )  # fmt: skip
 
     def measured(self, test: CylinderTest) -> bool:
-        """Return whether a test has measured loads."""
         return bool(test.measured)
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ...errors import marks, percent
 from ...materials.card import BAND, LEVEL, MaterialCard
@@ -31,7 +30,7 @@ from ...reports.cylinders import (
 )
 from ...reports.maps import write_vtu
 from ...reports.vega import save
-from ..kinds import CardRun, Output, PredictedRun, Shown, Simulation, record_of
+from ..kinds import Array, CardRun, Output, PredictedRun, Shown, Simulation, record_of
 from .predicted import (
     SECANT,
     BendingRun,
@@ -42,8 +41,6 @@ from .predicted import (
     place_names,
 )
 from .test import PART, CylinderTest
-
-Array = NDArray[np.float64]
 
 #: Node sets that the picture draws as lines.
 LINES = ("mid_span", "top_line", "bottom_line")

@@ -204,7 +204,6 @@ class CylinderTest:
     reach = Reach()
 
     def data_files(self) -> Sequence[DataFile]:
-        """Return the files of the measured repetitions."""
         return joined(
             DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
             for c in self.measured

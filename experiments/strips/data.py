@@ -23,9 +23,7 @@ from ...readers.curves import (
 from ...readers.frames import FrameSource
 from ...readers.registry import format_of
 from ...readers.tables import STRAIN_UNITS
-from ..kinds import DataFile, Doubt, Expected
-
-Array = NDArray[np.float64]
+from ..kinds import Array, DataFile, Doubt, Expected
 
 
 @dataclass(frozen=True)

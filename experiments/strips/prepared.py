@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +22,7 @@ from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
 from ...readers.curves import DIRECTIONS, LoadCurve
 from ...solvers.base import History
 from ..kinds import (
+    Array,
     Candidate,
     DataFile,
     Doubt,
@@ -35,10 +35,9 @@ from ..kinds import (
     Weighting,
     joined,
 )
+from ..measured import FittedPart, fitted_parts
 from .data import Strip, doubts_of_strips
 from .test import StripsTest, reach_of
-
-Array = NDArray[np.float64]
 
 
 class LoadObjective:
@@ -77,17 +76,14 @@ class LoadObjective:
 
     @property
     def scale(self) -> Array:
-        """Return newtons in one unit of each residual, (n,)."""
         return np.full(len(self.load), self._unit)
 
     @property
     def measured(self) -> Array:
-        """Return the measured loads, (n,) N."""
         return self.load
 
     @property
     def data(self) -> tuple[Array, ...]:
-        """Return everything measured that the residual depends on."""
         return self.elongation, self.load
 
     @property
@@ -96,11 +92,9 @@ class LoadObjective:
         return (self.elongation[:, None],)
 
     def of_points(self, values: Array) -> Array:
-        """Return values for each residual from values for each measured point."""
         return values
 
     def shifted(self, here: History, there: History) -> LoadObjective:
-        """Return the objective of a model that carries `here` where this one carries `there`."""
         other = copy.copy(self)
         other.load = self.load - self.sample @ (here.load - there.load)
         return other
@@ -110,11 +104,9 @@ class LoadObjective:
         return np.asarray(self.sample @ history.load)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return the block, (n,)."""
         return np.asarray((self.modelled(history) - self.load) / self._unit)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (n, parameters) from the history's load slope."""
         if history.load_slope is None:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
         return np.asarray(self.sample @ history.load_slope / np.reshape(self._unit, (-1, 1)))
@@ -206,26 +198,6 @@ STRAIGHT, BIAS = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
-class FittedStrip:
-    """One strip of a finished fit: measured data and the best law's response."""
-
-    strip: Strip
-    model: UniaxialModel
-    objective: LoadObjective
-    history: History
-
-    @property
-    def direction(self) -> str:
-        """Return warp, fill or bias."""
-        return self.strip.direction
-
-    @property
-    def rms(self) -> float:
-        """Return the RMS error of the load, N."""
-        return self.objective.rms(self.history)
-
-
-@dataclass(frozen=True, eq=False)
 class PreparedStrips:
     """A test of strips with its data."""
 
@@ -234,7 +206,6 @@ class PreparedStrips:
 
     @property
     def objective_is(self) -> str:
-        """Return what is minimised, in words."""
         return OBJECTIVES[self.test.objective]
 
     @property
@@ -338,23 +309,15 @@ class PreparedStrips:
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
-    def fitted_strips(self, fitted: FittedTest) -> tuple[FittedStrip, ...]:
-        """Return the strips that a fit matched, each with its model, objective and history."""
-        known = {c.name: (c, h) for c, h in zip(fitted.comparisons, fitted.histories, strict=True)}
-        strips = []
-        for direction in self.test.matched:
-            own, history = known[self.part(direction)]
-            objective: Any = own.objective
-            strips.append(FittedStrip(self.test.strips[direction], own.model, objective, history))
-        return tuple(strips)
+    def fitted_strips(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
+        """Return the strips that a fit matched."""
+        return fitted_parts((self.test.strips[d] for d in self.test.matched), fitted)
 
     def data_files(self) -> Sequence[DataFile]:
-        """Return the files of the curves that are matched."""
         test, points = self.test, self.test.match_by == "points"
         return joined(file for d in test.matched for file in test.strips[d].data_files(points))
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        """Return the doubts about the load curves."""
         test = self.test
         sizes = test.width, test.thickness
         return doubts_of_strips(test.strips, *sizes, expected, test.grip_distance)

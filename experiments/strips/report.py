@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.card import MaterialCard
@@ -33,6 +32,7 @@ from ...solvers.base import History
 from ..kinds import (
     READING,
     UNMATCHED,
+    Array,
     CardRun,
     Findings,
     FittedTest,
@@ -42,8 +42,9 @@ from ..kinds import (
     by_strain,
     strains_of,
 )
+from ..measured import FittedPart
 from .data import Strip, compare_orders, curves_of
-from .prepared import FittedStrip, PreparedStrips
+from .prepared import PreparedStrips
 from .test import StripsTest
 
 #: The kind of notes that is made here.
@@ -52,27 +53,27 @@ LEFT_OUT = NoteKind("points left out")
 PINS = {"warp": "E1", "fill": "E2", "bias": "G12"}
 
 
-def _warnings(test: StripsTest, strips: Sequence[FittedStrip]) -> Iterator[Note]:
+def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
     """Yield warnings of what the data leave open before any fit."""
-    directions = {s.direction for s in strips}
+    directions = {s.data.direction for s in strips}
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
             yield Note(UNMATCHED, words + "directions")
-    for words in dict.fromkeys(n for s in strips for curve in s.strip.curves for n in curve.notes):
+    for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
         yield Note(READING, words)
     words = "points beyond the final length (or before zero) were left out"
     for s in strips:
-        if test.match_by == "points" and s.strip.beyond:
-            yield Note(LEFT_OUT, f"{s.strip.beyond} {words}", s.direction)
+        if test.match_by == "points" and s.data.beyond:
+            yield Note(LEFT_OUT, f"{s.data.beyond} {words}", s.data.direction)
 
 
-def misfit_table(strips: Sequence[FittedStrip]) -> Table:
+def misfit_table(strips: Sequence[FittedPart]) -> Table:
     """Return the misfit strip by strip beside the specimens' scatter (Eqs 3.4 to 3.6)."""
     rows: list[list[object]] = []
     for s in strips:
-        p = s.strip.polynomial
-        rows.append([s.direction, s.rms, s.strip.scatter, p and p.r_squared, p and p.rmse,
+        p = s.data.polynomial
+        rows.append([s.data.direction, s.rms, s.data.scatter, p and p.r_squared, p and p.rmse,
                      len(s.objective.load), float(s.history.load[-1])])  # fmt: skip
     header = ["strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial",
               "its RMSE, N", "points matched", "load at the end, N"]  # fmt: skip
@@ -83,7 +84,6 @@ def misfit_table(strips: Sequence[FittedStrip]) -> Table:
     return Table("Misfit by strip", header, rows, note)
 
 
-Array = NDArray[np.float64]
 #: Name, elongation (mm), load (N).
 Curve = tuple[str, Array, Array]
 
@@ -92,19 +92,12 @@ FINE = 121  # places at which a modulus is drawn
 ORDERS = range(1, 9)
 
 
-def load_panels(
-    strips: Sequence[Strip], models: Mapping[str, Sequence[Curve]],
-    rms: Mapping[str, Sequence[float]],
-) -> list[StripCurves]:  # fmt: skip
-    """Return the panels of `load_charts`; `models` and their `rms` (N) by direction."""
-    panels = []
-    for strip in strips:
-        d, points = strip.direction, strip.points if strip.curves else None
-        u, line = np.linspace(0.0, strip.elongation, SMOOTH), strip.polynomial
-        curve = None if line is None else (u, line(u))
-        errors = rms.get(d, ())
-        panels.append(StripCurves(d, models.get(d, ()), points, curve, strip.scatter, errors))
-    return panels
+def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> StripCurves:
+    """Return a panel of `load_charts`; models and their `rms` (N) in one order."""
+    points = strip.points if strip.curves else None
+    u, line = np.linspace(0.0, strip.elongation, SMOOTH), strip.polynomial
+    curve = None if line is None else (u, line(u))
+    return StripCurves(strip.direction, models, points, curve, strip.scatter, rms)
 
 
 def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) -> None:
@@ -116,7 +109,7 @@ def draw_bias(model: UniaxialModel, history: History, picture: Path, vtu: Path) 
     write_vtu(mesh, u, vtu, cell_data={"log_strain_1_2_12": strain})
 
 
-def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path) -> None:
+def draw_moduli(strips: Sequence[FittedPart], fitted: FittedTest, picture: Path) -> None:
     """Draw moduli up to the strains at the end of the strips, in one picture (as Fig. 3.8)."""
     ends = failure_strains(strips, fitted.valid)
     strains = np.array([np.linspace(0.0, ends[c], FINE) for c in COMPONENTS.values()])
@@ -124,12 +117,12 @@ def draw_moduli(strips: Sequence[FittedStrip], fitted: FittedTest, picture: Path
     save(picture, moduli_together(strains, np.array(moduli)))
 
 
-def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
+def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
     """Return the strains (3,) at the end of warp and fill, and shear in the bias gauge.
     valid : (3,) the ends of the moduli, which no strain shown exceeds."""
     ends = np.array(valid, dtype=float)
     for s in strips:
-        if s.direction == "bias":  # the largest shear of the quads between the gauge's ends
+        if s.data.direction == "bias":  # the largest shear of the quads between the gauge's ends
             mesh = s.model.mesh
             strain = surface_strain(mesh, s.history.displacement[-1], s.model.warp)
             corners = mesh.points[mesh.quads][:, :, 1]
@@ -137,8 +130,8 @@ def failure_strains(strips: Sequence[FittedStrip], valid: Array) -> Array:
             inside = (corners.min(axis=1) > low - 1e-9) & (corners.max(axis=1) < high + 1e-9)
             ends[2] = min(ends[2], float(np.abs(strain[inside, 2]).max()))
         else:
-            component = 0 if s.direction == "warp" else 1
-            ends[component] = min(ends[component], s.strip.strain)
+            component = 0 if s.data.direction == "warp" else 1
+            ends[component] = min(ends[component], s.data.strain)
     return ends
 
 
@@ -260,7 +253,7 @@ def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) 
         if n := pull.shown:
             drawn[direction].append((name, pull.elongation[:n], pull.history.load[:n]))
             rms[direction] += [] if pull.rms is None else [pull.rms]
-    panels = load_panels(list(test.strips.values()), drawn, rms)
+    panels = [load_panel(strip, drawn[d], rms[d]) for d, strip in test.strips.items()]
     save(out.path("loads.png"), load_charts("loads", panels))
     for number, name in enumerate(cards, start=1):
         if (name, "bias") in ended:
@@ -291,15 +284,15 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
     test, strips = prepared.test, prepared.fitted_strips(fitted)
     total = sum(s.rms for s in strips)
-    errors = ", ".join(f"{s.direction} {s.rms:.3g}" for s in strips)
-    scatter = [s.strip.scatter for s in strips]
+    errors = [f"{s.data.direction} {s.rms:.3g}" for s in strips]
+    scatter = [s.data.scatter for s in strips]
     beside = ["" if own is None else f" (specimens scatter by {own:.3g})" for own in scatter]
-    line = ", ".join(f"{s.direction} {s.rms:.3g}{b}" for s, b in zip(strips, beside, strict=True))
+    line = ", ".join(map("".join, zip(errors, beside, strict=True)))
     numbers = {
-        s.direction: {
-            "rms_N": s.rms, "scatter_N": s.strip.scatter, "weight": test.weights[s.direction],
-            "matched": len(s.objective.load), "gauge_length_mm": s.strip.gauge_length,
-            "final_length_mm": s.strip.final_length, "end_load_N": float(s.history.load[-1]),
+        s.data.direction: {
+            "rms_N": s.rms, "scatter_N": s.data.scatter, "weight": test.weights[s.data.direction],
+            "matched": len(s.objective.load), "gauge_length_mm": s.data.gauge_length,
+            "final_length_mm": s.data.final_length, "end_load_N": float(s.history.load[-1]),
         }
         for s in strips
     }  # fmt: skip
@@ -307,18 +300,18 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
         {"directions": numbers, "e_uniaxial_N": total, "matched_by": test.match_by},
         tuple(_warnings(test, strips)),
         (f"RMS error, N: {line}; sum {total:.4g}",),
-        "RMS errors in N: " + ", ".join(f"{s.direction} {s.rms:.4g}" for s in strips),
-        f"RMS errors in N: {errors}, together {total:.4g}",
+        "RMS errors in N: " + ", ".join(f"{s.data.direction} {s.rms:.4g}" for s in strips),
+        f"RMS errors in N: {', '.join(errors)}, together {total:.4g}",
     )
 
 
 def fitted_loads(prepared: PreparedStrips, fitted: FittedTest) -> Charts:
     """Return charts of load over elongation, measured and modelled, and of their difference."""
     strips = prepared.fitted_strips(fitted)
-    models = {
-        s.direction: [("model", np.array(s.model.elongations), s.history.load)] for s in strips
-    }
-    panels = load_panels([s.strip for s in strips], models, {s.direction: [s.rms] for s in strips})
+    panels = [
+        load_panel(s.data, [("model", np.array(s.model.elongations), s.history.load)], [s.rms])
+        for s in strips
+    ]
     caption = "Load over gauge elongation: measured and modelled"
     return load_charts(f"{prepared.test.name} loads", panels, caption)
 
@@ -332,10 +325,10 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
     test, strips = prepared.test, prepared.fitted_strips(fitted)
     parts = []
     for s in strips:
-        u, polynomial = np.array(s.model.elongations), s.strip.polynomial
+        u, polynomial = np.array(s.model.elongations), s.data.polynomial
         columns = {
-            "direction": s.direction, "elongation_mm": u,
-            "engineering_strain": u / s.strip.gauge_length, "model_N": s.history.load,
+            "direction": s.data.direction, "elongation_mm": u,
+            "engineering_strain": u / s.data.gauge_length, "model_N": s.history.load,
             "polynomial_N": np.nan if polynomial is None else polynomial(u),
         }  # fmt: skip
         parts.append(pd.DataFrame(columns))
@@ -346,14 +339,14 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
         saved(out, "loads.png", charts, "picture of the load curves"),
     ]
     for s in strips:
-        if s.direction == "bias":
+        if s.data.direction == "bias":
             draw_bias(s.model, s.history, out.path("bias.png"), out.path("bias.vtu"))
             figures.append((out.name("bias.png"), "The bias strip at the end, and its shear"))
             files.append((out.name("bias.vtu"), "the deformed bias strip, for ParaView"))
     draw_moduli(strips, fitted, out.path("failure.png"))
     caption = "Tangent moduli up to the strains at the end of each strip"
     figures.append((out.name("failure.png"), caption))
-    if draw_orders([s.strip for s in strips], out.path("orders.png")):
+    if draw_orders([s.data for s in strips], out.path("orders.png")):
         caption = "Error of load polynomials by order, and with a specimen left out"
         figures.append((out.name("orders.png"), caption))
     standards, more = show_standard(test, out)
@@ -444,7 +437,7 @@ def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     for s in prepared.fitted_strips(fitted):
         modelled, measured = s.objective.modelled(s.history), s.objective.load
         columns = {
-            "part": s.direction, "elongation_mm": s.objective.elongation, "quantity": "load",
+            "part": s.data.direction, "elongation_mm": s.objective.elongation, "quantity": "load",
             "measured": measured, "modelled": modelled, "difference": modelled - measured,
             "unit": s.objective.unit,
         }  # fmt: skip

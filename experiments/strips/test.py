@@ -168,7 +168,6 @@ class StripsTest:
 
     @property
     def thickness(self) -> float:
-        """Return the thickness of the fabric, mm."""
         return self.place.fabric.thickness
 
     @cached_property
@@ -202,7 +201,6 @@ class StripsTest:
         return models
 
     def settings(self) -> Mapping[str, object]:
-        """Return everything but names and places of files."""
         names = ("width", "grip_distance", "bias_angle", "increments", "match_by", "objective",
                  "weight")  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}

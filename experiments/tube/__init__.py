@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, Field
 
 from ...errors import InputError
@@ -24,10 +24,9 @@ from ...readers.frames import FrameSource
 from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
+from ..kinds import Array, Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
 from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, StrainObjective, StrainsPrepared
 
-Array = NDArray[np.float64]
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
 STRAINS = {"axial_percent": 0.01, "hoop_percent": 0.01, "twist_deg_per_m": np.pi / 180e3}
@@ -81,7 +80,6 @@ class TubeTest:
         return {PART: TubeModel(self.loads, self.radius, thick)}
 
     def settings(self) -> Mapping[str, object]:
-        """Return the settings that a result depends on; data count by themselves."""
         return {"weight": self.weight, "noise": self.noise, "radius": self.radius}
 
 
@@ -150,7 +148,6 @@ class TubeObjective(StrainObjective):
         return _centred(self.model.strains(history.displacement)[:, self.read])
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        """Return (m, parameters) from the slope of the displacements."""
         own = self.model.strain_slopes(history.displacement, slope)[:, self.read]
         return self.in_blocks(_centred(own))
 
@@ -173,7 +170,6 @@ class PreparedTube(StrainsPrepared):
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        """Return the one comparison."""
         test = self.test
         count = int((~np.isnan(test.strain).any(axis=0)).sum())
         weight = weighting.weight / count if weighting.relative else 1.0
@@ -181,7 +177,6 @@ class PreparedTube(StrainsPrepared):
         return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        """Return the file."""
         own = self.test.path
         count = len(self.test.loads)
         return [] if own is None else [kinds.DataFile(own, FrameSource("csv"), count, {})]

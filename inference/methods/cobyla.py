@@ -18,7 +18,6 @@ class Cobyla:
     max_analyses = 2000
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
-        """Fit from the unknowns `start`; None when the analysis there fails."""
         return nlopt_minimise(nlopt.LN_COBYLA, problem, start, options, FIRST_STEP)
 
 

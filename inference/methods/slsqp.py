@@ -197,7 +197,6 @@ class Slsqp:
     max_analyses = 500
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
-        """Fit from the unknowns `start`; None when the analysis there fails."""
         return nlopt_minimise(nlopt.LD_SLSQP, problem, start, options)
 
 

@@ -227,7 +227,7 @@ def test_what_is_determined_in_closed_form(together, written):
     noise, alone = {}, {}
     for prepared in fit.setup.tests:
         for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
-            scatter, part = strip.strip.scatter, prepared.part(strip.direction)
+            scatter, part = strip.data.scatter, prepared.part(strip.data.direction)
             noise[part] = max(strip.rms, scatter)
             rms, of, unit, _, times = shown.pop(part)
             assert (of, unit) == (scatter, "N") and times == pytest.approx(strip.rms / scatter)

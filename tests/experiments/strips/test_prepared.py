@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.experiments.kinds import READING, UNMATCHED, CardRun, FittedTest, Output, Weighting
+from bubblefit.experiments.measured import FittedPart
 from bubblefit.experiments.strips import KIND, report
 from bubblefit.experiments.strips.data import BELOW, BEYOND, Strip, compare_orders
-from bubblefit.experiments.strips.prepared import FittedStrip, LoadObjective, PreparedStrips
+from bubblefit.experiments.strips.prepared import LoadObjective, PreparedStrips
 from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
@@ -155,7 +156,7 @@ def test_no_modulus_is_shown_beyond_where_it_is_fitted(published, monkeypatch):
     prepared = published()
     fit = fitted(prepared)
     strips = prepared.fitted_strips(fit)
-    gauges = [s.strip.strain for s in strips]
+    gauges = [s.data.strain for s in strips]
     assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
     ends = report.failure_strains(strips, fit.valid)
     assert (ends <= fit.valid).all()
@@ -226,7 +227,7 @@ def test_shear_is_that_of_the_quads_between_the_gauge_points(monkeypatch):
         return strain
 
     monkeypatch.setattr(report, "surface_strain", middle)
-    strip = SimpleNamespace(direction="bias", model=model, history=history)
+    strip = SimpleNamespace(data=BIAS, model=model, history=history)
     assert report.failure_strains([strip], np.full(3, 9.0))[2] == pytest.approx(0.3)
     drawn = caught(monkeypatch, report, "strip_charts")
     monkeypatch.setattr(report, "write_vtu", lambda *what, **more: drawn.append((what, more)))
@@ -259,9 +260,9 @@ def history(*load: float, shear: float = 0.0) -> History:
     return History(np.array(load), np.zeros((2, 4, 3)), -strain / 2, strain)
 
 
-def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedStrip:
+def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedPart:
     objective = LoadObjective([2.0, 4.0], [2.0, 4.0], [200.0, 400.0])
-    return FittedStrip(strip, MODEL, objective, history(*loads))
+    return FittedPart(strip, MODEL, objective, history(*loads))
 
 
 def holding(test, strips) -> Any:
