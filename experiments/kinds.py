@@ -261,9 +261,9 @@ class PreparedTest(Protocol):
     """A test with its data, in memory, as worker processes get it.
     objective_is : its own objective, in words. known : the law behind computed data. specimens : by
     comparison, of each point that can be left out of a fit. One with measured files also has
-    `data_files()`, for the record of a run (`OfFiles`), as a test that is predicted does. A kind
-    that looks at its data before a fit has `doubts(expected)`, and then lists the names of its
-    doubts, `Kind.doubts`."""
+    `data_files()`, for the record of a run, as a test that is predicted does. A kind that looks at
+    its data before a fit has `doubts(expected)`, and then lists the names of its doubts,
+    `Kind.doubts`."""
 
     @property
     def test(self) -> Test: ...
@@ -722,17 +722,10 @@ class DataFile:
     dropped: Mapping[str, int] = field(default_factory=dict)
 
 
-@runtime_checkable
-class OfFiles(Protocol):
-    """A prepared or predicted test with measured files."""
-
-    def data_files(self) -> Sequence[DataFile]:
-        """Return its measured files in their order; none where data are computed."""
-
-
 def files_of(test: object) -> tuple[DataFile, ...]:
-    """Return the measured files of a test; none of one without."""
-    return tuple(test.data_files()) if isinstance(test, OfFiles) else ()
+    """Return the measured files of a prepared or predicted test, its `data_files()` if it has any.
+    These are in their order; none where data are computed."""
+    return tuple(getattr(test, "data_files", tuple)())
 
 
 def joined(parts: Iterable[DataFile]) -> list[DataFile]:

@@ -1,7 +1,5 @@
 """Kinds of test by name: the folders beside this file, and those of other distributions."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 from functools import cache

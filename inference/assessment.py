@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import Note, NoteKind
 from ..materials.card import band_at
-from ..materials.forms.base import COMPONENTS, Array, modulus_rows
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from .linear import (
     LEFT,
@@ -270,12 +270,9 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
     """Return a verdict for each unknown beside the moduli.
     ends : (3,) strains (eps1, eps2, gamma12) to which the moduli are known."""
     unknowns, covariance = posterior.unknowns, posterior.covariance
-    size, free = unknowns.size, list(unknowns.free)
-    slopes = {}
-    for modulus, component in COMPONENTS.items():
-        middle = [0.5 * float(ends[component])]
-        row = modulus_rows(unknowns.form, modulus, middle, unknowns.strain_range)[0, free]
-        slopes[modulus] = row @ unknowns.to_coefficients
+    size, middle = unknowns.size, 0.5 * np.asarray(ends, dtype=float)
+    slopes = {name: unknowns.rows(name, middle[[c]])[0] @ unknowns.to_coefficients
+              for name, c in COMPONENTS.items()}  # fmt: skip
     of_law = covariance[:size, :size]
     spread = {m: float(np.sqrt(slope @ of_law @ slope)) for m, slope in slopes.items()}
     found = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, Protocol
 
@@ -258,10 +258,6 @@ class Comparison:
     must_be_stable: bool = True
     prolong: Callable[[Array], Array] | None = None
     _last: tuple[Array, Array, Array] | None = field(default=None, repr=False)
-
-    def by(self, solver: Solver) -> Comparison:
-        """Return the same comparison run by another solver."""
-        return replace(self, solver=solver, _last=None)
 
     def forget(self) -> None:
         """Drop the warm start until the next differentiated run."""

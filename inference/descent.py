@@ -36,7 +36,12 @@ def descend(
         if point.value < tolerance:
             return point, CONVERGED
         assert point.jacobian is not None
-        root = _block_weights(problem, point, norms)
+        root = np.ones_like(point.residual)
+        if norms:
+            # 1/norm of each block majorises e: its weighted sum of squares falls only if e does.
+            sizes = problem.blocks.norms(point.residual)
+            sizes = np.maximum(sizes, 1e-6 * sizes.max())
+            root = np.asarray(1.0 / np.sqrt(sizes))[problem.blocks.of]
         r, j = point.residual * root, point.jacobian * root[:, None]
         if only is not None:
             j[:, ~only] = 0.0
@@ -93,16 +98,6 @@ def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, fl
     if drop[k] < SMALLEST_DROP:
         return None
     return rows[k], float(0.5 * (before[k] + after[k]))
-
-
-def _block_weights(problem: FitProblem, point: Evaluation, norms: bool) -> Array:
-    """Return (m,) square roots of the weights of the squared residuals. 1/norm of each block
-    majorises e: its weighted sum of squares decreases only if e does."""
-    if not norms:
-        return np.ones_like(point.residual)
-    sizes = problem.blocks.norms(point.residual)
-    sizes = np.maximum(sizes, 1e-6 * sizes.max())
-    return np.asarray(1.0 / np.sqrt(sizes))[problem.blocks.of]
 
 
 def bounded_step(

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 from scipy.special import gammaincinv
 
-from ..materials.forms.base import Array, modulus_rows
+from ..materials.forms.base import Array
 from .descent import bounded_step
 from .posterior import LEVEL
 from .problem import Evaluation, FitProblem
@@ -33,10 +33,8 @@ BOUND, FAILED, FAR = "bound", "no analysis", "too many steps"
 
 def modulus_row(unknowns: Unknowns, name: str, strain: float) -> Array:
     """Return (unknowns,) so that this @ unknowns is a modulus (MPa) at a strain."""
-    at = np.array([strain])
-    rows = modulus_rows(unknowns.form, name, at, unknowns.strain_range)[:, list(unknowns.free)]
-    extra = np.zeros(unknowns.count - unknowns.size)
-    return np.concatenate([rows[0] @ unknowns.to_coefficients, extra])
+    row = unknowns.rows(name, np.array([strain]))[0] @ unknowns.to_coefficients
+    return np.concatenate([row, np.zeros(unknowns.count - unknowns.size)])
 
 
 @dataclass(frozen=True)

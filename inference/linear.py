@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import Note, NoteKind, SolverFailure
-from ..materials.forms.base import COMPONENTS, Array, modulus_rows
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
 from .comparison import Comparison, Nuisance
@@ -148,21 +148,19 @@ def posteriors_of(
 def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dict[str, Array]:
     """Return (n,) MPa by modulus at strains (n,), of the law at unknowns y."""
     coefficients = unknowns.to_coefficients @ y[: unknowns.size]
-    rows = {name: modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
-            for name, strain in strains.items()}  # fmt: skip
-    return {name: own[:, list(unknowns.free)] @ coefficients for name, own in rows.items()}
+    return {name: unknowns.rows(name, strain) @ coefficients for name, strain in strains.items()}
 
 
 def along(
     unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return strains and 1-sigma relative uncertainty of each modulus from a covariance."""
-    p, size = unknowns, unknowns.size
-    moved = p.to_coefficients @ covariance[:size, :size] @ p.to_coefficients.T
+    size, to = unknowns.size, unknowns.to_coefficients
+    moved = to @ covariance[:size, :size] @ to.T
     strains, sigmas = {}, {}
     for name, component in COMPONENTS.items():
         strain = np.linspace(0.0, reached[component], POINTS)
-        rows = modulus_rows(p.form, name, strain, p.strain_range)[:, list(p.free)]
+        rows = unknowns.rows(name, strain)
         sigma = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", rows, moved, rows), 0.0))
         strains[name], sigmas[name] = strain, sigma / law.modulus(name, strain)
     return strains, sigmas
@@ -252,7 +250,11 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
         # Symmetric, and t along every direction v, which are orthonormal.
         added = t @ v.T + v @ t.T - 0.5 * v @ (inner + inner.T) @ v.T
         added = 0.5 * (added + added.T)
-    found = Second(added, _left(problem, best, noise), len(known), problem.analyses - before)
+    # Residuals over their block's norm; zero where the block weighs by its noise.
+    sizes, own = problem.blocks.norms(best.residual), problem.blocks.norms(noise.least)
+    unit = (sizes > own) / np.where(sizes > own, sizes, 1.0)
+    left = np.asarray(best.residual * unit[problem.blocks.of])
+    found = Second(added, left, len(known), problem.analyses - before)
     norms = found.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
     blocks = norms[problem.blocks.starts]
     return replace(found, added=added - blocks.T @ blocks)
@@ -262,14 +264,6 @@ def definite(linear: Linear, second: Second) -> bool:
     """Return whether enough curvature is left along every direction with the second order."""
     unit = linear.sharp / np.sqrt(linear.curvature)
     return bool(np.linalg.eigvalsh(unit.T @ second.added @ unit).min() > LEFT_SECOND_ORDER - 1.0)
-
-
-def _left(problem: FitProblem, best: Evaluation, noise: Noise) -> Array:
-    """Return (m,) residuals over their block's norm; zero where the block weighs by its noise."""
-    blocks = problem.blocks
-    norms = blocks.norms(best.residual)
-    own = norms > blocks.norms(noise.least)
-    return np.asarray(best.residual * (own / np.where(own, norms, 1.0))[blocks.of])
 
 
 def _beside(problem: FitProblem, best: Evaluation, step: Array) -> tuple[Evaluation | None, float]:

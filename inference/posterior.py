@@ -15,7 +15,7 @@ import quadprog
 import scipy
 
 from ..files import compiled
-from ..materials.forms.base import Array, modulus_rows
+from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from .unknowns import Unknowns
 
@@ -298,8 +298,7 @@ def bands_of(
     coefficients = posterior.drawn @ unknowns.to_coefficients.T
     bands = {}
     for name, strain in strains.items():
-        rows = modulus_rows(unknowns.form, name, strain, unknowns.strain_range)
-        moduli = coefficients @ rows[:, list(unknowns.free)].T
+        moduli = coefficients @ unknowns.rows(name, strain).T
         ends = np.quantile(moduli, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
         own = law.modulus(name, strain)
         bands[name] = np.array([np.minimum(ends[0], own), np.maximum(ends[1], own)])

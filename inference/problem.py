@@ -106,7 +106,7 @@ class FitProblem:
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
         """Return the same problem for other solvers, one a comparison: a surrogate."""
         pairs = zip(self.comparisons, solvers, strict=True)
-        others = tuple(comparison.by(solver) for comparison, solver in pairs)
+        others = tuple(replace(one, solver=solver, _last=None) for one, solver in pairs)
         return FitProblem(others, self.law, self.unknowns)
 
     def part(self, numbers: Sequence[int]) -> FitProblem:

@@ -1,7 +1,6 @@
 """Fit from one start, by any method, for any solver."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,7 +56,13 @@ def corrected_fit(
     """
     surrogate = problem.surrogate
     assert surrogate is not None
-    with _corrections_of(surrogate) as restore:
+    objectives = [comparison.objective for comparison in surrogate.comparisons]
+
+    def restore() -> None:
+        for comparison, objective in zip(surrogate.comparisons, objectives, strict=True):
+            comparison.objective = objective
+
+    try:
         best: Evaluation | None = None
         status, shorter, failure = RUNS_USED_UP, 0, ""
         y = _lead(surrogate, start, method, options)
@@ -65,11 +70,9 @@ def corrected_fit(
             point = problem.evaluate(y, False)
             worse = point is not None and best is not None and point.value >= best.value
             if point is None or not point.stable or worse:
-                if shorter == MOST_SHORTER or (
-                    False
-                    if point is None or best is None or not point.stable
-                    else point.value < (1 + NOT_WORTH_A_RUN) * best.value
-                ):
+                least = np.inf if point is None or not point.stable else point.value
+                level = best is not None and least < (1 + NOT_WORTH_A_RUN) * best.value
+                if shorter == MOST_SHORTER or level:
                     status, failure = LEVEL, problem.failure if point is None else ""
                     break
                 shorter += 1
@@ -88,26 +91,13 @@ def corrected_fit(
             restore()
             surrogate.shift(point.histories, beside.histories)
             y = _lead(surrogate, y, method, options)
+    finally:
+        restore()
     if best is None:
         return None
     status = f"{problem.solver.name} failed: {failure}" if failure else status
     runs = problem.analyses
     return Optimum(best, status, runs + surrogate.analyses, runs, failure)
-
-
-@contextmanager
-def _corrections_of(surrogate: FitProblem) -> Iterator[Callable[[], None]]:
-    """Yield what restores the surrogate's own objectives, and call it at the end."""
-    objectives = [comparison.objective for comparison in surrogate.comparisons]
-
-    def restore() -> None:
-        for comparison, objective in zip(surrogate.comparisons, objectives, strict=True):
-            comparison.objective = objective
-
-    try:
-        yield restore
-    finally:
-        restore()
 
 
 def _lead(surrogate: FitProblem, y: Array, method: Method, options: FitOptions) -> Array | None:

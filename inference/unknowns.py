@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, own_bounds
+from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
 from .comparison import Comparison, NuisanceOf
 
@@ -200,6 +200,10 @@ class Unknowns:
     def box(self) -> tuple[Array, Array]:
         """Return lower and upper (size,) of the free coefficients, MPa."""
         return self.bounds.box(self.form, self.from_values)
+
+    def rows(self, name: str, strain: Array) -> Array:
+        """Return (n, size): a modulus (MPa) at strains (n,) is this @ free coefficients."""
+        return modulus_rows(self.form, name, strain, self.strain_range)[:, list(self.free)]
 
     @cached_property
     def moduli(self) -> dict[str, Array]:

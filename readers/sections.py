@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -55,6 +55,9 @@ class Section(BaseModel):
     """A table of a project file: no unknown keys, no text for numbers, no NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
+
+
+AnySection = TypeVar("AnySection", bound=Section)
 
 
 def beside(folder: Path, given: str) -> Path:
@@ -145,6 +148,12 @@ def in_base_units(section: type[BaseModel], said: Mapping[str, Any], scales: Any
             ]
             whole[key] = tables if isinstance(value, list) else tables[0]
     return whole
+
+
+def whole_in_base_units(section: AnySection, scales: Any) -> AnySection:
+    """Return a section that was read with its marked numbers in mm, N and MPa."""
+    said = section.model_dump(exclude_unset=True, exclude_none=True)
+    return section.model_validate(in_base_units(type(section), said, scales))
 
 
 def _times(value: Any, scale: float) -> Any:

@@ -1,7 +1,5 @@
 """Biaxial tests: a cruciform loaded along warp and fill in several ratios."""
 
-from __future__ import annotations
-
 from pydantic import BaseModel
 
 from ..kinds import Kind

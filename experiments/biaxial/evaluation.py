@@ -11,6 +11,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import InputError, Note, rows
 from ...inference.assessment import UNCERTAIN
@@ -175,8 +176,7 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
                     stiff[own] = line.load[own] / line.strain[own]
                 if unloaded and line.strain[1 - own] > 0:
                     nu[own] = -line.strain[own] / line.strain[1 - own]
-        kept = np.full(2, np.nan) if k.after is None else PERCENT * k.after
-        table.append({**row, **_standard(ends, stiff, nu, kept)})
+        table.append({**row, **_standard(ends, stiff, nu, _percent(k.after))})
     c, nothing = found.chosen.constants, np.full((2, 2), np.nan)
     row = {"file": "", "ratio": "all", "load_cycles": sum(k.cycles for k in found.kept)}
     together = np.array([c.warp, c.fill]), np.array([c.nu_warp, c.nu_fill])
@@ -185,13 +185,23 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
 
 
 def _standard(ends: Array, stiff: Array, nu: Array, kept: Array) -> dict[str, float]:
-    pairs = {"from_kN_per_m": ends[0], "to_kN_per_m": ends[1], "stiffness_kN_per_m": stiff,
-             "poisson": nu, "strain_kept_percent": kept}  # fmt: skip
+    return _by_yarn(
+        from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
+        strain_kept_percent=kept,
+    )  # fmt: skip
+
+
+def _by_yarn(**pairs: ArrayLike) -> dict[str, float]:
+    """Return pairs (warp, fill) by their names, each with its yarn's before it."""
     return {
-        f"{yarn}_{name}": float(pair[i])
+        f"{yarn}_{name}": float(value)
         for name, pair in pairs.items()
-        for i, yarn in enumerate(("warp", "fill"))
+        for yarn, value in zip(("warp", "fill"), np.asarray(pair), strict=True)
     }
+
+
+def _percent(strain: Array | None) -> Array:
+    return np.full(2, np.nan) if strain is None else PERCENT * strain
 
 
 #: File of the table after EN 17117-1.
@@ -213,20 +223,19 @@ def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
             "cycles": path.cycles, "readings": len(path.load),
             "from_kN_per_m": float(path.larger[0]), "to_kN_per_m": float(path.larger[-1]),
         }  # fmt: skip
-        for what, values in (
-            ("load_change_kN_per_m", line.load),
-            ("strain_change_percent", PERCENT * np.asarray(line.strain)),
-            ("rms_about_line_percent", PERCENT * np.asarray(line.residual)),
-        ):
-            row |= {f"warp_{what}": values[0], f"fill_{what}": values[1]}
+        row |= _by_yarn(
+            load_change_kN_per_m=line.load,
+            strain_change_percent=PERCENT * np.asarray(line.strain),
+            rms_about_line_percent=PERCENT * np.asarray(line.residual),
+        )
         table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
     phases = []
     for k in found.kept:
         row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
-        for when, strain in (("before", k.before), ("after", k.after)):
-            values = np.full(2, np.nan) if strain is None else PERCENT * strain
-            row |= {f"warp_{when}_percent": values[0], f"fill_{when}_percent": values[1]}
-        phases.append(row | {"warp_load_kN_per_m": k.load[0], "fill_load_kN_per_m": k.load[1]})
+        before, after = _percent(k.before), _percent(k.after)
+        phases.append(
+            row | _by_yarn(before_percent=before, after_percent=after, load_kN_per_m=k.load)
+        )
     return {"constants": pd.DataFrame(options), STANDARD: standard_table(found),
             "lines": pd.DataFrame(table), "kept": pd.DataFrame(phases)}  # fmt: skip
 
@@ -271,10 +280,7 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
 def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
     """Return the results for result.json."""
     plain = {
-        name: [
-            {str(k): None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()}
-            for row in table.to_dict("records")
-        ]
+        name: table.astype(object).where(table.notna(), None).to_dict("records")
         for name, table in tables_of(found).items()
     }
     return {

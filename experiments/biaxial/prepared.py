@@ -1,7 +1,5 @@
 """Biaxial tests in a fit: residuals, comparisons, doubts, and tests that could be made next."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

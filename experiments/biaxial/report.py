@@ -1,9 +1,6 @@
 """Results of biaxial tests as numbers, tables, figures and files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,7 +16,6 @@ from ...reports.strips import BiaxialPanel, biaxial_charts
 from ...reports.vega import saved
 from .. import kinds
 from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
-from .data import BiaxialPath
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
 from .prepared import PERCENT, FittedPart, PreparedBiaxial
 from .test import BiaxialTest
@@ -67,84 +63,49 @@ def _warnings(test: BiaxialTest) -> list[Note]:
     return notes + [Note(kinds.READING, words) for words in said]
 
 
-@dataclass(frozen=True, eq=False)
-class Loading:
-    """One card along one path: (n,) kN/m, (n, 2) % of the loads shown, (2,) %, (3,) strains."""
-
-    path: BiaxialPath
-    larger: Array
-    strain: Array
-    rms: tuple[float | None, float | None]
-    reached: Array
-
-
-#: By (card, ratio).
-Loadings = Mapping[tuple[str, str], "Loading | SolverFailure"]
-
-
 def simulate(
     test: BiaxialTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
     out: Output, within_range: bool = False,
 ) -> Simulation:  # fmt: skip
     """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
-    found: Loadings = {
-        (name, path.ratio): _loading(path, card, runs[name, path.ratio], within_range)
-        for path in test.data.paths
-        for name, card in cards.items()
-    }
-    ended = {key: one for key, one in found.items() if isinstance(one, Loading)}
-    tables = []
-    for (card, ratio), one in ended.items():
-        table = _columns(one.path.load[: len(one.larger)], "load_kN_per_m")
-        table[[f"{yarn}_strain_percent" for yarn in YARNS]] = one.strain
-        table.insert(0, "card", card)
-        table.insert(1, "ratio", ratio)
-        tables.append(table)
+    numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
+    tables, panels, lines = [], [], []
+    for path in test.data.paths:
+        curves = []
+        for name, card in cards.items():
+            outcome, ratios = runs[name, path.ratio].outcome, numbers[name]["ratios"]
+            if isinstance(outcome, SolverFailure):
+                ratios[path.ratio] = {"failed": outcome.reason}
+                lines.append(f"{name}: ratio {path.ratio} failed: {outcome.reason}")
+                continue
+            own = elongations(outcome.displacement)
+            beyond = (np.log1p(own) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
+            shown = int(np.argmax(beyond)) if within_range and beyond.any() else len(own)
+            larger, strain = path.larger[:shown], PERCENT * (own - own[0])[:shown]
+            table = _columns(path.load[:shown], "load_kN_per_m")
+            table[[f"{yarn}_strain_percent" for yarn in YARNS]] = strain
+            table.insert(0, "card", name)
+            table.insert(1, "ratio", path.ratio)
+            tables.append(table)
+            warp, fill, end = None, None, 0.0
+            if shown:
+                curves.append((name, larger, strain))
+                off, end = strain - PERCENT * path.since[:shown], float(larger[-1])
+                warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
+                lines.append(
+                    f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
+                    f"{fill:.3g} % along fill, to {end:.3g} kN/m"
+                )
+            ratios[path.ratio] = {
+                "rms_warp_percent": warp, "rms_fill_percent": fill, "shown_to_kN_per_m": end,
+                "strain_reached": kinds.by_strain(kinds.strains_of(outcome)),
+            }  # fmt: skip
+        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
     if tables:
         out.write("paths.csv", pd.concat(tables))
-    panels = []
-    for path in test.data.paths:
-        curves = tuple(
-            (card, one.larger, one.strain)
-            for (card, ratio), one in ended.items()
-            if ratio == path.ratio and len(one.larger)
-        )
-        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
     charts = biaxial_charts("ratios", panels)
     figures = [saved(out, "paths.png", charts, "Strain over the larger load")]
-    numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
-    lines = []
-    for (name, ratio), run in found.items():
-        if isinstance(run, SolverFailure):
-            numbers[name]["ratios"][ratio] = {"failed": run.reason}
-            lines.append(f"{name}: ratio {ratio} failed: {run.reason}")
-            continue
-        end = float(run.larger[-1]) if len(run.larger) else 0.0
-        numbers[name]["ratios"][ratio] = {
-            "rms_warp_percent": run.rms[0], "rms_fill_percent": run.rms[1],
-            "shown_to_kN_per_m": end,
-            "strain_reached": kinds.by_strain(run.reached),
-        }  # fmt: skip
-        if len(run.larger):
-            lines.append(
-                f"{name}: ratio {ratio}: RMS of strain {run.rms[0]:.3g} % along warp, "
-                f"{run.rms[1]:.3g} % along fill, to {end:.3g} kN/m"
-            )
     return Simulation({"cards": numbers}, lines, figures)
-
-
-def _loading(
-    path: BiaxialPath, card: MaterialCard, run: CardRun, within_range: bool
-) -> Loading | SolverFailure:
-    if isinstance(run.outcome, SolverFailure):
-        return run.outcome
-    own = elongations(run.outcome.displacement)
-    beyond = (np.log1p(own) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
-    shown = int(np.argmax(beyond)) if within_range and beyond.any() else len(own)
-    strain = PERCENT * (own - own[0])[:shown]
-    off = strain - PERCENT * path.since[:shown]
-    warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist() if shown else (None, None)
-    return Loading(path, path.larger[:shown], strain, (warp, fill), kinds.strains_of(run.outcome))
 
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:

@@ -1,7 +1,5 @@
 """A biaxial test, as its section describes it, and its models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,6 +152,7 @@ class BiaxialTest:
     section: BiaxialSection
     noise: float | None = None
     kind: str = "biaxial"
+    reads_files: bool = True
 
     @property
     def state(self) -> State:
@@ -168,11 +167,6 @@ class BiaxialTest:
             LoadHistory(t.path, t.load.max(axis=1), t.strain.max(axis=1), t.time)
             for t in self.data.tables
         )
-
-    @property
-    def reads_files(self) -> bool:
-        """Return True: a biaxial test is measured."""
-        return True
 
     @property
     def reach(self) -> Reach:

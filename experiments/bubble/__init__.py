@@ -1,7 +1,5 @@
 """The bubble inflation test: a clamped disk, inflated, its surface followed by stereo DIC."""
 
-from __future__ import annotations
-
 from .prepared import candidates, prepare
 from .section import BubbleSection, with_units
 from .test import STUDIED, read

@@ -2,8 +2,6 @@
 
 Each check, one function in `CHECKS`, looks at the measured fields (`View`) and yields doubts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Numbers and words on a fitted bubble test: the sheet, the frames taken, the registration."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any, cast
 
@@ -221,10 +219,3 @@ def read_numbers(prepared: PreparedBubble) -> dict[str, Any]:
         dropped.update(field.dropped)
     read = {"format": source.format, "columns": dict(source.columns), "units": dict(source.units)}
     return {"dropped": dict(dropped), **({"read": read} if source.format else {})}
-
-
-def nuisance_lines(fitted: FittedTest) -> list[str]:
-    """Return the line of the terminal on the offsets that were fitted; none without any."""
-    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
-    said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
-    return [f"nuisance: {said}"] if units else []

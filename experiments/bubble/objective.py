@@ -35,9 +35,9 @@ PLACED = ("tilt_x", "tilt_y", "shift_x", "shift_y")
 CORRELATION = 0.05
 
 
-def displacement_offset(nuisance: Unknowns | None) -> Array:
-    """Return (3,) mm; zero where it is no unknown."""
-    return np.array([(nuisance or {}).get(name, 0.0) for name in OFFSETS])
+def amounts_of(names: Sequence[str], nuisance: Unknowns | None) -> Array:
+    """Return the amounts of `OFFSETS` or `PLACED`; zero where one is no unknown."""
+    return np.array([(nuisance or {}).get(name, 0.0) for name in names])
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +142,9 @@ class FieldObjective:
 
     def modelled(self, displacement: Array, nuisance: Unknowns | None = None) -> list[Array]:
         """Return (n, 3) mm of each target from the model's (frames, nodes, 3), offset included."""
-        shift = displacement_offset(nuisance)
+        shift = amounts_of(OFFSETS, nuisance)
         moved = [target.of(displacement, k) + shift for k, target in enumerate(self.targets)]
-        amounts = placed_by(nuisance)
+        amounts = amounts_of(PLACED, nuisance)
         if not amounts.any():
             return moved
         return [m + placed for m, placed in zip(moved, self._placed(amounts), strict=True)]
@@ -274,7 +274,7 @@ class FieldObjective:
             raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
         parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
         if any(name in PLACED for name in names):
-            placed = self._placed_by(placed_by(nuisance))
+            placed = self._placed_by(amounts_of(PLACED, nuisance))
             parts = [np.concatenate(both, -1) for both in zip(parts, placed, strict=True)]
         return self._columns(parts)[:, [every.index(name) for name in names]]
 
@@ -315,11 +315,6 @@ def _slopes_of(places: Array, size: float, amplitude: Array) -> tuple[Array, Arr
         for one in SMALL * np.eye(2)
     )
     return by_x, by_y
-
-
-def placed_by(nuisance: Unknowns | None) -> Array:
-    """Return (4,) the amounts of `PLACED`; zero where one is no unknown."""
-    return np.array([(nuisance or {}).get(name, 0.0) for name in PLACED])
 
 
 def _tilted(degrees: Array) -> tuple[Array, tuple[Array, Array]]:

@@ -1,7 +1,5 @@
 """The files of [bubble.data.points]: measured displacements, and the pressures of their frames."""
 
-from __future__ import annotations
-
 import os
 import re
 import string

@@ -1,7 +1,5 @@
 """A bubble test with its data, measured or computed, and the comparisons of a fit with it."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -522,7 +520,12 @@ def _elliptic(test: BubbleTest, angle: float) -> BubbleTest:
 def _usual(planning: Planning) -> BubbleTest:
     """Return a circular test, to a pressure that strains the sheet as far as the law is known."""
     law, ends = planning.law, planning.ends
-    top = _pressure(law, REACHED * float(min(ends[:2])), planning.place.fabric.thickness)
+    # A shallow cap: strain 2/3 (h/R)^2, curvature 2 h/R^2, mean modulus.
+    strain = REACHED * float(min(ends[:2]))
+    along = np.linspace(0.0, strain, 21)
+    mean = np.mean([law.modulus(name, along).mean() for name in ("E1", "E2")])
+    tension = float(mean) * strain * planning.place.fabric.thickness / (1.0 - law.nu12)
+    top = 4.0 * RADIUS * float(np.sqrt(1.5 * strain)) * tension / RADIUS**2
     pressures = tuple(share * top for share in LEVELS)
     increments = default_increments(pressures)
     return BubbleTest(
@@ -533,12 +536,3 @@ def _usual(planning: Planning) -> BubbleTest:
         match_by="points", match_degree=4, objective="mm", displacement_offset=False,
         pressure_offset=False, sheet=Sheet(),
     )  # fmt: skip
-
-
-def _pressure(law: HypoelasticLaw, strain: float, thickness: float) -> float:
-    """Return MPa at a strain of a shallow cap: 2/3 (h/R)^2, curvature 2 h/R^2, mean modulus."""
-    along = np.linspace(0.0, strain, 21)
-    mean = np.mean([law.modulus(name, along).mean() for name in ("E1", "E2")])
-    tension = float(mean) * strain * thickness / (1.0 - law.nu12)
-    height = RADIUS * float(np.sqrt(1.5 * strain))
-    return 4.0 * height * tension / RADIUS**2

@@ -521,25 +521,6 @@ class WarpDirection:
     strains: tuple[float, float]
 
 
-def warp_of_field(
-    frames: Sequence[Frame], radius: float, warp_is_stiff: bool = True
-) -> WarpDirection:
-    """Find the axis of symmetry along which the centre is strained less (warp stiff), or more.
-    Raises InputError for too few points about the centre, and for a field without clear axes."""
-    axes = symmetry_axes(frames, radius)
-    if axes.error > UNSURE or axes.clear < CLEAR:
-        problem = (
-            f"the field does not tell warp from fill (axes at {axes.angle:.0f} +- {axes.error:.1f}"
-            f" degrees, {axes.clear:.0%} clear); give the angle"
-        )
-        raise InputError(None, "warp", problem)
-    angle = axes.angle
-    along, across = _strains(frames, radius, angle)
-    if (along > across) == warp_is_stiff:
-        angle, along, across = angle + 90.0, across, along
-    return WarpDirection(line_angle(angle), axes.error, axes.clear, (along, across))
-
-
 def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
     """Return the strains at the centre along an axis at `angle` degrees and across it."""
     strain = centre_strain(frames[-1], radius)
@@ -722,25 +703,36 @@ def _warp(
     options: RegistrationOptions,
 ) -> tuple[float, WarpDirection | None]:  # fmt: skip
     """Return degrees from the plane's x to the warp, and how it was found unless given."""
-    given = _given_warp(placement, options)
+    given, radius = _given_warp(placement, options), min(semi_axes)
     if given is not None:
         return given, None
     if semi_axes[0] == semi_axes[1] or options.rim_angle is None:
-        found = warp_of_field(frames, min(semi_axes), options.warp_is_stiff)
-    elif rim is None:
+        # The axis of symmetry along which the centre is strained less, or more.
+        axes = symmetry_axes(frames, radius)
+        if axes.error > UNSURE or axes.clear < CLEAR:
+            problem = (
+                f"the field does not tell warp from fill (axes at {axes.angle:.0f} +- "
+                f"{axes.error:.1f} degrees, {axes.clear:.0%} clear); give the angle"
+            )
+            raise InputError(None, "warp", problem)
+        angle, error, clear = axes.angle, axes.error, axes.clear
+        along, across = _strains(frames, radius, angle)
+        if (along > across) == options.warp_is_stiff:
+            angle, along, across = angle + 90.0, across, along
+        angle = line_angle(angle)
+        return angle, WarpDirection(angle, error, clear, (along, across))
+    if rim is None:
         problem = "expected the warp, too, where the centre of an elliptic rim is given"
         raise InputError(None, "warp", problem)
-    elif rim.turn_error > UNSURE:
+    if rim.turn_error > UNSURE:
         problem = (
             f"the rim is too round to tell the warp (turned by {rim.angle:.0f} +- "
             f"{rim.turn_error:.0f} degrees); give the angle"
         )
         raise InputError(None, "warp", problem)
-    else:
-        angle = line_angle(rim.angle - options.rim_angle)
-        strains = _strains(frames, min(semi_axes), angle)
-        found = WarpDirection(angle, rim.turn_error, None, strains)
-    return found.angle, found
+    angle = line_angle(rim.angle - options.rim_angle)
+    strains = _strains(frames, radius, angle)
+    return angle, WarpDirection(angle, rim.turn_error, None, strains)
 
 
 def register_fields(

@@ -3,8 +3,6 @@
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
 fit, `residuals` the table of all matched values, `simulate` the results of forward analyses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from ...errors import SolverFailure, percent
 from ...files import replacing
@@ -43,7 +40,7 @@ from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
 from . import findings as wording
 from .findings import fitted_model, objective_of
-from .objective import displacement_offset
+from .objective import OFFSETS, amounts_of
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
@@ -88,7 +85,7 @@ STRESSES = ("stress along the warp σ1", "stress along the fill σ2", "shear str
 def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     """Return numbers for result.json, warnings, and words for terminal, card and page."""
     test, objective = prepared.test, objective_of(fitted)
-    offset = displacement_offset(fitted.nuisance)
+    offset = amounts_of(OFFSETS, fitted.nuisance)
     mean = objective.mean_absolute(fitted.histories[0].displacement, fitted.nuisance)
     numbers: dict[str, Any] = {
         "mean_abs_mm": mean,
@@ -118,12 +115,14 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         numbers["moduli_error"] = errors
         numbers["moduli_error_range"] = {name: [0.0, end] for name, end in ends.items()}
         each = [f"{n} {percent(errors[n])} (up to {100 * end:.3g} %)" for n, end in ends.items()]
-        said = ", ".join(each)
-        lines.append(f"largest error of the moduli over the strain reached: {said}")
+        lines.append(f"largest error of the moduli over the strain reached: {', '.join(each)}")
     if prepared.registration is not None:
         numbers["registration"] = wording.registration_numbers(prepared.registration)
         lines.append(wording.registration_line(prepared.registration))
-    lines += [*wording.sheet_lines(numbers["sheet"]), *wording.nuisance_lines(fitted)]
+    lines += wording.sheet_lines(numbers["sheet"])
+    units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
+    said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
+    lines += [f"nuisance: {said}"] if units else []
     warnings = (*wording.sheet_warnings(prepared), *wording.match_warnings(prepared))
     quality = f"mean |dx|+|dy|+|dz| {mean:.4g} mm"
     summary = f"mean |dx| + |dy| + |dz| = {mean:.3g} mm"
@@ -160,19 +159,22 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     series = out.path("bubble.pvd")
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
-    surfaces = []
+    files, tables = [], [misfit_table(prepared, fitted)]
     if prepared.surfaces:
         with replacing(out.path("surfaces.csv")) as path:
             write_surfaces(prepared.surfaces, path)
-        surfaces.append((out.name("surfaces.csv"), "polynomial surfaces of the data"))
-    files = [
-        *surfaces,
+        files.append((out.name("surfaces.csv"), "polynomial surfaces of the data"))
+        every = zip(prepared.test.pressures, prepared.surfaces, strict=True)
+        rows: list[list[object]] = [[1e3 * p, *(f"{r:.5f}" for r in s.r_squared)] for p, s in every]
+        title = f"R² of polynomial surfaces of degree {prepared.test.match_degree}"
+        note = "" if prepared.test.match_by == "surfaces" else NOT_MATCHED
+        tables.append(Table(title, ["pressure, kPa", "x", "y", "z"], rows, note))
+    files += [
         (series.name, "the inflated bubble pressure by pressure, for ParaView"),
         saved(out, "profiles.png", cuts, f"{name}: cuts through the bubble along warp and fill"),
         saved(out, "heights.png", heights, f"{name}: modelled against measured height"),
         *sheet_files,
     ]
-    tables = [misfit_table(prepared, fitted), *surface_tables(prepared)]
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
@@ -224,27 +226,13 @@ def misfit_table(prepared: PreparedBubble, fitted: FittedTest) -> Table:
     return Table("Misfit by pressure", header, rows, f"RMS error {of}, direction by direction")
 
 
-def surface_tables(prepared: PreparedBubble) -> list[Table]:
-    """Return R^2 of the polynomial surfaces, where there are any."""
-    if not prepared.surfaces:
-        return []
-    test = prepared.test
-    rows: list[list[object]] = [
-        [1e3 * p, *(f"{r:.5f}" for r in s.r_squared)]
-        for p, s in zip(test.pressures, prepared.surfaces, strict=True)
-    ]
-    title = f"R² of polynomial surfaces of degree {test.match_degree}"
-    note = "" if test.match_by == "surfaces" else NOT_MATCHED
-    return [Table(title, ["pressure, kPa", "x", "y", "z"], rows, note)]
-
-
 def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return heights along both axes: lines of the model, dots of what was measured."""
     return bubbles.cut_charts(
         f"{prepared.test.name} cuts",
         prepared.test.pressures,
         fitted.comparisons[0].model.mesh.points,
-        fitted.histories[0].displacement + displacement_offset(fitted.nuisance),
+        fitted.histories[0].displacement + amounts_of(OFFSETS, fitted.nuisance),
         [(seen.points, seen.displacement) for seen in prepared.fields],
         f"{prepared.test.name}: lines are the model, dots {prepared.source}.",
     )
@@ -318,7 +306,10 @@ def bubble_solid(
     test, model = prepared.test, fitted_model(fitted)
     mesh, known = model.mesh, replace(fitted.histories[0], model=model, law=fitted.law)
     signs = np.array(QUARTERS if test.symmetry == "quarter" else WHOLE, dtype=float)
-    residual = np.tile(np.array([_sizes(own, mesh.quads) for own in left]), len(signs))
+    none = np.full((len(mesh.points), 3), np.nan)
+    apart = [np.linalg.norm(none if own is None else own, axis=1) for own in left]
+    # Means over the corners; NaN where one of them has none.
+    residual = np.tile(np.array([own[mesh.quads].mean(axis=1) for own in apart]), len(signs))
     residual[residual < ROUNDING * float(np.abs(known.displacement).max())] = 0.0
     shades = [Shade("residual, length", "mm", pack(residual))]
     fields = ((STRAIN_LABELS, "%", 100 * known.strain()), (STRESSES, "MPa", known.stress()))
@@ -344,13 +335,6 @@ def bubble_solid(
         pack(np.concatenate(around, axis=1)), pack(np.concatenate(quads)), shades, caption, alt,
         warp_arrow(np.concatenate(around, axis=1)),
     )  # fmt: skip
-
-
-def _sizes(left: Array | None, quads: NDArray[np.intp]) -> Array:
-    """Return (quads,) mm, means over the corners; NaN where one of them has none."""
-    if left is None:
-        return np.full(len(quads), np.nan)
-    return np.asarray(np.linalg.norm(left, axis=1)[quads].mean(axis=1))
 
 
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:

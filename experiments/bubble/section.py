@@ -270,7 +270,13 @@ def sheet_of(
     for key in ("surface", "rim"):
         if not of_files and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
-    given, since = section.model_fields_set, _frame(section, place, pressures)
+    given, since = section.model_fields_set, None
+    if section.from_pressure is not None:
+        near = np.isclose(pressures, section.from_pressure * place.scales.pressure, rtol=1e-6)
+        if not near.any() or len(pressures) < 2:
+            problem = f"expected one of several 'pressures', got {section.from_pressure:g}"
+            raise place.error("sheet.from_pressure", problem)
+        since = int(np.argmax(near))
     quarter, measured = symmetry == "quarter", section.surface == "measured"
     unknown, taken = section.modes or section.slack, since is not None or section.constant_field
     stressed = "a surface measured under pressure is not without stress: use modes instead"
@@ -302,16 +308,6 @@ def sheet_of(
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
     )  # fmt: skip
-
-
-def _frame(section: SheetSection, place: Place, pressures: Sequence[float]) -> int | None:
-    if section.from_pressure is None:
-        return None
-    near = np.isclose(pressures, section.from_pressure * place.scales.pressure, rtol=1e-6)
-    if not near.any() or len(pressures) < 2:
-        problem = f"expected one of several 'pressures', got {section.from_pressure:g}"
-        raise place.error("sheet.from_pressure", problem)
-    return int(np.argmax(near))
 
 
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]

@@ -1,7 +1,5 @@
 """The sheet of a bubble: its first shape and its rim in the model, and the inflated sheet."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A bubble test as its section describes it, its model, and the quantities that studies compare."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -206,7 +204,12 @@ class BubbleTest:
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     """Return the test of a section; raises InputError naming the file and the dotted key."""
-    asked, length = _pressures(section, place), place.scales.length
+    length, scale, given = place.scales.length, place.scales.pressure, section.pressures
+    for i, (before, after) in enumerate(pairwise(given or ()), start=1):
+        if after <= before:
+            problem = f"pressures must increase, got {after:g} after {before:g}"
+            raise place.error(f"pressures[{i}]", problem)
+    asked = None if given is None else tuple(p * scale for p in given)
     measured = measured_files(section, place, asked)
     recorded = None if measured is None else measured.recorded
     pressures = asked if recorded is None else tuple(recorded.pressure.tolist())
@@ -260,15 +263,6 @@ def radius_of_clamp(place: Place, data: PointFiles | None, pressures: Sequence[f
             raise
         raise place.error("radius", f"'clamp': {error.problem}") from None
     return radius
-
-
-def _pressures(section: BubbleSection, place: Place) -> tuple[float, ...] | None:
-    for i, (before, after) in enumerate(pairwise(section.pressures or ()), start=1):
-        if after <= before:
-            problem = f"pressures must increase, got {after:g} after {before:g}"
-            raise place.error(f"pressures[{i}]", problem)
-    given = section.pressures
-    return None if given is None else tuple(p * place.scales.pressure for p in given)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:

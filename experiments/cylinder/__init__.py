@@ -1,7 +1,5 @@
 """The inflated cylinder in three-point bending: predicted with cards, not fitted."""
 
-from __future__ import annotations
-
 from .predicted import STUDIED, CylinderPredicted
 from .test import CylinderSection, read
 

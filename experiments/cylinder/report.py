@@ -1,7 +1,5 @@
 """Results of bent cylinders as facts, figures, tables and files."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A membrane (`CylinderTest.model`), or a beam of a wall that the section gives pe
 each are refused where the other is asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -13,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ...errors import InputError
 from ...materials.card import MaterialCard
@@ -37,7 +35,16 @@ from ...meshes.cylinder_model import (
 )
 from ...readers.bending import BendingCurve, read_bending_curves
 from ...readers.frames import FrameSource
-from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Unit
+from ...readers.sections import (
+    Length,
+    Name,
+    Number,
+    Positive,
+    Pressure,
+    Section,
+    Unit,
+    whole_in_base_units,
+)
 from ..kinds import (
     ChannelSection,
     DataFile,
@@ -262,53 +269,40 @@ class CylinderTest:
 
 def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     """Read the section of a test; refuse a cylinder that makes no model."""
-    length, pressure = place.scales.length, place.scales.pressure
     others = OF_BEAM if section.model == "membrane" else OF_MEMBRANE
     for key in others:
         if key in section.model_fields_set:
             other = "beam" if section.model == "membrane" else "membrane"
             raise place.error(key, f'is a key of model = "{other}"; take it out or change model')
 
-    def own(value: float | None, default: float) -> float:
-        return default if value is None else float(value * length)
-
-    def scaled(part: BaseModel, scale: float, *names: str) -> dict[str, Any]:
-        given = part.model_dump(exclude_none=True)
-        return {k: v * scale if k in names else v for k, v in given.items()}
-
-    def listed(values: Sequence[float] | None) -> list[float] | None:
-        return None if values is None else [v * length for v in values]
-
-    diameter, usual = section.diameter * length, RigidSupports()
-    deflections, end = listed(section.deflections), own(section.deflection, DEFLECTION)
+    own = whole_in_base_units(section, place.scales)
+    deflections = own.deflections
     if deflections is None:
-        deflections = np.linspace(0.0, end, (section.frames or FRAMES) + 1)[1:].tolist()
-    cords = tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(section.cord))
-    if section.model == "beam":
+        end = own.deflection or DEFLECTION
+        deflections = np.linspace(0.0, end, (own.frames or FRAMES) + 1)[1:].tolist()
+    cords = tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(own.cord))
+    if own.model == "beam":
         return _beam(section, place, name, deflections, cords)
+    usual = RigidSupports()
     try:
-        collar = section.collar and Collar(
-            **scaled(section.collar, length, "inner_diameter", "length", "fillet")
-        )
+        collar = usual_collar(own.diameter)
+        if own.collar is not None:
+            collar = Collar(**own.collar.model_dump(exclude_none=True))
         test = CylinderTest(
             name=name,
             place=place,
-            diameter=diameter,
-            pressure=section.pressure * pressure,
-            length=own(section.length, LENGTH),
-            seam_width=own(section.seam_width, SEAM_WIDTH),
-            size=own(section.element_size, SIZE),
-            symmetry=section.symmetry,
-            cap_warp=section.cap_warp,
-            supports=RigidSupports(
-                own(section.span, usual.span), own(section.support_diameter, usual.diameter)
-            ),
-            collar=collar or usual_collar(diameter),
+            diameter=own.diameter,
+            pressure=own.pressure,
+            length=own.length or LENGTH,
+            seam_width=SEAM_WIDTH if own.seam_width is None else own.seam_width,
+            size=own.element_size or SIZE,
+            symmetry=own.symmetry,
+            cap_warp=own.cap_warp,
+            supports=RigidSupports(own.span or usual.span, own.support_diameter or usual.diameter),
+            collar=collar,
             deflections=tuple(deflections),
-            gas=Gas(**scaled(section.gas, pressure, "ambient")),
-            reading=curve_reading(
-                diameter, listed(section.places), section.slope_over and section.slope_over * length
-            ),
+            gas=Gas(**own.gas.model_dump(exclude_none=True)),
+            reading=curve_reading(own.diameter, own.places, own.slope_over),
             cords=cords,
         )
         test.model()
@@ -318,7 +312,7 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
         test,
         measured=read_measured(section.measured, place),
         reads_files=bool(section.measured.files),
-        assumed=tuple(words for key, words in USUAL.items() if getattr(section, key) is None),
+        assumed=tuple(words for key, words in USUAL.items() if getattr(own, key) is None),
     )
 
 
@@ -375,27 +369,20 @@ def _beam(
     cords: tuple[Cord, ...],
 ) -> CylinderTest:  # fmt: skip
     """Read the section of a beam."""
-    length, usual = place.scales.length, RigidSupports()
     if section.wall is None:
         raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
-    wall = _wall(section.wall, section.pressure, place)
-    diameter = section.diameter * length
-    lengths: dict[str, Any] = {
-        key: (getattr(section, name) or 0.0) * length
-        for key, name in (
-            ("load_spacing", "load_spacing"), ("load_width", "load_width"),
-            ("roller_below", "roller_below_axis"),
-        )
-    }  # fmt: skip
-    places = None if section.places is None else [v * length for v in section.places]
-    over = section.slope_over and section.slope_over * length
+    wall, own = (
+        _wall(section.wall, section.pressure, place),
+        whole_in_base_units(section, place.scales),
+    )
     try:
         beam = BeamModel(
-            TubeSection(0.5 * diameter, section.pressure * place.scales.pressure, wall, cords),
-            (section.span or usual.span / length) * length, deflections,
-            weight=1e-3 * GRAVITY * (section.mass_per_length or 0.0),
-            friction=section.friction or 0.0, size=(section.element_size or SIZE / length) * length,
-            reading=curve_reading(diameter, places, over), **lengths,
+            TubeSection(0.5 * own.diameter, own.pressure, wall, cords),
+            own.span or RigidSupports().span, deflections, own.load_spacing or 0.0,
+            load_width=own.load_width or 0.0, roller_below=own.roller_below_axis or 0.0,
+            weight=1e-3 * GRAVITY * (own.mass_per_length or 0.0), friction=own.friction or 0.0,
+            size=own.element_size or SIZE,
+            reading=curve_reading(own.diameter, own.places, own.slope_over),
         )  # fmt: skip
     except InputError as error:
         keys = {**KEYS, "angle": "wall.angle"}
@@ -405,7 +392,7 @@ def _beam(
     if section.mass_per_length is None:
         assumed += ["weightless tube"]
     return CylinderTest(
-        name=name, place=place, diameter=diameter, pressure=beam.pressure, length=beam.span,
+        name=name, place=place, diameter=own.diameter, pressure=beam.pressure, length=beam.span,
         seam_width=0.0, size=beam.size, symmetry="quarter", cap_warp="x", supports=beam.supports,
         collar=beam.collar, deflections=tuple(deflections), gas=Gas(), reading=beam.reading,
         cords=cords, beam=beam, measured=read_measured(section.measured, place),

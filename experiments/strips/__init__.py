@@ -1,7 +1,5 @@
 """Strip tests: cut strips pulled along warp, fill and 45 degrees, loads over a gauge's length."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Studied

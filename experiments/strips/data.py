@@ -1,7 +1,5 @@
 """Data of one direction: load curves, their polynomials and regions, and doubts about them."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -55,30 +53,26 @@ def compare_orders(
     groups = [
         np.array([i for i, name in enumerate(names) if name == one]) for one in dict.fromkeys(names)
     ]
-    return tuple(_score(u, f, order, through_origin, groups) for order in sorted(set(orders)))
-
-
-def _score(
-    u: Array, f: Array, order: int, through_origin: bool, groups: list[NDArray[np.intp]]
-) -> OrderScore:
-    fitted = fit_load_polynomial(u, f, order, through_origin)
-    terms, _, _ = terms_of(u, order, through_origin)
-    n, k = terms.shape
-    if n < k + 2:
-        problem = f"comparing needs {k + 2} points, there are {n}; lower it"
-        raise InputError(None, f"order {order}", problem)
-    orthonormal = np.linalg.qr(terms)[0]
-    left = f - fitted(u)
-    squares = sum(_left_out_squares(orthonormal[group], left[group]) for group in groups)
-    return OrderScore(order, fitted.r_squared, fitted.rmse, float(np.sqrt(squares / n)))
-
-
-def _left_out_squares(rows: Array, left: Array) -> float:
-    """Return the squared error at points refitted without them, by (1 - H)^-1."""
-    without = np.eye(len(rows)) - rows @ rows.T
-    if np.linalg.cond(without) > 1e12:
-        return float("inf")  # the others do not settle the coefficients
-    return float((np.linalg.solve(without, left) ** 2).sum())
+    scores = []
+    for order in sorted(set(orders)):
+        fitted = fit_load_polynomial(u, f, order, through_origin)
+        terms, _, _ = terms_of(u, order, through_origin)
+        n, k = terms.shape
+        if n < k + 2:
+            problem = f"comparing needs {k + 2} points, there are {n}; lower it"
+            raise InputError(None, f"order {order}", problem)
+        orthonormal, left, squares = np.linalg.qr(terms)[0], f - fitted(u), 0.0
+        for group in groups:
+            rows = orthonormal[group]
+            # The squared error at points refitted without them, by (1 - H)^-1.
+            without = np.eye(len(rows)) - rows @ rows.T
+            if np.linalg.cond(without) > 1e12:
+                squares = float("inf")  # the others do not settle the coefficients
+                break
+            squares += float((np.linalg.solve(without, left[group]) ** 2).sum())
+        error = float(np.sqrt(squares / n))
+        scores.append(OrderScore(order, fitted.r_squared, fitted.rmse, error))
+    return tuple(scores)
 
 
 #: Places that a break may take between zero and the last strain.

@@ -353,75 +353,64 @@ GAUGE, INCREMENTS, USUAL = 20.0, 20, 3
 SCATTER = 0.04
 
 
-@dataclass(frozen=True)
-class Pull:
-    """A strip that could be pulled: its direction (warp, fill, bias) and its angle in degrees."""
-
-    direction: str
-    angle: float
-
-    @property
-    def name(self) -> str:
-        """Return a readable name."""
-        across = self.direction == "bias"
-        return f"strip at {self.angle:g} degrees" if across else f"{self.direction} strip"
-
-
 def candidates(planning: Planning) -> Sequence[Candidate]:
     """Return each direction by itself, after the project's first strips or usual ones."""
     own = [test for test in planning.present if isinstance(test, PreparedStrips)]
     template = own[0] if own else None
-    angles = dict.fromkeys([*ANGLES, *([template.test.bias_angle] if template else [])])
-    pulls = [Pull("warp", 0.0), Pull("fill", 90.0), *(Pull("bias", a) for a in sorted(angles))]
+    angles = sorted({*ANGLES, *([template.test.bias_angle] if template else [])})
+    pulls = {"warp strip": ("warp", 45.0), "fill strip": ("fill", 45.0)}
+    pulls |= {f"strip at {angle:g} degrees": ("bias", angle) for angle in angles}
     noise_is = "assumed" if template is None else f"that of {template.test.name}"
     noise_is = noise_is if planning.noise is None else "given"
     return [
-        Candidate(pull.name, partial(_made, pull, template, planning), noise_is, USUAL)
-        for pull in pulls
+        Candidate(name, partial(_made, name, *pull, template, planning), noise_is, USUAL)
+        for name, pull in pulls.items()
     ]
 
 
-def _made(pull: Pull, template: PreparedStrips | None, planning: Planning) -> PreparedStrips:
+def _made(
+    name: str, direction: str, angle: float, template: PreparedStrips | None, planning: Planning
+) -> PreparedStrips:
     """Return the strip with the loads that the law gives, one value an increment.
-    It is as long as the project's own, else pulled up to the end of the known law."""
+    It is as long as the project's own, else pulled up to the end of the known law. angle : degrees
+    from the pull to the warp of a strip across the yarns."""
     own = None if template is None else template.test
-    strip = None if own is None else own.strips.get(pull.direction)
+    strip = None if own is None else own.strips.get(direction)
     gauge = GAUGE if strip is None else strip.gauge_length
-    final = gauge * math.exp(_strain(pull, planning))
+    final = gauge * math.exp(_strain(direction, angle, planning))
     if own is not None and strip is not None:
-        alike = pull.direction != "bias" or pull.angle == own.bias_angle
+        alike = direction != "bias" or angle == own.bias_angle
         final = strip.final_length if alike else final
-    strip = Strip(pull.direction, gauge, final)
+    strip = Strip(direction, gauge, final)
     width, grips = (WIDTH, GRIP_DISTANCE) if own is None else (own.width, own.grip_distance)
     test = StripsTest(
-        name=pull.name, place=planning.place, weight=1.0, width=width, grip_distance=grips,
-        bias_angle=pull.angle if pull.direction == "bias" else 45.0, increments=INCREMENTS,
-        strips={pull.direction: strip}, match_by="points", weights=dict.fromkeys(DIRECTIONS, 1.0),
-        objective="N",
+        name=name, place=planning.place, weight=1.0, width=width, grip_distance=grips,
+        bias_angle=angle, increments=INCREMENTS, strips={direction: strip}, match_by="points",
+        weights=dict.fromkeys(DIRECTIONS, 1.0), objective="N",
     )  # fmt: skip
     (model,) = test.models().values()
     load = np.asarray(planning.make_solver().run(model, planning.law).load)
-    noise = _noise(pull, template, planning, len(load), float(np.abs(load).max()))
-    curve = LoadCurve(pull.direction, "computed", np.array(model.elongations), load, None)
+    noise = _noise(direction, template, planning, len(load), float(np.abs(load).max()))
+    curve = LoadCurve(direction, "computed", np.array(model.elongations), load, None)
     done = replace(strip, curves=(curve,))
-    return PreparedStrips(replace(test, strips={pull.direction: done}, noise=noise))
+    return PreparedStrips(replace(test, strips={direction: done}, noise=noise))
 
 
-def _strain(pull: Pull, planning: Planning) -> float:
+def _strain(direction: str, angle: float, planning: Planning) -> float:
     """Return the logarithmic strain of the gauge where a yarn, or the shear, is at its end.
     A strip across the yarns keeps its area: shear 2 sin(2 angle) e, the nearer yarn cos(2 angle) e.
     """
     warp, fill, shear = planning.ends.tolist()
-    if pull.direction != "bias":
-        return float(warp if pull.direction == "warp" else fill)
-    turn = math.radians(2 * pull.angle)
-    along, end = math.cos(turn), warp if pull.angle < 45 else fill
+    if direction != "bias":
+        return float(warp if direction == "warp" else fill)
+    turn = math.radians(2 * angle)
+    along, end = math.cos(turn), warp if angle < 45 else fill
     most = shear / (2 * math.sin(turn))
     return float(min(most, end / abs(along))) if abs(along) > 1e-9 else float(most)
 
 
 def _noise(
-    pull: Pull, template: PreparedStrips | None, planning: Planning, values: int, largest: float
+    direction: str, template: PreparedStrips | None, planning: Planning, values: int, largest: float
 ) -> float:
     """Return the noise (N) of independent loads: of the own direction, the others, or usual."""
     if planning.noise is not None:
@@ -437,8 +426,8 @@ def _noise(
         else:
             known = replace(known, values=max(1, known.values // specimens))
         own[d] = known.at(values)
-    if pull.direction in own:
-        return own[pull.direction]
+    if direction in own:
+        return own[direction]
     models = test.models()
     loads = {d: loads_to_match(test, test.strips[d], models[d])[1] for d in own}
     return max(noise / float(np.abs(loads[d]).max()) for d, noise in own.items()) * largest

@@ -1,9 +1,6 @@
 """Results of strip tests as numbers, tables, figures and files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -161,49 +158,60 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
 MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 
-@dataclass(frozen=True, eq=False)
-class Pull:
-    """One card on one strip: elongations (mm), those shown, and their RMS error (N)."""
-
-    model: UniaxialModel
-    history: History
-    elongation: Array
-    shown: int
-    rms: float | None
-
-
-#: By (card, direction).
-Pulls = Mapping[tuple[str, str], "Pull | SolverFailure"]
-
-
 def simulate(
     test: StripsTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
     out: Output, within_range: bool = False,
 ) -> Simulation:  # fmt: skip
     """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
     within_range : show each curve only to where the card's valid range ends."""
-    pulls = {
-        (name, direction): _pull(test, cards[name], direction, run, within_range)
-        for (name, direction), run in runs.items()
-    }
-    numbers = {name: _card_numbers(test, name, card, pulls) for name, card in cards.items()}
-    _write_loads(test, list(cards), pulls, out)
+    numbers: dict[str, Any] = {}
+    lines, tables = list[str](), []
+    drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
+    rms: dict[str, list[float]] = {d: [] for d in test.strips}
+    for number, (name, card) in enumerate(cards.items(), start=1):
+        directions: dict[str, Any] = {}
+        errors, said = list[float | None](), []
+        for direction, strip in test.strips.items():
+            model, history = runs[name, direction].model, runs[name, direction].outcome
+            if isinstance(history, SolverFailure):
+                directions[direction] = {"failed": history.reason}
+                said.append(f"{direction} failed")
+                errors.append(None)
+                continue
+            u, load, error = np.array(model.elongations), history.load, None
+            columns = {"card": name, "direction": direction, "elongation_mm": u, "load_N": load}
+            tables.append(pd.DataFrame(columns))
+            n = _within(model, card, history) if within_range else len(u)
+            if n:
+                drawn[direction].append((name, u[:n], load[:n]))
+            if strip.polynomial is not None and n:
+                error = float(np.sqrt(np.mean((load[:n] - strip.polynomial(u[:n])) ** 2)))
+                rms[direction].append(error)
+            errors.append(error if n == len(u) else None)
+            end, shown = float(load[-1]), float(u[n - 1]) if n else 0.0
+            directions[direction] = {
+                "rms_N": error, "end_load_N": end, "shown_to_mm": shown,
+                "strain_reached": by_strain(strains_of(history)),
+            }  # fmt: skip
+            words = (
+                f"{end:.4g} N at the end" if error is None else f"{error:.4g} N to {shown:.3g} mm"
+            )
+            said.append(f"{direction} {words}")
+            if direction == "bias":
+                stem = "bias" if len(cards) == 1 else f"bias-{number}"
+                draw_bias(model, history, out.path(f"{stem}.png"), out.path(f"{stem}.vtu"))
+        # A sum of errors over parts of the curves could be compared with nothing.
+        known = [error for error in errors if error is not None]
+        total = sum(known) if len(known) == len(errors) else None
+        numbers[name] = {"e_uniaxial_N": total, "directions": directions}
+        words = "" if total is None else f"; sum {total:.4g} N"
+        lines.append(f"{name}: RMS {', '.join(said)}{words}")
+    if tables:
+        out.write("loads.csv", pd.concat(tables), digits=None)
+    panels = [load_panel(strip, drawn[d], rms[d]) for d, strip in test.strips.items()]
+    save(out.path("loads.png"), load_charts("loads", panels))
     figures = [(out.name("loads.png"), "Load over gauge elongation")]
-    return Simulation({"cards": numbers}, _lines_of_cards(numbers), figures)
-
-
-def _pull(
-    test: StripsTest, card: MaterialCard, direction: str, run: CardRun, within_range: bool
-) -> Pull | SolverFailure:
-    if isinstance(run.outcome, SolverFailure):
-        return run.outcome
-    history, u = run.outcome, np.array(run.model.elongations)
-    shown = _within(run.model, card, history) if within_range else len(u)
-    polynomial, rms = test.strips[direction].polynomial, None
-    if polynomial is not None and shown:
-        error = history.load[:shown] - polynomial(u[:shown])
-        rms = float(np.sqrt(np.mean(error**2)))
-    return Pull(run.model, history, u, shown, rms)
+    return Simulation({"cards": numbers}, lines, figures)
 
 
 def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
@@ -214,70 +222,6 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
         if (reached > card.law.strain_range * (1 + 1e-6)).any():
             return i
     return len(history.load)
-
-
-def _card_numbers(test: StripsTest, name: str, card: MaterialCard, pulls: Pulls) -> dict[str, Any]:
-    """Return RMS errors, end loads and strains of a card, strip by strip."""
-    directions: dict[str, Any] = {}
-    errors: list[float | None] = []
-    for direction in test.strips:
-        pull = pulls[name, direction]
-        if isinstance(pull, SolverFailure):
-            directions[direction] = {"failed": pull.reason}
-            errors.append(None)
-            continue
-        directions[direction] = {
-            "rms_N": pull.rms,
-            "end_load_N": float(pull.history.load[-1]),
-            "shown_to_mm": float(pull.elongation[pull.shown - 1]) if pull.shown else 0.0,
-            "strain_reached": by_strain(strains_of(pull.history)),
-        }
-        errors.append(pull.rms if pull.shown == len(pull.elongation) else None)
-    # A sum of errors over parts of the curves could be compared with nothing.
-    known = [error for error in errors if error is not None]
-    total = sum(known) if len(known) == len(errors) else None
-    return {"e_uniaxial_N": total, "directions": directions}
-
-
-def _write_loads(test: StripsTest, cards: list[str], pulls: Pulls, out: Output) -> None:
-    ended = {key: pull for key, pull in pulls.items() if isinstance(pull, Pull)}
-    header = ("card", "direction", "elongation_mm", "load_N")
-    tables = [
-        pd.DataFrame(dict(zip(header, (*key, pull.elongation, pull.history.load), strict=True)))
-        for key, pull in ended.items()
-    ]
-    out.write("loads.csv", pd.concat(tables), digits=None)
-    drawn: dict[str, list[Curve]] = {d: [] for d in test.strips}
-    rms: dict[str, list[float]] = {d: [] for d in test.strips}
-    for (name, direction), pull in ended.items():
-        if n := pull.shown:
-            drawn[direction].append((name, pull.elongation[:n], pull.history.load[:n]))
-            rms[direction] += [] if pull.rms is None else [pull.rms]
-    panels = [load_panel(strip, drawn[d], rms[d]) for d, strip in test.strips.items()]
-    save(out.path("loads.png"), load_charts("loads", panels))
-    for number, name in enumerate(cards, start=1):
-        if (name, "bias") in ended:
-            stem = "bias" if len(cards) == 1 else f"bias-{number}"
-            pull = ended[name, "bias"]
-            draw_bias(pull.model, pull.history, out.path(f"{stem}.png"), out.path(f"{stem}.vtu"))
-
-
-def _lines_of_cards(cards: Mapping[str, dict[str, Any]]) -> list[str]:
-    lines = []
-    for name, card in cards.items():
-        parts = []
-        for direction, numbers in card["directions"].items():
-            if "failed" in numbers:
-                words = "failed"
-            elif numbers["rms_N"] is None:
-                words = f"{numbers['end_load_N']:.4g} N at the end"
-            else:
-                words = f"{numbers['rms_N']:.4g} N to {numbers['shown_to_mm']:.3g} mm"
-            parts.append(f"{direction} {words}")
-        total = card["e_uniaxial_N"]
-        words = "" if total is None else f"; sum {total:.4g} N"
-        lines.append(f"{name}: RMS {', '.join(parts)}{words}")
-    return lines
 
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:

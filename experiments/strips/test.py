@@ -1,7 +1,5 @@
 """A test of strips: its section, the reading of its load curves, and its models."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -37,7 +35,7 @@ from ...readers.curves import (
     split_at_restarts,
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
-from ...readers.sections import Length, Name, Positive, Section
+from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
 from ..kinds import Place, Reach, Refined, named_format, state_said
 from .data import Strip
 
@@ -210,9 +208,8 @@ class StripsTest:
 
 def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     """Read the section of a test, and its load curves."""
-    length = place.scales.length
-    grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
-    width = WIDTH if section.width is None else section.width * length
+    section = whole_in_base_units(section, place.scales)
+    grips, width = section.grip_distance or GRIP_DISTANCE, section.width or WIDTH
     strips = read_strips(place, section, width)
     weights = section.weights.model_dump()
     if not sum(weights[d] for d in strips) > 0:
@@ -228,12 +225,11 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
             if strip.curves and not len(strip.points[0]):
                 problem = "no measured point lies between the gauge length and this one"
                 raise place.error(f"{direction}.final_length", problem)
-    same = ("weight", "bias_angle", "increments", "objective", "noise")
+    same = ("weight", "bias_angle", "increments", "objective", "noise", "rate", "conditioning")
     return StripsTest(
         name=name, place=place, width=width, grip_distance=grips, strips=strips,
         match_by=section.match, weights=weights, specimens=section.data.specimens,
-        rate=None if section.rate is None else section.rate * length,
-        conditioning=section.conditioning, **{key: getattr(section, key) for key in same},
+        **{key: getattr(section, key) for key in same},
     )  # fmt: skip
 
 
@@ -328,9 +324,9 @@ EXTRAPOLATED = 0.05
 
 
 def read_strips(place: Place, section: StripsSection, width: float) -> dict[str, Strip]:
-    """Read the strips of a section (width mm), by direction: those with a table or data.
+    """Read the strips of a section (mm), by direction: those with a table or data; width : mm.
     Missing files are no error where the place needs none and all lengths are given."""
-    data, length = section.data, place.scales.length
+    data = section.data
     if (data.polynomials is None) == (data.files is None):
         raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
     folder = place.folder(data.folder)
@@ -342,7 +338,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
         if place.need_data or not ends or any(None in pair for pair in ends.values()):
             problem = f"there is no file {missing.path}; --data DIR names another folder"
             raise place.error(missing.field, problem)
-        return {d: _strip(place, d, a * length, b * length) for d, (a, b) in ends.items()}
+        return {d: _strip(place, d, *pair) for d, pair in ends.items()}
     if data.polynomials is not None:
         strips = _published(place, data, tables, listed[0])
     else:
@@ -361,14 +357,13 @@ def _published(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
 ) -> dict[str, Strip]:
     format = named_format(place, "data.format", "load polynomials", data.format)
-    curves, length = read_published_polynomials(file.path, format), place.scales.length
-    strips = {}
+    curves, strips = read_published_polynomials(file.path, format), {}
     for direction in DIRECTIONS:
         if direction not in curves or (tables and direction not in tables):
             continue
         curve, own = curves[direction], tables.get(direction) or GaugeSection()
-        start = curve.gauge_length if own.gauge_length is None else own.gauge_length * length
-        end = curve.final_length if own.final_length is None else own.final_length * length
+        start = own.gauge_length or curve.gauge_length
+        end = own.final_length or curve.final_length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
         known = {"scatter": scatter, "published": file.path}
         strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
@@ -379,9 +374,8 @@ def _measured(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection],
     listed: Sequence[ListedFile], width: float,
 ) -> dict[str, Strip]:  # fmt: skip
-    said = {file.direction for file in listed}
-    strips, length = {}, place.scales.length
-    gauges = {d: t.gauge_length * length for d, t in tables.items() if t.gauge_length is not None}
+    said, strips = {file.direction for file in listed}, {}
+    gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
     for direction, curves in measured_curves(place, data, listed, width, gauges).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
         if tables and direction not in tables and direction not in said:
@@ -398,12 +392,12 @@ def _measured(
         except InputError as error:
             problem = f"no load curve through the {direction} points: {error.problem}"
             raise place.error(f"data, {error.field}", problem) from None
-        start, open_end = own.gauge_length * length, own.final_length is None
-        end = start + polynomial.end if own.final_length is None else own.final_length * length
-        known = {"curves": curves, "scatter": scatter, "through_origin": data.through_origin}
         strips[direction] = _strip(
-            place, direction, start, end, polynomial, open_end=open_end, **known
-        )
+            place, direction, own.gauge_length,
+            own.final_length or own.gauge_length + polynomial.end, polynomial,
+            open_end=own.final_length is None, curves=curves, scatter=scatter,
+            through_origin=data.through_origin,
+        )  # fmt: skip
     return strips
 
 
@@ -411,14 +405,10 @@ def _strip(
     place: Place, direction: str, start: float, end: float,
     polynomial: LoadPolynomial | None = None, **data: Any,
 ) -> Strip:  # fmt: skip
-    problem = ""
-    if not end > start:
-        problem = f"expected more than the gauge length {start:g} mm, got {end:g} mm"
-    elif polynomial is not None and end - start > polynomial.end * (1 + EXTRAPOLATED):
-        problem = (
-            f"the data end at an elongation of {polynomial.end:.5g} mm; expected up to"
-            f" {start + polynomial.end:.5g} mm, got {end:g} mm"
-        )
-    if problem:
-        raise place.error(f"{direction}.final_length", problem)
+    known = np.inf if polynomial is None else polynomial.end
+    expected = f"more than the gauge length {start:g} mm" if not end > start else ""
+    if end - start > known * (1 + EXTRAPOLATED):
+        expected = f"up to {start + known:.5g} mm, where the data end"
+    if expected:
+        raise place.error(f"{direction}.final_length", f"expected {expected}, got {end:g} mm")
     return Strip(direction, start, end, polynomial, **data)

@@ -4,8 +4,6 @@ A long closed tube, warp along it, with the same strain everywhere (`TubeModel`)
 wall as nothing but G12 resists, so that a tube tells G12 where strips and bubbles do not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Results of tubes in tension and torsion as numbers, a table, a figure and a file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -22,12 +22,8 @@ CONSTRAINT_TOLERANCE, FLAG_TOLERANCE = 1e-9, 1e-8
 RELATIVE_E, RELATIVE_X = 1e-10, 1e-12
 
 
-class NoMoreAnalyses(Exception):
-    """The allowed number of analyses was spent."""
-
-
-class BelowTolerance(Exception):
-    """e fell below the tolerance."""
+class Ended(Exception):
+    """The search ended, and how: below the tolerance, or all analyses are used up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +65,7 @@ class Record:
         return np.asarray(np.linalg.solve(self.basis, y - self.origin), dtype=float)
 
     def at(self, x: Array, with_slope: bool) -> Look:
-        """Evaluate `x`, a repeated point once; ends by NoMoreAnalyses or BelowTolerance."""
+        """Evaluate `x`, a repeated point once; raises Ended."""
         key = x.tobytes()
         if self._last is not None and self._last[0] == key:
             before = self._last[1]
@@ -94,12 +90,12 @@ class Record:
         if positive and (point.value < self.best.value or not self.best.stable):
             self.best = point
         if self.best.value < self.options.tolerance:
-            raise BelowTolerance
+            raise Ended(CONVERGED)
         return Look(point.value, self._slope(point, x) if with_slope else none, positive, True)
 
     def _evaluate(self, y: Array, with_jacobian: bool) -> Evaluation | None:
         if self.problem.analyses >= self.options.max_analyses:
-            raise NoMoreAnalyses
+            raise Ended(ANALYSES_USED_UP)
         return self.problem.evaluate(y, with_jacobian)
 
     def _slope(self, point: Evaluation, x: Array) -> Array:
@@ -156,10 +152,8 @@ def nlopt_minimise(
     try:
         optimiser.optimize(x)
         status = f"nlopt {optimiser.last_optimize_result()}"
-    except BelowTolerance:
-        status = CONVERGED
-    except NoMoreAnalyses:
-        status = ANALYSES_USED_UP
+    except Ended as end:
+        status = str(end)
     except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
         status = f"nlopt stopped: {type(error).__name__}"
     return Optimum(record.best, status, problem.analyses)

@@ -396,7 +396,7 @@ def test_a_test_of_ones_own_alone_and_by_another_solver(tmp_path):
     setup = prepared(with_torsion(easy(tmp_path)))
     bubble, tube = setup.problem().comparisons
     assert tube.objective.shifted(None, None) is tube.objective
-    led = setup.problem_of([bubble.by(Plain(bubble.solver)), tube]).surrogate
+    led = setup.problem_of([replace(bubble, solver=Plain(bubble.solver)), tube]).surrogate
     assert [c.solver.name for c in led.comparisons] == ["membrane", "closed form"]
 
 

@@ -296,10 +296,10 @@ def test_what_is_known_now_is_what_a_fit_says_its_tests_pin_down(tmp_path, few, 
 def test_what_cannot_be_computed_is_left_out_and_named(project, few, monkeypatch):
     made, told = strips._made, []
 
-    def fails(pull, *rest):
-        if pull.direction == "fill":
+    def fails(name, *rest):
+        if name == "fill strip":
             raise SolverFailure("no equilibrium", "membrane")
-        return made(pull, *rest)
+        return made(name, *rest)
 
     monkeypatch.setattr(strips, "_made", fails)
     found = plan(project, CARD, strain=PLANNED_ENDS, progress=lambda *event: told.append(event))
