@@ -759,14 +759,10 @@ class Around:
     records: Sequence[RunRecord] = ()
 
     @property
-    def failed(self) -> int:
-        """Return how many of the runs failed."""
-        return sum(bool(record.failure) for record in self.records)
-
-    @property
     def words(self) -> str:
         """Describe the runs."""
-        lost = f", {self.failed} failed" if self.failed else ""
+        failed = sum(bool(record.failure) for record in self.records)
+        lost = f", {failed} failed" if failed else ""
         along = "of its least certain directions" if self.by == "directions" else "laws drawn"
         return f"{len(self.records)} {along}{lost}"
 

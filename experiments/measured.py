@@ -5,11 +5,10 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import InputError
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
@@ -59,11 +58,7 @@ class StrainsPrepared:
     """What prepared tests share that have one strain everywhere: no mesh, and no specimens."""
 
     known: HypoelasticLaw | None = None
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Return nothing: no part is a specimen of another."""
-        return {}
+    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
 
     def finer(
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
@@ -118,9 +113,6 @@ class StrainObjective:
         raise NotImplementedError
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (m, 0): there are no nuisance unknowns."""
-        if names:
-            raise InputError(None, "nuisance", f"these strains know no {', '.join(names)}")
         return np.empty((sum(self.sizes), 0))
 
     def shifted(self, here: History, there: History) -> StrainObjective:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -150,14 +150,11 @@ class PreparedOwn:
 
     test: OwnTest
     known = None
+    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
 
     @property
     def objective_is(self) -> str:
         return f"RMS error, {self.test.unit}"
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        return {}
 
     def reach(self, masks: Masks) -> kinds.Reach:
         return self.test.reach

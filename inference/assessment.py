@@ -276,7 +276,7 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
     of_law = covariance[:size, :size]
     spread = {m: float(np.sqrt(slope @ of_law @ slope)) for m, slope in slopes.items()}
     found = []
-    pairs = zip(unknowns.nuisance_names, unknowns.nuisance.all, strict=True)
+    pairs = zip(unknowns.nuisance.names, unknowns.nuisance.all, strict=True)
     for k, (name, one) in enumerate(pairs, start=size):
         sigma, value = float(np.sqrt(covariance[k, k])), float(posterior.best[k])
         correlation = {

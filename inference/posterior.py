@@ -252,7 +252,7 @@ class Posterior:
     @property
     def labels(self) -> tuple[str, ...]:
         """Return the labels of the rows of `coefficients`."""
-        return (*self.unknowns.labels, *self.unknowns.nuisance_names)
+        return (*self.unknowns.labels, *self.unknowns.nuisance.names)
 
     @property
     def correlations(self) -> Array:

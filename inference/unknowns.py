@@ -138,10 +138,6 @@ class Unknowns:
     def labels(self) -> tuple[str, ...]:
         return tuple(self.form.labels[i] for i in self.free)
 
-    @property
-    def nuisance_names(self) -> tuple[str, ...]:
-        return self.nuisance.names
-
     def nuisance_values(self, comparison: str, y: Array) -> dict[str, float]:
         """Return the nuisance of a comparison by plain name at unknowns y, in its units."""
         return self.nuisance.values(comparison, y[self.size :])

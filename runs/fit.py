@@ -321,8 +321,8 @@ def fit(
         record.write(store.path)
         unknowns, scales = problem.unknowns, project.scales
         columns = [f"{label}_{scales.modulus_unit}" for label in unknowns.labels]
-        scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance_names)
-        files = RunningFiles(store, [*columns, *unknowns.nuisance_names], scale)
+        scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance.names)
+        files = RunningFiles(store, [*columns, *unknowns.nuisance.names], scale)
         done = files.begin(resume)
     setup.law.increment(*np.zeros((3, 3)))  # processes that are forked find the kernels loaded
     with failure_page(None if out is None else Path(out), project.title):

@@ -295,7 +295,7 @@ class Fit:
 
         unknowns, sure, scales = self.problem.unknowns, self.best.certainty, self.project.scales
         size, nuisance = unknowns.size, unknowns.nuisance.all
-        names = [*unknowns.labels, *unknowns.nuisance_names]
+        names = [*unknowns.labels, *unknowns.nuisance.names]
         scale = np.array([scales.modulus] * size + [1.0] * len(nuisance))
         known = None if sure is None else sure.reported
         y = self.best.point.unknowns if known is None else known.best

@@ -10,7 +10,7 @@ from ...meshes.bubble_model import BubbleModel
 from ...readers.pressure_log import ClockOffset
 from ..kinds import Array, FittedTest
 from .objective import FieldObjective
-from .point_files import PointFiles, RecordedFrames
+from .point_files import RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
 from .section import DIRECTIONS
@@ -127,12 +127,6 @@ def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
     for target in objective.targets:
         places[target.places] = target.at(nodes)
     return places, field
-
-
-def recorded_of(prepared: PreparedBubble) -> RecordedFrames | None:
-    """Return the frames chosen by pressure; None where the project names all pressures."""
-    data = prepared.test.data
-    return data.recorded if isinstance(data, PointFiles) else None
 
 
 def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:

@@ -269,9 +269,6 @@ class FieldObjective:
     def nuisance_columns(self, names: Sequence[str], nuisance: Unknowns) -> Array:
         """Return (m, names), the slope of the residual by `OFFSETS` (mm) and `PLACED`."""
         every = (*OFFSETS, *PLACED)
-        unknown = [name for name in names if name not in every]
-        if unknown:
-            raise InputError(None, "nuisance", f"a field knows no {', '.join(unknown)}")
         parts = [np.tile(np.eye(3), (len(t.displacement), 1, 1)) for t in self.targets]
         if any(name in PLACED for name in names):
             placed = self._placed_by(amounts_of(PLACED, nuisance))

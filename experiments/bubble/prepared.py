@@ -4,6 +4,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -24,7 +25,7 @@ from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precisi
 from . import objective as matching
 from .doubts import View, doubts_of
 from .objective import FieldObjective, FieldTarget, folded, mirrored
-from .point_files import PointFiles
+from .point_files import PointFiles, RecordedFrames
 from .registration import Registration, register_fields
 from .section import Sheet
 from .sheet import (
@@ -69,6 +70,7 @@ class PreparedBubble:
     registration: Registration | None = None
     by_this_model: bool = False
     sheet: MeasuredSheet = FLAT
+    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}  # a bubble is one
 
     @property
     def objective_is(self) -> str:
@@ -77,8 +79,9 @@ class PreparedBubble:
         return f"{own}, and what is known of the sheet" if unknown else own
 
     @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        return {}
+    def recorded(self) -> RecordedFrames | None:
+        """Return the frames chosen by pressure; None where the project names all pressures."""
+        return self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
@@ -210,8 +213,7 @@ class PreparedBubble:
         return replace(own, model=model, objective=moved, prolong=prolong)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        recorded = self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
-        logs = () if recorded is None else recorded.logs
+        logs = () if self.recorded is None else self.recorded.logs
         if isinstance(self.test.data, PointFiles) and self.test.data.options.reference:
             logs = (*logs, self.test.data.options.reference)
         read = [(field.path, field) for field in self.fields if field.path is not None]
@@ -243,8 +245,7 @@ class PreparedBubble:
         """Return the fields for a look before a fit."""
         test = self.test
         registered, flat = self.registration is not None, not test.sheet.known
-        recorded = test.data.recorded if isinstance(test.data, PointFiles) else None
-        numbers = () if recorded is None else recorded.numbers
+        numbers = () if self.recorded is None else self.recorded.numbers
         return View(self.fields, test.outline, test.thickness, registered, flat, numbers)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:

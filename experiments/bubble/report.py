@@ -100,7 +100,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         },
     }  # fmt: skip
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    taken = wording.recorded_of(prepared)
+    taken = prepared.recorded
     if taken is not None:
         numbers["data"]["pressures"] = wording.recorded_numbers(taken)
         lines += wording.recorded_lines(taken)
@@ -178,7 +178,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
-    taken = wording.recorded_of(prepared)
+    taken = prepared.recorded
     if taken is not None:
         tables.insert(0, recorded_table(taken))
         figures += clock_pictures(taken, out)

@@ -56,12 +56,6 @@ class LoadObjective:
     ) -> None:  # fmt: skip
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
-        if not len(self.load):
-            raise InputError(None, "load curve", "holds no point to match")
-        beyond = (self.elongation < 0) | (self.elongation > knots[-1] * (1 + 1e-9))
-        if beyond.any():
-            problem = f"expected elongations from 0 to {knots[-1]:g} mm, got "
-            raise InputError(None, "load curve", f"{problem}{self.elongation[beyond][0]:g}")
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         from scipy.interpolate import CubicSpline
 
@@ -127,9 +121,6 @@ class LoadObjective:
         }  # fmt: skip
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (n, 0): a load curve has no nuisance unknowns."""
-        if names:
-            raise InputError(None, "nuisance", f"a load curve knows no {', '.join(names)}")
         return np.empty((len(self.load), 0))
 
     def rms(self, history: History) -> float:
@@ -319,7 +310,7 @@ class PreparedStrips:
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         test = self.test
-        sizes = test.width, test.thickness
+        sizes = test.width, test.place.fabric.thickness
         return doubts_of_strips(test.strips, *sizes, expected, test.grip_distance)
 
 

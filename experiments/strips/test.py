@@ -164,10 +164,6 @@ class StripsTest:
         by_key = Pace() if self.rate is None else Pace(self.rate / 60.0 / self.grip_distance)
         return found if math.isfinite(found.rate) else by_key
 
-    @property
-    def thickness(self) -> float:
-        return self.place.fabric.thickness
-
     @cached_property
     def reach(self) -> Reach:
         """Return the reach of the gauges, see `reach_of`."""
@@ -183,7 +179,7 @@ class StripsTest:
     ) -> Mapping[str, UniaxialModel]:
         """Return the models by direction; edges of quads, or increments, divided by a factor."""
         quads, steps = (factor, 1.0) if what == "elements" else (1.0, factor)
-        thick = self.thickness if thickness is None else thickness
+        thick = self.place.fabric.thickness if thickness is None else thickness
         increments = max(1, round(self.increments * steps))
         models = {}
         for d, s in self.strips.items():
@@ -408,7 +404,7 @@ def _strip(
     known = np.inf if polynomial is None else polynomial.end
     expected = f"more than the gauge length {start:g} mm" if not end > start else ""
     if end - start > known * (1 + EXTRAPOLATED):
-        expected = f"up to {start + known:.5g} mm, where the data end"
+        expected = f"up to {start + known:.5g} mm (the data end at an elongation of {known:.5g} mm)"
     if expected:
         raise place.error(f"{direction}.final_length", f"expected {expected}, got {end:g} mm")
     return Strip(direction, start, end, polynomial, **data)

@@ -112,86 +112,73 @@ class Record:
                 slope[i] = (beside.value - point.value) / DIFFERENCE
         return slope
 
-
-def nlopt_minimise(
-    algorithm: int, problem: FitProblem, start: Array, options: FitOptions,
-    first_step: float | None = None,
-) -> Optimum | None:  # fmt: skip
-    """Minimise e by NLopt's algorithm `algorithm`; None when the analysis at `start` fails.
-    Returns the best feasible, stable point that was seen, whatever NLopt itself says. first_step :
-    of each bound's width; NLopt's own unless given."""
-    problem.warm_starts = False  # e has to be a function of the point alone
-    first = problem.evaluate(start, False)
-    if first is None:
-        return None
-    record = Record(problem, first, options)
-    optimiser = nlopt.opt(algorithm, len(start))
-
-    def objective(x: Array, gradient: Array) -> float:
-        look = record.at(x, gradient.size > 0)
+    def objective(self, x: Array, gradient: Array) -> float:
+        """Return e, as NLopt asks for it."""
+        look = self.at(x, gradient.size > 0)
         if gradient.size:
             gradient[:] = look.slope
         return look.value
 
-    optimiser.set_min_objective(objective)
-    x = record.variables(start)
-    if record.flags:
-        size, (low, high) = problem.unknowns.size, problem.unknowns.nuisance.bounds
-        low, high = np.concatenate([np.zeros(size), low]), np.concatenate([np.ones(size), high])
-        x = np.clip(x, low, high)
-        optimiser.set_lower_bounds(low)
-        optimiser.set_upper_bounds(high)
-        _flag(optimiser, record)
-    else:
-        _constrain(optimiser, record)
-    optimiser.set_maxeval(options.max_analyses)
-    optimiser.set_ftol_rel(RELATIVE_E)
-    optimiser.set_xtol_rel(RELATIVE_X)
-    if first_step is not None:
-        optimiser.set_initial_step(first_step)
-    try:
-        optimiser.optimize(x)
-        status = f"nlopt {optimiser.last_optimize_result()}"
-    except Ended as end:
-        status = str(end)
-    except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
-        status = f"nlopt stopped: {type(error).__name__}"
-    return Optimum(record.best, status, problem.analyses)
-
-
-def _constrain(optimiser: nlopt.opt, record: Record) -> None:
-    a, c = record.problem.unknowns.inequalities
-    rows = a @ record.basis
-    limit = c - a @ record.origin
-
-    def linear(result: Array, x: Array, gradient: Array) -> None:
-        result[:] = limit - rows @ x
-        if gradient.size:
-            gradient[:] = -rows
-
-    optimiser.add_inequality_mconstraint(linear, np.full(len(rows), CONSTRAINT_TOLERANCE))
-
-
-def _flag(optimiser: nlopt.opt, record: Record) -> None:
-    """Add two flags without a slope: positive moduli, and an analysis that ends well (Eq. 4.9)."""
-
-    def flag(name: str, x: Array, gradient: Array) -> float:
+    def flag(self, name: str, x: Array, gradient: Array) -> float:
+        """Return -1 where moduli are "positive", or the point was "analysed", else 1 (Eq. 4.9)."""
         gradient[:] = 0.0
-        return -1.0 if getattr(record.at(x, False), name) else 1.0
-
-    for name in ("positive", "analysed"):
-        optimiser.add_inequality_constraint(partial(flag, name), FLAG_TOLERANCE)
+        return -1.0 if getattr(self.at(x, False), name) else 1.0
 
 
-class Slsqp:
-    """NLopt's SLSQP with the exact gradient of e, or with differences where there is none."""
+@dataclass(frozen=True)
+class NloptMethod:
+    """An algorithm of NLopt, with linear or boolean constraints.
+    first_step : of each bound's width; NLopt's own unless given."""
 
-    needs_slope = False
-    boolean = True
-    max_analyses = 500
+    algorithm: int
+    max_analyses: int
+    first_step: float | None = None
+    needs_slope: bool = False
+    boolean: bool = True
 
     def minimise(self, problem: FitProblem, start: Array, options: FitOptions) -> Optimum | None:
-        return nlopt_minimise(nlopt.LD_SLSQP, problem, start, options)
+        """Minimise e; None when the analysis at `start` fails.
+        Returns the best feasible, stable point that was seen, whatever NLopt itself says."""
+        problem.warm_starts = False  # e has to be a function of the point alone
+        first = problem.evaluate(start, False)
+        if first is None:
+            return None
+        record, unknowns = Record(problem, first, options), problem.unknowns
+        optimiser, x = nlopt.opt(self.algorithm, len(start)), record.variables(start)
+        optimiser.set_min_objective(record.objective)
+        if record.flags:
+            ends = zip((0.0, 1.0), unknowns.nuisance.bounds, strict=True)
+            low, high = (np.r_[np.full(unknowns.size, own), others] for own, others in ends)
+            x = np.clip(x, low, high)
+            optimiser.set_lower_bounds(low)
+            optimiser.set_upper_bounds(high)
+            for name in ("positive", "analysed"):
+                optimiser.add_inequality_constraint(partial(record.flag, name), FLAG_TOLERANCE)
+        else:
+            a, c = unknowns.inequalities
+            rows, limit = a @ record.basis, c - a @ record.origin
+
+            def linear(result: Array, x: Array, gradient: Array) -> None:
+                result[:] = limit - rows @ x
+                if gradient.size:
+                    gradient[:] = -rows
+
+            most = np.full(len(rows), CONSTRAINT_TOLERANCE)
+            optimiser.add_inequality_mconstraint(linear, most)
+        optimiser.set_maxeval(options.max_analyses)
+        optimiser.set_ftol_rel(RELATIVE_E)
+        optimiser.set_xtol_rel(RELATIVE_X)
+        if self.first_step is not None:
+            optimiser.set_initial_step(self.first_step)
+        try:
+            optimiser.optimize(x)
+            status = f"nlopt {optimiser.last_optimize_result()}"
+        except Ended as end:
+            status = str(end)
+        except (nlopt.RoundoffLimited, RuntimeError, ValueError) as error:
+            status = f"nlopt stopped: {type(error).__name__}"
+        return Optimum(record.best, status, problem.analyses)
 
 
-METHOD = Slsqp()
+#: SLSQP with the exact gradient of e, or with differences where there is none.
+METHOD = NloptMethod(nlopt.LD_SLSQP, 500)

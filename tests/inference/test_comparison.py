@@ -62,12 +62,12 @@ def test_nuisance_belongs_to_its_comparison_and_stays_inside_its_bounds():
     unknowns = two().unknowns
     own = {"offset_z": 0.1, "pressure_offset": 2.0, "offset_x": 0.3}
     names = *(f"bubble 1: {name}" for name in own), "bubble 2: pressure_offset"
-    assert unknowns.nuisance_names == names and unknowns.count == 16
+    assert unknowns.nuisance.names == names and unknowns.count == 16
     y = np.concatenate([np.ones(12), [0.1, 2.0, 0.3, -4.0]])
     for name, values in (("1", own), ("2", {"pressure_offset": -4.0}), ("3", {})):
         assert unknowns.nuisance_values(f"bubble {name}", y) == values
     alone = fit_of(comparison("bubble 1", SMALL, PRESSURE))
-    assert alone.unknowns.nuisance_names == ("pressure_offset",)
+    assert alone.unknowns.nuisance.names == ("pressure_offset",)
     a, c = unknowns.inequalities
     y = unknowns.at(LAW.beta)
     assert (a @ y >= c).all()
@@ -127,7 +127,6 @@ def test_a_problem_says_what_does_not_go_together():
     assert "nuisance of bubble 1" in complaint(FitProblem, (first, second), LAW, unknowns)
     assert "a name of their own" in complaint(FitProblem, (second, second), LAW, unknowns)
     assert "expected comparisons" in complaint(FitProblem, (), LAW, unknowns)
-    assert "knows no tilt" in complaint(second.objective.nuisance_columns, ["tilt"], {})
 
 
 def test_what_contracts_asks_for_a_positive_definite_law():

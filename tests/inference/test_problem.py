@@ -38,7 +38,7 @@ def test_jacobian_against_finite_differences(unknowns):
     fit.comparisons[0].solver = MembraneSolver(1e-10)
     coefficients = LAW.beta[list(unknowns.free)] * 1.02
     y = unknowns.at(coefficients)
-    if unknowns.nuisance_names:
+    if unknowns.nuisance.names:
         y[unknowns.size :] = [0.3, -0.2, 0.5, 1.5]
     differentiated(fit, y)
 
@@ -86,7 +86,7 @@ def test_inequalities_say_what_bounds_and_positivity_say(unknowns):
         lower, upper = unknowns.box
         coefficients = lower + (upper - lower) * random.uniform(-0.02, 1.02, unknowns.size)
         y = unknowns.at(coefficients)
-        y[unknowns.size :] = random.uniform(-21, 21, len(unknowns.nuisance_names))
+        y[unknowns.size :] = random.uniform(-21, 21, len(unknowns.nuisance.names))
         full = unknowns.beta(y)
         law = HypoelasticLaw(full, 0.24, RANGE)
         x = np.linspace(0, 0.13, 31)

@@ -238,8 +238,6 @@ def test_placements_follow_one_another():
     b = Placement(np.array([-4.0, 0.5, 1.0]), rotation("zyx", [50, -20, 5]))
     points = np.random.default_rng(3).normal(size=(5, 3))
     np.testing.assert_allclose(b.after(a).places(points), b.places(a.places(points)))
-    with pytest.raises(ValueError, match="right-handed"):
-        Placement(np.zeros(3), np.diag([1.0, 1.0, -1.0]))
     rng = np.random.default_rng(2)
     points = np.column_stack([rng.uniform(-100, 100, (200, 2)), rng.normal(0, 0.05, 200)])
     points[:20, 2] += 30.0

@@ -366,7 +366,7 @@ def test_a_fit_with_the_thickness_unknown(together, tmp_path):
 def test_what_is_shared_stands_before_each_comparisons_own(tmp_path):
     both = "nu12 = {}\nthickness = { prior = 0.02 }"
     problem = prepare_fit(own := project(tmp_path, both), own.chosen(None, fitted=True)).problem()
-    assert problem.unknowns.nuisance_names == ("nu12", "thickness")
+    assert problem.unknowns.nuisance.names == ("nu12", "thickness")
     nu12, thickness = problem.unknowns.nuisance.shared
     assert (nu12.lower, nu12.upper, nu12.start, nu12.prior) == (0.0, 0.6, 0.0, None)
     assert (thickness.lower, thickness.upper) == pytest.approx((0.4, 1.2))

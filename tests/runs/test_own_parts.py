@@ -375,7 +375,7 @@ def test_the_derivative_of_a_closed_form(tmp_path):
     path.write_text(path.read_text().replace("[[bubble]]", UNKNOWN, 1))
     project = read_project(path).with_tests(Pull())
     problem, y = at_known(prepared(project))
-    assert problem.unknowns.nuisance_names == ("nu12", "thickness")
+    assert problem.unknowns.nuisance.names == ("nu12", "thickness")
     rows, point = problem.rows(1), problem.evaluate(y, True)
     found = differences(problem, y)[rows]
     assert np.abs(found[:, 4:]).max(axis=0).min() > 0 and not found[:, :4].any()

@@ -198,7 +198,7 @@ def test_priors_are_a_block_of_their_own(tmp_path):
     path = project(tmp_path, "modes = 3\nprior = 2.0\nslack = true\nslack_prior = 0.1")
     problem = prepared(path).problem()
     y = problem.unknowns.at(UNEVEN.law().beta[[2, 3, 6, 7, 10, 11]])
-    assert problem.unknowns.nuisance_names == ("z0_1", "z0_x", "z0_y", "slack_warp", "slack_fill")
+    assert problem.unknowns.nuisance.names == ("z0_1", "z0_x", "z0_y", "slack_warp", "slack_fill")
     y[-5:] = 1.0, -2.0, 0.5, 0.05, 0.1
     point = problem.evaluate(y, True, warm=False)
     # 0.5 mm against sqrt(points / 20) of it.
