@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
@@ -132,6 +133,20 @@ class Place:
     def error(self, field: str, problem: str) -> InputError:
         """Return an error in the section; `field` is the dotted key below it, "" for itself."""
         return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
+
+    @contextmanager
+    def naming(
+        self, below: str = "", field: str | None = None, keys: Mapping[str, str] | None = None
+    ) -> Iterator[None]:
+        """Name the section's key in errors that name no file: below a key, or `field` itself.
+        keys : of the section, by fields that have another name."""
+        try:
+            yield
+        except InputError as error:
+            if error.path is not None:
+                raise
+            own = (keys or {}).get(error.field, error.field) if field is None else field
+            raise self.error(f"{below}.{own}".strip("."), error.problem) from None
 
     def folder(self, named: str) -> Path:
         """Return the folder of the data: the one that its section names, unless it is given."""
@@ -832,8 +847,6 @@ def named_format(place: Place, field: str, content: Content, name: str | None) -
     Raises InputError: naming file and key. PlugInFailure : a reader of a plug-in that does not
     work."""
     if name is not None:
-        try:
+        with place.naming(field=field):
             format_named(content, name)
-        except InputError as error:
-            raise place.error(field, error.problem) from None
     return name

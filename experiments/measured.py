@@ -87,15 +87,12 @@ class StrainObjective:
         if scale is None:
             scales = np.maximum(np.abs(self.measured).max(axis=0), USUAL_NOISE)
         self._unit = scales * np.sqrt(count) / max(weight, 1e-300)
+        self.scale = PERCENT * np.repeat(self._unit, count)
 
     @property
     def measured(self) -> Array:
         """Return the measured strains (rows, blocks) from their zero on."""
         return self.strain
-
-    @property
-    def scale(self) -> Array:
-        return PERCENT * np.repeat(self._unit, self.sizes[0])
 
     @property
     def data(self) -> tuple[Array, ...]:

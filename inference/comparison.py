@@ -294,7 +294,16 @@ class Comparison:
         if history.path is not None and history.path_slope is not None:
             self._last = (point, history.path, history.path_slope)
         by_solver = self.objective.jacobian(history, slope)
-        return history, self._chain(by_solver, len(free), nuisance)
+        # From the model's order to that of the unknowns.
+        by = {n.name: n.scale for n in self.nuisance if n.model_parameter is not None}
+        by |= {n.name: n.scale for n in self.nuisance if n.law_parameter is not None}
+        own = [n.name for n in self.nuisance if n.name not in by]
+        by_objective = self.objective.nuisance_columns(own, nuisance).T if own else ()
+        columns = dict(zip(own, by_objective, strict=True))
+        scaled = zip(by.items(), by_solver.T[len(free) :], strict=True)
+        columns |= {name: scale * column for (name, scale), column in scaled}
+        every = by_solver[:, : len(free)], *(columns[n.name] for n in self.nuisance)
+        return history, np.column_stack(every)
 
     def _model_values(self, nuisance: Mapping[str, float]) -> dict[str, float]:
         return {n.model_parameter: n.scale * (nuisance[n.name] - n.start) for n in self.nuisance
@@ -308,20 +317,6 @@ class Comparison:
             return self.model.with_parameters(values)
         except InputError as error:
             raise SolverFailure(f"there is no such model: {error}", self.solver.name) from None
-
-    def _chain(self, by_solver: Array, free: int, nuisance: Mapping[str, float]) -> Array:
-        """Return columns in the order of the unknowns from those in the model's order."""
-        of_model = [n for n in self.nuisance if n.model_parameter is not None]
-        of_law = [n for n in self.nuisance if n.law_parameter is not None]
-        by = {n.name: n.scale for n in (*of_model, *of_law)}
-        own = [n.name for n in self.nuisance if n.name not in by]
-        by_objective = self.objective.nuisance_columns(own, nuisance).T if own else ()
-        columns = dict(zip(own, by_objective, strict=True))
-        columns |= {
-            name: scale * column
-            for (name, scale), column in zip(by.items(), by_solver.T[free:], strict=True)
-        }
-        return np.column_stack([by_solver[:, :free], *(columns[n.name] for n in self.nuisance)])
 
     @property
     def _of_law(self) -> list[str]:

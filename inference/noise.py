@@ -274,8 +274,8 @@ def discrepancies(
 
 def _share(one: Discrepancy, objective: Objective) -> float:
     """Return its size beside what was measured."""
-    measured = getattr(objective, "measured_rms", 0.0)
-    return one.rms / measured if measured > 0 else 1.0
+    measured = np.asarray(getattr(objective, "measured", ()))
+    return one.rms / float(np.sqrt(np.mean(measured**2))) if measured.any() else 1.0
 
 
 def _causes_on_sheet(

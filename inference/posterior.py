@@ -55,7 +55,13 @@ def truncated_draws(
     rows, least = rows[real] / size[real, None], least[real] / size[real]
     centre = (axes[:, some].T @ (mean - allowed)) / np.sqrt(variance[some])
     rows, least, centre, back = _without_equalities(rows, least, centre)
-    drawn = _drawn_again(rows, least, centre, count, random)
+    inside: list[Array] = []
+    for _ in range(MOST_DRAWS):
+        draws = centre + random.standard_normal((count, len(centre)))
+        inside.append(draws[(draws @ rows.T >= least - ROUNDING).all(axis=1)])
+        if sum(map(len, inside)) >= count:
+            break
+    drawn = np.concatenate(inside)[:count]
     if len(drawn) < count:
         drawn = _walked(rows, least, centre, count, random)
     return np.asarray(allowed + (drawn @ back.T) @ root.T)
@@ -76,18 +82,6 @@ def _without_equalities(
     others = rows @ free
     some = np.linalg.norm(others, axis=1) > 1e-6
     return others[some], least[some], free.T @ centre, free
-
-
-def _drawn_again(
-    rows: Array, least: Array, centre: Array, count: int, random: np.random.Generator
-) -> Array:
-    inside: list[Array] = []
-    for _ in range(MOST_DRAWS):
-        draws = centre + random.standard_normal((count, len(centre)))
-        inside.append(draws[(draws @ rows.T >= least - ROUNDING).all(axis=1)])
-        if sum(map(len, inside)) >= count:
-            break
-    return np.concatenate(inside)[:count]
 
 
 def _walked(
@@ -243,11 +237,6 @@ class Posterior:
         t = np.eye(n)
         t[:size, :size] = self.unknowns.to_coefficients
         return np.asarray(t @ self.covariance @ t.T)
-
-    @property
-    def of_law(self) -> Array:
-        """Return (size, size) MPa^2, covariance of the law's free coefficients, in their order."""
-        return self.coefficients[: self.unknowns.size, : self.unknowns.size]
 
     @property
     def labels(self) -> tuple[str, ...]:

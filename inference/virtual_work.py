@@ -88,14 +88,7 @@ class GapObjective:
         self.shape, self.roots, self.least_noise = shape, roots, like.least_noise
         self.noise_is = getattr(like, "noise_is", "assumed")
         self.sizes = (roots[..., 0].size,)
-
-    @property
-    def scale(self) -> Array:
-        return np.ones(self.sizes[0])
-
-    @property
-    def data(self) -> tuple[Array, ...]:
-        return (self.shape.moved,)
+        self.scale, self.data = np.ones(roots[..., 0].size), (shape.moved,)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.jacobian(history, history.displacement[..., None])[:, 0]

@@ -100,10 +100,8 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     if missing:
         problem = f"there is no ratio {', '.join(missing)}; the test has: {', '.join(there)}"
         raise test.place.error("ratios", problem)
-    try:
+    with test.place.naming(field="data"):
         chosen = designers.evaluate(lines, options)
-    except InputError as error:
-        raise test.place.error("data", error.problem) from None
     found = []
     for table, cycles in zip(test.data.tables, test.data.cycles, strict=True):
         away = np.abs(table.load - table.load[0]).max(axis=1)

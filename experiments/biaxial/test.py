@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from ...errors import InputError
 from ...materials.card import State
 from ...meshes.strip_models import PatchModel
 from ...readers.histories import LoadHistory, Pace, pace_of
@@ -131,10 +130,8 @@ def _listed(place: Place, data: TablesSection, folder: Path) -> list[tuple[Path,
 
 
 def _ratio(place: Place, field: str, name: str) -> str:
-    try:
+    with place.naming(field=field):
         return plain_ratio(name)
-    except InputError as error:
-        raise place.error(field, error.problem) from None
 
 
 #: Strains below it are none that a law could be fitted over.

@@ -276,12 +276,6 @@ def _same_states(view: View) -> Iterator[Doubt]:
             return
 
 
-def numbered(view: View, expected: Expected) -> Iterator[Doubt]:
-    """Doubt the times of frames whose numbers have gaps or repeats."""
-    for text in view.numbers:
-        yield Doubt("frame-numbers", False, text)
-
-
 def outliers(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt points far off the smooth surface through all."""
     found = [(field, *_gross(view, field)) for field in view.fields]
@@ -565,7 +559,7 @@ def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
-    numbered, length_unit, rejected_at_zero, outliers, upside_down, order, repeated,
+    length_unit, rejected_at_zero, outliers, upside_down, order, repeated,
     deformed_coordinates, mirrored, clamped_elsewhere, pressure_unit, first_shape, camera_height,
     off_centre, tilted, turned, swapped,
 )  # fmt: skip
@@ -573,7 +567,7 @@ CHECKS = (
 
 def doubts_of(view: View, expected: Expected) -> Sequence[Doubt]:
     """Return the doubts in the order of the checks."""
-    found: list[Doubt] = []
+    found = [Doubt("frame-numbers", False, text) for text in view.numbers]
     for check in CHECKS:
         found += check(view, expected)
         if any(doubt.sure for doubt in found):

@@ -100,10 +100,7 @@ class FieldObjective:
             count = np.sqrt(len(target.displacement))
             self.scales.append(count / weight * (largest if normalise == "e" else np.ones(3)))
         self.sizes = tuple(len(t.displacement) for t in self.targets for _ in "xyz")
-
-    @property
-    def scale(self) -> Array:
-        return np.repeat(np.concatenate(self.scales), self.sizes)
+        self.scale = np.repeat(np.concatenate(self.scales), self.sizes)
 
     @property
     def data(self) -> tuple[Array, ...]:
@@ -225,11 +222,6 @@ class FieldObjective:
         return np.concatenate(
             [(p / s[:, None]).swapaxes(0, 1).reshape(-1, p.shape[-1]) for p, s in every]
         )
-
-    @property
-    def measured_rms(self) -> float:
-        """Return the RMS of the measured displacements, mm."""
-        return float(np.sqrt(np.mean(np.concatenate([t.displacement for t in self.targets]) ** 2)))
 
     def causes(self, history: History) -> dict[str, Array]:
         """Return (m, k) a cause, by its words, slopes of the residual by its amounts.

@@ -2,7 +2,6 @@
 
 import os
 import re
-import string
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -52,17 +51,13 @@ def pressures_by_log(
         several = [f"{one.name}, frame {i + 1}" for i in range(len(risen))]
         names += several if len(risen) > 1 else [one.name] * len(risen)
     height = np.array(heights)
-    try:
+    with place.naming(at):
         times, said = _frame_times(section, files, own, place, folder)
         seen = times, height, log.time, log.pressure
         given = section.offset
         if given is None:
             return pressure_log.find_offset(*seen), names, said
         return pressure_log.given_offset(given, *seen), names, said
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise place.error(f"{at}.{error.field}".rstrip("."), error.problem) from None
 
 
 def _frame_times(
@@ -264,6 +259,10 @@ def _folder(points: PointsSection, place: Place) -> Path:
     return Path(place.data_folder or place.path.parent / points.folder)
 
 
+#: A name of files with {index} in it, which may have a width; other braces are doubled.
+PATTERN = r"([^{}]|\{\{|\}\}|\{index(:\d{0,2}d?)?\})*"
+
+
 def _file_names(points: PointsSection, place: Place) -> list[str]:
     if (points.files is None) == (points.pattern is None):
         problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
@@ -273,29 +272,14 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
     pattern = points.pattern or ""
     if points.indices is None:
         raise place.error("data.points.indices", "this key is missing; 'pattern' needs it")
-    try:
-        names = [_named(pattern, i) for i in points.indices]
-    except ValueError:
+    if not re.fullmatch(PATTERN, pattern):
         example = "expected a name with {index} in it, such as t_{index:02d}.csv"
-        problem = f"{example}; got {pattern!r}"
-        raise place.error("data.points.pattern", problem) from None
+        raise place.error("data.points.pattern", f"{example}; got {pattern!r}")
+    names = [pattern.format(index=i) for i in points.indices]
     if len(set(names)) != len(names):
         problem = "the same file for several pressures; is {index} in the pattern?"
         raise place.error("data.points.pattern", problem)
     return names
-
-
-def _named(pattern: str, index: int) -> str:
-    """Return the pattern with `index` for {index}; raises ValueError for other braces."""
-    name = ""
-    for text, inside, spec, conversion in string.Formatter().parse(pattern):
-        name += text
-        if inside is None:
-            continue
-        if inside != "index" or conversion or not re.fullmatch(r"\d{0,2}d?", spec or ""):
-            raise ValueError(inside)
-        name += format(index, spec or "")
-    return name
 
 
 def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:

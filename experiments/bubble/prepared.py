@@ -122,10 +122,8 @@ class PreparedBubble:
         blocks = 3 * (len(test.pressures) - len(whole) + len(targets))
         weight = weighting.weight / blocks if weighting.relative else 1.0
         kind = "e" if weighting.relative else test.objective
-        try:
+        with test.place.naming():
             objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
-        except InputError as error:
-            raise test.place.error(error.field, error.problem) from None
         nuisance = (
             *nuisance_of(test),
             *sheet_nuisance(sheet, model, objective.scale),
@@ -153,13 +151,11 @@ class PreparedBubble:
             targets = matching.at_nodes(self.matched, mesh)
         else:
             targets, _ = matching.at_points(test, self.matched, mesh)
-        try:
+        with test.place.naming():
             if sheet.constant or sheet.since is not None:
                 targets = matching.with_places(targets, mesh.points[:, :2])
             if sheet.since is not None:
                 targets = matching.counted_from(targets, sheet.since)
-        except InputError as error:
-            raise test.place.error(error.field, error.problem) from None
         return targets
 
     def finer(
@@ -185,10 +181,8 @@ class PreparedBubble:
         if self.sheet.rim:
             base = np.array([rim.at(nodes) for rim in self.sheet.rim])
         unit, shifted = test.outline.unit(nodes), test.displacement_offset
-        try:
+        with test.place.naming("data"):
             shape, roots = smoothed(own.model, own.objective.targets, unit, base, shifted)
-        except InputError as error:
-            raise test.place.error(f"data.{error.field}", error.problem) from None
         return (replace(own, model=shape, objective=GapObjective(shape, roots, own.objective)),)
 
     def _refined(self, own: Comparison, factor: float) -> Comparison:
@@ -367,10 +361,8 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
         fields, registration = read_measured(test)
         surfaces = _surfaces(test, fields, computed=False)
         prepared = PreparedBubble(test, fields, surfaces, None, registration)
-    try:
+    with test.place.naming():
         sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
-    except InputError as error:
-        raise test.place.error(error.field, error.problem) from None
     return replace(prepared, sheet=sheet)
 
 
@@ -379,15 +371,11 @@ def _computed(
 ) -> tuple[tuple[DisplacementField, ...], HypoelasticLaw, bool]:
     """Return fields, their law, and whether mesh, increments and solver are those of the fit."""
     field = "data.known_solution"
-    try:
+    with test.place.naming(field):
         form = form_named(data.form, {}, law.strain_range.tolist())
         known = HypoelasticLaw(data.beta, law.nu12, law.strain_range, law.thickness_change, form)
-    except InputError as error:
-        raise test.place.error(f"{field}.{error.field}", error.problem) from None
-    try:
+    with test.place.naming(field=f"{field}.solver"):
         solver = make_solver() if data.solver is None else make_solver(data.solver)
-    except InputError as error:
-        raise test.place.error(f"{field}.solver", error.problem) from None
     if data.symmetry == "quarter" and test.symmetry == "full":
         problem = "data of a quarter cannot be matched by a full model; use the same symmetry"
         raise test.place.error(f"{field}.symmetry", problem)
@@ -443,11 +431,8 @@ def read_measured(
         fields = (replace(fields[0], source=source), *fields[1:])
     if data.registration is None:
         return fields, None
-    try:
+    with test.place.naming("data.points.registration"):
         return register_fields(fields, test.outline, data.registration)
-    except InputError as error:
-        field = f"data.points.registration.{error.field}".rstrip(".")
-        raise test.place.error(field, error.problem) from None
 
 
 #: Of the highest pressure of the project's own test: frames of one to more pressure.

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, StringConstraints
 
-from ...errors import InputError
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
 from ...meshes.mesh import Facet
 from ...readers import sections
@@ -65,10 +64,8 @@ def facet_of(
     if match != "points":
         raise place.error(at, "surfaces are matched, not points: leave this out")
     step = None if section.step is None else section.step * scale
-    try:
+    with place.naming(at):
         return Facet(section.facet * scale, section.order, section.smoothing, step)
-    except InputError as error:
-        raise place.error(f"{at}.{error.field}", error.problem) from None
 
 
 class EllipseSection(sections.Section):
@@ -166,7 +163,7 @@ def registration_options(
     if section is None:
         return None
     marks = [_point(one, scale) for one in section.warp_points or ()]
-    try:
+    with place.naming("data.points.registration"):
         return RegistrationOptions(
             plane=section.plane,
             centre=None if section.centre is None else _point(section.centre, scale),
@@ -175,8 +172,6 @@ def registration_options(
             warp_is_stiff=section.warp_is == "stiff",
             remove_clamp_motion=section.remove_clamp_motion,
         )
-    except InputError as error:
-        raise place.error(f"data.points.registration.{error.field}", error.problem) from None
 
 
 def _point(given: list[float], scale: float) -> tuple[float, float, float]:

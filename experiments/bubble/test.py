@@ -238,14 +238,10 @@ def measured_fields(
 ) -> tuple[DisplacementField, ...]:
     """Read the fields at the pressures (MPa) as the files have them; raises InputError."""
     frames = None if data.recorded is None else data.recorded.frames
-    try:
+    with place.naming("data.points"):
         return read_fields(
             data.files, pressures, options=data.options, format=data.format, frames=frames
         )
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise place.error(f"data.points.{error.field}", error.problem) from None
 
 
 def radius_of_clamp(place: Place, data: PointFiles | None, pressures: Sequence[float]) -> float:

@@ -284,7 +284,7 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     if own.model == "beam":
         return _beam(section, place, name, deflections, cords)
     usual = RigidSupports()
-    try:
+    with place.naming(keys=KEYS):
         collar = usual_collar(own.diameter)
         if own.collar is not None:
             collar = Collar(**own.collar.model_dump(exclude_none=True))
@@ -306,8 +306,6 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
             cords=cords,
         )
         test.model()
-    except InputError as error:
-        raise place.error(KEYS.get(error.field, error.field), error.problem) from None
     return replace(
         test,
         measured=read_measured(section.measured, place),
@@ -323,15 +321,13 @@ def _cord(section: CordSection, place: Place, at: str) -> Cord:
         raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
     if not section.bonded:
         raise place.error(f"{at}.bonded", "a cord that slides is not modelled; take bonded = true")
-    try:
+    with place.naming(at):
         table = axial_table(section.stiffness or 1.0)
         if section.strain and section.force:
             table = ForceTable(np.array(section.strain), np.array(section.force))
         return Cord(
             section.angle, table, section.initial_force, section.prestrain, section.tension_only
         )
-    except InputError as error:
-        raise place.error(f"{at}.{error.field}", error.problem) from None
 
 
 def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedWall:
@@ -356,12 +352,10 @@ def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedW
             raise place.error(f"wall.{wrong[0]}", problem)
     more = "across" if own is BRAID else "poisson"
     values = {k: value(k) for k in (*own, more) if getattr(section, k) is not None}
-    try:
+    with place.naming("wall"):
         if own is BRAID:
             return BraidedWall(**values)
         return PlainWall(**values, wrinkles=section.wrinkles)
-    except InputError as error:
-        raise place.error(f"wall.{error.field}", error.problem) from None
 
 
 def _beam(
@@ -375,7 +369,7 @@ def _beam(
         _wall(section.wall, section.pressure, place),
         whole_in_base_units(section, place.scales),
     )
-    try:
+    with place.naming(keys={**KEYS, "angle": "wall.angle"}):
         beam = BeamModel(
             TubeSection(0.5 * own.diameter, own.pressure, wall, cords),
             own.span or RigidSupports().span, deflections, own.load_spacing or 0.0,
@@ -384,9 +378,6 @@ def _beam(
             size=own.element_size or SIZE,
             reading=curve_reading(own.diameter, own.places, own.slope_over),
         )  # fmt: skip
-    except InputError as error:
-        keys = {**KEYS, "angle": "wall.angle"}
-        raise place.error(keys.get(error.field, error.field), error.problem) from None
     assumed = ["span"] if section.span is None else []
     assumed += ["constant pressure while bending"]
     if section.mass_per_length is None:

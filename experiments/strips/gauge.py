@@ -145,13 +145,9 @@ def virtual_strain_gauge(
             " these give no length. Move the gauge to keep them"
         )
         warnings.append(Note(LOST, words))
-    return _record(places[0], places[1], tuple(warnings))
-
-
-def _record(lower: Sequence, upper: Sequence, warnings: tuple[Note, ...]) -> GaugeRecord:
     pairs = [
         None if isinstance(a, str) or isinstance(b, str) else b - a
-        for a, b in zip(lower, upper, strict=True)
+        for a, b in zip(*places, strict=True)
     ]
     whole = next((pair for pair in pairs if pair is not None), None)
     if whole is None:
@@ -165,7 +161,7 @@ def _record(lower: Sequence, upper: Sequence, warnings: tuple[Note, ...]) -> Gau
     lost = tuple(i for i, pair in enumerate(pairs) if pair is None)
     further = length - reference
     strains = further / reference, np.log(length / reference)
-    return GaugeRecord(reference, length, further, *strains, lost, warnings)
+    return GaugeRecord(reference, length, further, *strains, lost, tuple(warnings))
 
 
 def _end(point: ArrayLike, name: str) -> Array:

@@ -105,11 +105,6 @@ class LoadObjective:
             raise InputError(None, "history", "the solver gives no derivatives of the load")
         return np.asarray(self.sample @ history.load_slope / np.reshape(self._unit, (-1, 1)))
 
-    @property
-    def measured_rms(self) -> float:
-        """Return the RMS of the measured loads, N."""
-        return float(np.sqrt(np.mean(self.load**2)))
-
     def causes(self, history: History) -> dict[str, Array]:
         """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
         slope = self.steep @ history.load / self._unit

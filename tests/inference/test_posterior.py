@@ -92,7 +92,7 @@ def test_an_exact_fit_weighs_its_blocks_by_the_noise_to_reckon_with():
     exact = of(PROBLEM, evaluation(TRUTH, 0 * ROWS), noise())
     assert exact.covariance == pytest.approx(FORMULA)
     t = UNKNOWNS.to_coefficients
-    assert exact.of_law == pytest.approx(t @ exact.covariance[:3, :3] @ t.T)
+    assert exact.coefficients[:3, :3] == pytest.approx(t @ exact.covariance[:3, :3] @ t.T)
     assert exact.labels == (*UNKNOWNS.labels, "offset")
     assert exact.coefficients[3, 3] == exact.covariance[3, 3]
     sigma = np.sqrt(np.diag(exact.coefficients))

@@ -98,7 +98,7 @@ def test_units_of_the_file_do_not_matter(example):
         ("width = 25.0", "width = 25.0e-3"), ("grip_distance = 75.0", "grip_distance = 75.0e-3"),
     )  # fmt: skip
     assert metres.fabric.thickness == pytest.approx(0.81)
-    assert metres.tests["strips"].thickness == pytest.approx(0.81)
+    assert metres.tests["strips"].place.fabric.thickness == pytest.approx(0.81)
     small = unknowns(example(('modulus = "GPa"', 'modulus = "MPa"'), source=KNOWN)).bounds
     assert small.upper[11] == pytest.approx(1.5) and small.least["E1"] == pytest.approx(0.005)
 
