@@ -142,19 +142,15 @@ class Objective(Protocol):
 
     def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
         """Return (m,) at nuisance values by name, in their units."""
-        ...
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from the solver's slope of the displacements."""
-        ...
 
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         """Return (m, names), slopes by the nuisance that the objective knows, at its values."""
-        ...
 
     def shifted(self, here: History, there: History) -> Objective:
         """Return the objective of a model that shows `here` where this one shows `there`."""
-        ...
 
 
 #: Relative step of a central difference; probes of what noise makes of a function's values.

@@ -15,8 +15,6 @@ from ..solvers.base import DifferentiatingSolver, History, Solver, instability
 from .comparison import Blocks, Comparison
 from .unknowns import RandomStarts, Starts, Unknowns
 
-FROM_CACHE = "ok, from the cache"  # status of an analysis that was kept earlier
-
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -41,7 +39,7 @@ class Evaluation:
     @property
     def status(self) -> str:
         if self.stable:
-            return FROM_CACHE if self.from_cache else "ok"
+            return "ok, from the cache" if self.from_cache else "ok"
         return next(filter(None, (instability(h.unstable) for h in self.histories)))
 
 

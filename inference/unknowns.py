@@ -326,7 +326,6 @@ class Starts(Protocol):
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
         """Yield free coefficients (size,) MPa of allowed moduli, the first to be tried first."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -251,18 +251,6 @@ class BiaxialPath:
         return replace(self, load=self.load[rows], strain=self.strain[rows])
 
 
-def cycles_of(tables: Sequence[BiaxialTable], named: Sequence[str | None]) -> list[list[Cycle]]:
-    """Return the cycles of each file; `named` holds the ratio that each is listed for, or None."""
-    found = []
-    for table, name in zip(tables, named, strict=True):
-        labels = [name] * len(table.load) if name is not None else table.ratio
-        cycles = find_cycles(table.load, labels)
-        if not cycles:
-            raise InputError(table.path, "", "no loading: the loads do not rise anywhere")
-        found.append(cycles)
-    return found
-
-
 def evaluated_paths(
     tables: Sequence[BiaxialTable], cycles: Sequence[Sequence[Cycle]], which: Which = "last",
     conditioning: int = 0, ratios: Collection[str] | None = None,

@@ -52,17 +52,6 @@ def _columns(values: Array, name: str) -> pd.DataFrame:
     return pd.DataFrame(values, columns=[f"{yarn}_{name}" for yarn in YARNS])
 
 
-def _warnings(test: BiaxialTest) -> list[Note]:
-    """Return warnings of what the data leave open before any fit."""
-    words = (
-        f"{test.name} pulls along the yarns only: it says nothing of G12, which rests on other "
-        "tests or stays where its fit began"
-    )
-    notes = [Note(kinds.UNMATCHED, words)]
-    said = dict.fromkeys(note for table in test.data.tables for note in table.source.notes)
-    return notes + [Note(kinds.READING, words) for words in said]
-
-
 def simulate(
     test: BiaxialTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
     out: Output, within_range: bool = False,
@@ -123,8 +112,13 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
         }  # fmt: skip
     errors = ", ".join(f"{p.data.ratio} {p.rms[0]:.3g} / {p.rms[1]:.3g}" for p in paths)
     summary = f"RMS errors of strain along warp / fill in %: {errors}"
-    warnings = tuple(_warnings(prepared.test))
-    return Findings({"ratios": numbers}, warnings, (summary,), summary, summary)
+    words = (
+        f"{prepared.test.name} pulls along the yarns only: it says nothing of G12, which rests on "
+        "other tests or stays where its fit began"
+    )
+    said = dict.fromkeys(note for table in prepared.test.data.tables for note in table.source.notes)
+    notes = Note(kinds.UNMATCHED, words), *(Note(kinds.READING, words) for words in said)
+    return Findings({"ratios": numbers}, notes, (summary,), summary, summary)
 
 
 def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter
 
+from ...errors import InputError
 from ...materials.card import State
 from ...meshes.strip_models import PatchModel
 from ...readers.histories import LoadHistory, Pace, pace_of
@@ -19,8 +20,8 @@ from .data import (
     Cycle,
     LoadUnit,
     StrainUnit,
-    cycles_of,
     evaluated_paths,
+    find_cycles,
     plain_ratio,
     read_biaxial_table,
 )
@@ -103,7 +104,13 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
             )
         )  # fmt: skip
         named.append(ratio)
-    cycles = cycles_of(tables, named)
+    cycles = [
+        find_cycles(table.load, table.ratio if ratio is None else [ratio] * len(table.load))
+        for table, ratio in zip(tables, named, strict=True)
+    ]
+    if [] in cycles:
+        path = tables[cycles.index([])].path
+        raise InputError(path, "", "no loading: the loads do not rise anywhere")
     wanted = None
     if section.ratios is not None:
         wanted = [_ratio(place, f"ratios[{i}]", name) for i, name in enumerate(section.ratios)]

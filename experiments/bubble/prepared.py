@@ -124,16 +124,21 @@ class PreparedBubble:
         kind = "e" if weighting.relative else test.objective
         with test.place.naming():
             objective = FieldObjective(targets, kind, weight, test.noise, sheet.constant)
-        nuisance = (
-            *nuisance_of(test),
-            *sheet_nuisance(sheet, model, objective.scale),
-            *registration_nuisance(test, objective, self.frame_found),
-        )
+        nuisance: list[Nuisance] = []
+        if test.displacement_offset:
+            ends = -MOST_SHIFT, MOST_SHIFT
+            nuisance += [Nuisance(name, *ends, "mm", None, 1.0) for name in matching.OFFSETS]
+        if test.pressure_offset:
+            least = LEAST_SHARE * 1e3 * min(test.increments)
+            unknown = Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3)
+            nuisance.append(unknown)
+        nuisance += sheet_nuisance(sheet, model, objective.scale)
+        nuisance += registration_nuisance(test, objective, self.frame_found)
         if masks and all(target.frame is not None for target in targets):
             # What lies above the last frame that counts strains nothing.
             last = max(sheet.since or 0, *(target.frame or 0 for target in targets))
             model = model.until(last)
-        return (Comparison(test.name, model, make_solver(), objective, nuisance, STAGE),)
+        return (Comparison(test.name, model, make_solver(), objective, tuple(nuisance), STAGE),)
 
     @cached_property
     def frame_found(self) -> Mapping[str, float]:
@@ -244,18 +249,6 @@ class PreparedBubble:
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)
-
-
-def nuisance_of(test: BubbleTest) -> tuple[Nuisance, ...]:
-    """Return the offsets that the test's section turns on."""
-    on: list[Nuisance] = []
-    if test.displacement_offset:
-        ends = -MOST_SHIFT, MOST_SHIFT
-        on += [Nuisance(name, *ends, "mm", None, 1.0) for name in matching.OFFSETS]
-    if test.pressure_offset:
-        least = LEAST_SHARE * 1e3 * min(test.increments)
-        on.append(Nuisance(PRESSURE, least, MOST_PRESSURE, "kPa", "pressure_offset", 1e-3))
-    return tuple(on)
 
 
 def registration_nuisance(

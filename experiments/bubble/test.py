@@ -248,13 +248,8 @@ def radius_of_clamp(place: Place, data: PointFiles | None, pressures: Sequence[f
     """Return the radius of the clamp by its points that stand still, mm; raises InputError."""
     if data is None or not place.need_data:
         raise place.error("radius", "'clamp' is found in measured data; give the radius here")
-    try:
-        radius, _ = clamp_radius(measured_fields(place, data, pressures), data.registration)
-    except InputError as error:
-        if error.path is not None:
-            raise
-        raise place.error("radius", f"'clamp': {error.problem}") from None
-    return radius
+    with place.naming(field="radius"):
+        return clamp_radius(measured_fields(place, data, pressures), data.registration)[0]
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:

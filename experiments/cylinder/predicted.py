@@ -253,10 +253,7 @@ def wrinkle_onset(run: BendingRun) -> Point | None:
 
 
 def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] | None:
-    """Return R^2 of a line up to `STRAIGHT` of the buckling load, and the largest deviation.
-
-    The deviation is over the load where the part ends.
-    """
+    """Return R^2 of a line up to `STRAIGHT` of buckling; its largest error over its last load."""
     beyond = np.flatnonzero(load > STRAIGHT * buckling)
     count = int(beyond[0]) if len(beyond) else len(d)
     if count < FEWEST + 1:
@@ -270,10 +267,7 @@ def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] 
 
 
 def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[Point, Point]:
-    """Return largest (eps1, eps2) of quads of the inflated tube: of the body, and of all.
-
-    The body is without the quads that touch seam or caps, which these bend.
-    """
+    """Return largest (eps1, eps2) of the inflated tube: of quads off seam and caps, and of all."""
     strain = surface_strain(mesh, inflated)[:, :2]
     others = np.zeros(len(mesh.points), dtype=bool)
     for name in ("seam", "caps"):

@@ -211,14 +211,12 @@ class PreparedStrips:
             )
             for d in test.matched
         }
-        directions: dict[str, Masks] = {}
-        specimens: dict[str, Masks] = {}
-        for direction in test.matched:
-            name = self.part(direction)
-            directions[direction] = {**whole, name: ~whole[name]}
-            others = _without(test.strips[direction]) if points else {}
-            for which, mask in others.items():
-                specimens[f"{direction}, {which}"] = {**whole, name: mask}
+        specimens: dict[str, Masks] = {
+            f"{d}, {which}": {**whole, self.part(d): mask}
+            for d in test.matched if points
+            for which, mask in _without(test.strips[d]).items()
+        }  # fmt: skip
+        directions = {d: {**whole, self.part(d): ~whole[self.part(d)]} for d in test.matched}
         sorts = {"directions": directions, "specimens": specimens}
         return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
 

@@ -259,11 +259,11 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
     """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [ListedFile(folder / data.polynomials, "data.polynomials")]
-    by_direction: dict[str | None, list[str]]
+    by_direction: dict[str | None, list[str]] = {None: []}
     if isinstance(data.files, list):
-        by_direction = {None: data.files}
+        by_direction[None] = data.files
     else:
-        by_direction = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
+        by_direction |= {d: getattr(data.files, d) or [] for d in DIRECTIONS}
     listed = []
     for direction, names in by_direction.items():
         key = "data.files" if direction is None else f"data.files.{direction}"
