@@ -477,20 +477,6 @@ def by_strain(values: Sequence[float] | Array) -> dict[str, float]:
     return dict(zip(STRAINS, np.asarray(values, dtype=float).tolist(), strict=True))
 
 
-def beyond(reached: Array, ends: Array) -> list[tuple[str, float, float]]:
-    """Return name, strain and end of each strain of `reached` (3,) beyond its end of `ends`."""
-    return [
-        (name, float(s), float(end))
-        for name, s, end in zip(STRAINS, reached, ends, strict=True)
-        if s > end * BEYOND
-    ]
-
-
-def in_percent(strain: float, end: float) -> tuple[str, str]:
-    """Return two strains in % with enough digits to differ, where they do."""
-    return apart(100 * strain, 100 * end)
-
-
 #: Notes on a strain beyond an end: of a card that was run, and of a test that was fitted.
 HELD = "{} strain {} % is beyond the card's valid range of {} %: modulus held there"
 WIDER = (
@@ -503,8 +489,11 @@ def notes_beyond(
     reached: Array, ends: Array, kind: NoteKind = BEYOND_CARD, words: str = HELD
 ) -> list[Note]:
     """Note strains (3,) beyond their ends; words : with places for name, strain and end in %."""
-    found = beyond(reached, ends)
-    return [Note(kind, words.format(name, *in_percent(*two))) for name, *two in found]
+    return [
+        Note(kind, words.format(name, *apart(100 * strain, 100 * end)))
+        for name, strain, end in zip(STRAINS, reached.tolist(), ends.tolist(), strict=True)
+        if strain > end * BEYOND
+    ]
 
 
 def other_thickness(card: MaterialCard, thickness: float) -> list[Note]:

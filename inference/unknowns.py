@@ -264,11 +264,6 @@ class Unknowns:
 MOST_VALUES = 4  # values of one modulus that are drawn
 
 
-def draw(unknowns: Unknowns, random: np.random.Generator, count: int) -> Array:
-    """Return `count` random free coefficients (count, size) MPa, not all of them feasible."""
-    return coefficients_at(unknowns, random.random((count, dimensions(unknowns))))
-
-
 def dimensions(unknowns: Unknowns) -> int:
     """Return how many numbers between 0 and 1 determine a law inside the bounds."""
     if unknowns.bounds.largest is None:
@@ -335,7 +330,7 @@ class RandomStarts:
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
         random = np.random.default_rng([seed, number])
         for _ in range(MOST_DRAWS // BATCH):
-            draws = draw(unknowns, random, BATCH)
+            draws = coefficients_at(unknowns, random.random((BATCH, dimensions(unknowns))))
             yield from draws[allowed(unknowns, draws)]
 
 

@@ -20,9 +20,8 @@ from ..experiments.kinds import (
     Planning,
     Precision,
     Weighting,
-    beyond,
     by_strain,
-    in_percent,
+    notes_beyond,
     strains_of,
     unstable_words,
 )
@@ -341,12 +340,10 @@ def _added(
         objective = comparison.objective
         size = round(np.mean(objective.sizes))
         said.append(f"{objective.least_noise:.3g} {objective.unit} at {size} values")
-        for strain, at, end in beyond(strains_of(history), law.strain_range):
-            one, other = in_percent(at, end)
-            words = f"{strain} strain {one} % is beyond {other} %: the modulus is held there"
-            notes.append(Note(BEYOND_LAW, words, candidate.name))
-        if comparison.must_be_stable:
-            notes += [note.about(candidate.name) for note in unstable_words(history.unstable)]
+        words = "{} strain {} % is beyond {} %: the modulus is held there"
+        own = notes_beyond(strains_of(history), law.strain_range, BEYOND_LAW, words)
+        own += unstable_words(history.unstable) if comparison.must_be_stable else []
+        notes += [note.about(candidate.name) for note in own]
     return whole, f"{'; '.join(said)} ({candidate.noise_is})", notes
 
 

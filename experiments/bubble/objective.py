@@ -241,7 +241,7 @@ class FieldObjective:
             assert target.at_rest is not None
             x, y = target.at_rest.T
             u, by_p = target.of(moved, k), target.of(by_pressure, k) / target.pressure
-            by_x, by_y = _slopes(target.at_rest, u)
+            by_x, by_y = _slopes_of(target.at_rest, *_smoothed(target.at_rest, u))
             (dx, dy, dz), none = u.T, np.zeros(len(u))
             degree, p = np.pi / 180, target.pressure
             turned = np.stack([-dy, dx, none], axis=1) + y[:, None] * by_x - x[:, None] * by_y
@@ -278,11 +278,6 @@ class FieldObjective:
 DEGREE, EACH, SMALL = 8, 3, 1e-4
 
 
-def _slopes(places: Array, values: Array) -> tuple[Array, Array]:
-    """Return the slopes (n, 3) of values (n, 3) at places (n, 2) by x and by y."""
-    return _slopes_of(places, *_smoothed(places, values))
-
-
 def _shapes(at: Array, terms: int) -> Array:
     x, y = (legvander(one, math.isqrt(terms) - 1) for one in at.T)
     return np.asarray((x[:, :, None] * y[:, None]).reshape(len(at), -1))
@@ -296,6 +291,7 @@ def _smoothed(places: Array, values: Array) -> tuple[float, Array]:
 
 
 def _slopes_of(places: Array, size: float, amplitude: Array) -> tuple[Array, Array]:
+    """Return slopes (n, 3) at places (n, 2) mm by x and by y, of what `_smoothed` returns."""
     at = places / size
     by_x, by_y = (
         (_shapes(at + one, len(amplitude)) - _shapes(at - one, len(amplitude)))

@@ -130,13 +130,8 @@ class Strip:
         """Return the elongation of the gauge at the end, mm."""
         return self.final_length - self.gauge_length
 
-    @property
-    def strain(self) -> float:
-        """Return logarithmic strain of the gauge at the end."""
-        return float(np.log1p(self.elongation / self.gauge_length))
-
-    def strain_by(self, mask: NDArray[np.bool_] | None) -> float:
-        """Return the strain at the end by the points of a mask, unless the end was given."""
+    def strain_by(self, mask: NDArray[np.bool_] | None = None) -> float:
+        """Return log strain of the gauge at the end, by points of a mask unless it was given."""
         end = self._end_of(mask) if self.open_end else self.elongation
         return float(np.log1p(end / self.gauge_length))
 

@@ -128,7 +128,7 @@ def failure_strains(strips: Sequence[FittedPart], valid: Array) -> Array:
             ends[2] = min(ends[2], float(np.abs(strain[inside, 2]).max()))
         else:
             component = 0 if s.data.direction == "warp" else 1
-            ends[component] = min(ends[component], s.data.strain)
+            ends[component] = min(ends[component], s.data.strain_by())
     return ends
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import NoFeasibleStart
 from bubblefit.inference.search import evaluate_law, feasible_start
-from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, draw
+from bubblefit.inference.unknowns import LawBounds, Unknowns, allowed, coefficients_at, dimensions
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.forms.base import form_named
 from bubblefit.materials.forms.spline import TriLinear
@@ -132,7 +132,7 @@ def test_unknowns_of_splines_are_moduli_at_their_knots():
 )
 def test_inequalities_ask_between_knots_and_ends(form):
     p = Unknowns.of(form, 0.24, RANGE, LawBounds.of_moduli(RANGES))
-    draws = draw(p, np.random.default_rng(3), 4000)
+    draws = coefficients_at(p, np.random.default_rng(3).random((4000, dimensions(p))))
     good, (a, c) = allowed(p, draws), p.inequalities
     assert good.sum() > 20
     lower, upper = p.box
@@ -238,7 +238,9 @@ BEFORE = {
 @pytest.mark.parametrize("seed, number", BEFORE)
 def test_starts_are_those_of_always(seed, number):
     random = np.random.default_rng([seed, number])
-    draws = np.concatenate([draw(CUBIC, random, 500) for _ in range(4)])
+    draws = np.concatenate(
+        [coefficients_at(CUBIC, random.random((500, dimensions(CUBIC)))) for _ in range(4)]
+    )
     y = CUBIC.at(draws[allowed(CUBIC, draws)][0])
     assert (y[0], y[-1]) == pytest.approx(BEFORE[seed, number], rel=1e-12)
 
@@ -246,7 +248,7 @@ def test_starts_are_those_of_always(seed, number):
 @pytest.mark.parametrize("knots", [6, 20, 50])
 def test_splines_of_many_knots_have_starts_too(knots):
     p = of_form("spline", knots=knots)
-    draws = draw(p, np.random.default_rng(1), 5000)
+    draws = coefficients_at(p, np.random.default_rng(1).random((5000, dimensions(p))))
     assert draws.shape == (5000, 3 * knots)
     assert allowed(p, draws).mean() > 0.02
     spread = np.log(draws[:, :knots]).std(axis=0) / np.log(200.0 / 0.5)

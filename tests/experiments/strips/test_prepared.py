@@ -156,7 +156,7 @@ def test_no_modulus_is_shown_beyond_where_it_is_fitted(published, monkeypatch):
     prepared = published()
     fit = fitted(prepared)
     strips = prepared.fitted_strips(fit)
-    gauges = [s.data.strain for s in strips]
+    gauges = [s.data.strain_by() for s in strips]
     assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
     ends = report.failure_strains(strips, fit.valid)
     assert (ends <= fit.valid).all()
@@ -320,9 +320,9 @@ def test_points_of_a_strip_and_those_left_out():
 
 
 def test_lengths_and_noise_of_a_strip():
-    assert WARP.elongation == 4.0 and WARP.strain == pytest.approx(np.log(1.2))
+    assert WARP.elongation == 4.0 and WARP.strain_by() == pytest.approx(np.log(1.2))
     some = np.array([True, True, True, True, True, False])
-    assert WARP.strain_by(some) == WARP.strain
+    assert WARP.strain_by(some) == WARP.strain_by()
     opened = replace(WARP, open_end=True)
     assert opened.strain_by(some) == pytest.approx(np.log(1.1))
     assert opened.strain_by(None) == pytest.approx(np.log(1.2))
