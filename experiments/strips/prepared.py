@@ -211,13 +211,14 @@ class PreparedStrips:
             )
             for d in test.matched
         }
-        specimens: dict[str, Masks] = {
-            f"{d}, {which}": {**whole, self.part(d): mask}
-            for d in test.matched if points
-            for which, mask in _without(test.strips[d]).items()
+        sorts: dict[str, dict[str, Masks]] = {
+            "directions": {d: {**whole, self.part(d): ~whole[self.part(d)]} for d in test.matched},
+            "specimens": {
+                f"{d}, {which}": {**whole, self.part(d): mask}
+                for d in test.matched if points
+                for which, mask in _without(test.strips[d]).items()
+            },
         }  # fmt: skip
-        directions = {d: {**whole, self.part(d): ~whole[self.part(d)]} for d in test.matched}
-        sorts = {"directions": directions, "specimens": specimens}
         return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
 
     def reach(self, masks: Masks) -> Reach:
