@@ -737,9 +737,8 @@ def joined(parts: Iterable[DataFile]) -> list[DataFile]:
     files: dict[Path, DataFile] = {}
     for part in parts:
         one = files.get(part.path, DataFile(part.path, part.source, None))
-        known = [used for used in (one.used, part.used) if used is not None]
         dropped = Counter(one.dropped) + Counter(part.dropped)
-        used = sum(known) if known else None
+        used = (one.used or 0) + (part.used or 0)
         files[part.path] = DataFile(part.path, one.source, used, dict(dropped))
     return list(files.values())
 

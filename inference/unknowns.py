@@ -60,16 +60,6 @@ class LawBounds:
         most = None if self.largest is None else {**largest, **self.largest}
         return replace(self, least={**least, **self.least}, largest=most)
 
-    def check(self, form: Form) -> None:
-        """Raise InputError for a modulus without bounds, or a wrong number of bounds."""
-        missing = [name for name in dict.fromkeys(form.modulus_of) if name not in self.least]
-        if missing:
-            raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
-        count = len(form.free)
-        if self.lower is not None and self.lower.shape != (count,):
-            problem = f"expected {count} of a {form.name} law, got {len(self.lower)}"
-            raise InputError(None, "bounds.lower", problem)
-
     def box(self, form: Form, from_values: Array) -> tuple[Array, Array]:
         """Return lower and upper (free,) of the free coefficients, MPa.
         Of bounded moduli: the smallest box of all laws that keep them at the control strains."""
@@ -107,9 +97,16 @@ class Unknowns:
         cls, form: Form, nu12: float, strain_range: ArrayLike, bounds: LawBounds,
         comparisons: Iterable[Comparison] = (),
     ) -> Unknowns:  # fmt: skip
-        """Return the unknowns of a law and its comparisons; raises as `LawBounds.check`."""
+        """Return the unknowns of a law and its comparisons.
+        Raises InputError for a modulus without bounds, or a wrong number of bounds."""
         bounds = bounds.beside(own_bounds(form))
-        bounds.check(form)
+        missing = [name for name in dict.fromkeys(form.modulus_of) if name not in bounds.least]
+        if missing:
+            raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
+        count = len(form.free)
+        if bounds.lower is not None and bounds.lower.shape != (count,):
+            problem = f"expected {count} of a {form.name} law, got {len(bounds.lower)}"
+            raise InputError(None, "bounds.lower", problem)
         several = tuple(comparisons)
         nuisance = NuisanceOf({c.name: c.nuisance for c in several})
         # Where it is unknown, whatever it may be: the largest is the strictest.

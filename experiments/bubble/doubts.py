@@ -88,10 +88,7 @@ def apex_of(field: DisplacementField, radius: float) -> Apex:
     """Return the apex of a field about the centre of a rim of `radius` mm; raises InputError."""
     before = field.frame.points
     after = before + field.displacement
-    try:
-        shape = registration.apex_shape(field.points, np.hstack([after, before]), radius)
-    except InputError as error:
-        raise InputError(field.path, error.field, error.problem) from None
+    shape = registration.apex_shape(field.points, np.hstack([after, before]), radius)
     left = after[shape.near, 2] - shape.terms @ shape.coefficients[:, 2]
     tangents = np.stack([shape.at_centre(1, 0), shape.at_centre(0, 1)])
     metric = tangents[:, :3] @ tangents[:, :3].T
@@ -127,11 +124,6 @@ class View:
     registered: bool
     flat: bool = False
     numbers: Sequence[str] = ()
-
-    @property
-    def radius(self) -> float:
-        """Return the radius in mm, of an ellipse the mean of its semi-axes."""
-        return self.outline.radius
 
     @property
     def last(self) -> DisplacementField:
@@ -189,7 +181,8 @@ class View:
         """Find the axes of symmetry; None of an ellipse or where points lie on one side only."""
         if not self.outline.round or not registration.in_all_quarters(self.last.points):
             return None
-        return registration.symmetry_axes([field.frame for field in self.fields], self.radius)
+        frames = [field.frame for field in self.fields]
+        return registration.symmetry_axes(frames, self.outline.radius)
 
     @property
     def frame_found(self) -> dict[str, float]:
@@ -250,11 +243,9 @@ def repeated(view: View, expected: Expected) -> Iterator[Doubt]:
         more = f" (and in {len(pairs) - 1} more pairs)" if pairs[1:] else ""
         text = f"the displacements at {pairs[0]} are the same to the last digit{more}: one frame"
         yield Doubt("repeated-frame", True, f"{text} is given twice")
-        return
-    yield from _same_states(view)
 
 
-def _same_states(view: View) -> Iterator[Doubt]:
+def same_states(view: View, of: Expected) -> Iterator[Doubt]:
     """Doubt two pressures between which the centre rises by next to nothing."""
     if len(view.fields) < 2 or not (view.rises > 0).all():
         return
@@ -390,7 +381,7 @@ def mirrored(view: View, expected: Expected) -> Iterator[Doubt]:
 def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt heights counted from somewhere else than the rim."""
     height = 0.0 if view.last.z is None else float(np.median(view.last.z))
-    if not abs(height) < HIGH * view.radius:
+    if not abs(height) < HIGH * view.outline.radius:
         text = f"the reference heights lie about z = {height:.4g} mm, not about the rim: {ADVICE}"
         yield Doubt("camera-frame", False, text)
 
@@ -430,7 +421,7 @@ def first_shape(view: View, expected: Expected) -> Iterator[Doubt]:
     except InputError:
         return
     most = float(np.abs(shape - plane).max())
-    if most > SHAPE * view.radius:
+    if most > SHAPE * view.outline.radius:
         text = (
             f"the sheet is up to {most:.2g} mm off a plane in the reference picture, and would be "
             "taken for flat and taut, which can change E1 by a factor: say [bubble.sheet] surface "
@@ -445,14 +436,14 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
     off = 0.0 if rim is None else float(np.hypot(rim.x, rim.y))
     if rim is None:
         return
-    much = max(OFF * view.radius, SURE * rim.error)
-    little = max(A_LITTLE * view.radius, WELL * rim.error)
+    much = max(OFF * view.outline.radius, SURE * rim.error)
+    little = max(A_LITTLE * view.outline.radius, WELL * rim.error)
     if not off < min(much, little):
         text = (
             f"the sheet rises about x = {rim.x:.3g}, y = {rim.y:.3g} mm (+- {rim.error:.2g}), not "
             f"about the origin: {ADVICE}"
         )
-        yield Doubt("off-centre", off > FAR_OFF * view.radius, text)
+        yield Doubt("off-centre", off > FAR_OFF * view.outline.radius, text)
 
 
 def _motion(view: View) -> Array | None:
@@ -524,7 +515,7 @@ def swapped(view: View, expected: Expected) -> Iterator[Doubt]:
 def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt mm taken for m, in places or in displacements."""
     reach = float(view.outline.share(view.last.points).max())
-    rise = abs(float(view.rises[-1])) / view.radius
+    rise = abs(float(view.rises[-1])) / view.outline.radius
     if not LEAST_REACH < reach < MOST_REACH:
         text = (
             f"the outermost point is {reach:.3g} radii from the centre: are x and y in the length "
@@ -559,7 +550,7 @@ def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
-    length_unit, rejected_at_zero, outliers, upside_down, order, repeated,
+    length_unit, rejected_at_zero, outliers, upside_down, order, repeated, same_states,
     deformed_coordinates, mirrored, clamped_elsewhere, pressure_unit, first_shape, camera_height,
     off_centre, tilted, turned, swapped,
 )  # fmt: skip

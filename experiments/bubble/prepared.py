@@ -245,7 +245,8 @@ class PreparedBubble:
         test = self.test
         registered, flat = self.registration is not None, not test.sheet.known
         numbers = () if self.recorded is None else self.recorded.numbers
-        return View(self.fields, test.outline, test.thickness, registered, flat, numbers)
+        thick = test.place.fabric.thickness
+        return View(self.fields, test.outline, thick, registered, flat, numbers)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)

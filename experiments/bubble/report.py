@@ -39,6 +39,7 @@ from ...reports.vega import save, saved
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
 from . import findings as wording
+from .doubts import View
 from .findings import fitted_model, objective_of
 from .objective import OFFSETS, amounts_of
 from .point_files import PointFiles, RecordedFrames
@@ -355,20 +356,20 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     if prepared.registration is not None:
         tables.insert(0, registration_table(prepared.registration))
     if view.apexes:
-        tables.append(_equilibrium(prepared))
+        tables.append(_equilibrium(view))
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
     rises = bubbles.rise_charts([field.pressure for field in prepared.fields], view.rises)
     figure = saved(out, "rises.png", rises, "rise about the centre against pressure")
     return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
 
 
-def _equilibrium(prepared: PreparedBubble) -> Table:
+def _equilibrium(view: View) -> Table:
     rows: list[list[object]] = [
         [
             1e3 * apex.pressure, apex.height, 1e3 * apex.curvature, apex.force, apex.error,
-            apex.force / prepared.test.thickness, 100 * apex.strain[0], 100 * apex.strain[1],
+            apex.force / view.thickness, 100 * apex.strain[0], 100 * apex.strain[1],
         ]
-        for apex in prepared.view.apexes
+        for apex in view.apexes
     ]  # fmt: skip
     header = [
         "pressure, kPa", "apex, mm", "k1 + k2, 1/m", "force, kN/m", "+-", "stress, MPa",

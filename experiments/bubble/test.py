@@ -140,10 +140,6 @@ class BubbleTest:
         return self.outline.radius
 
     @property
-    def thickness(self) -> float:
-        return self.place.fabric.thickness
-
-    @property
     def reads_files(self) -> bool:
         return isinstance(self.data, PointFiles)
 
@@ -155,7 +151,7 @@ class BubbleTest:
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
-        thick = self.thickness if thickness is None else thickness
+        thick = self.place.fabric.thickness if thickness is None else thickness
         return BubbleModel(mesh, thick, self.pressures, increments or self.increments)
 
     def models(
