@@ -7,6 +7,7 @@ allowed and likely, to a place drawn on that line between its ends (hit and run)
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -168,7 +169,11 @@ def _start(rows: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     """Return a point inside, and a root (n, n) of the shape of what is likely around it.
     It minimises |z - centre|^2 / 2 - sum log(rows z - least), whose inverse curvature is the shape.
     """
-    place = _inside(rows, least, centre)
+    place = np.zeros_like(centre)
+    for way in INSIDE:  # the point nearest to the centre that is some way inside
+        with suppress(ValueError):
+            place = quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, least + way)[0]
+            break
     value, slope, factor = _barrier(rows, least, centre, place)
     for _ in range(NEWTON):
         root = _root(factor)
@@ -200,18 +205,6 @@ def _barrier(rows: Array, least: Array, centre: Array, place: Array) -> tuple[fl
     by_room = rows / room[:, None]
     factor = np.vstack([np.eye(len(away)), by_room])
     return float(away @ away / 2 - np.log(room).sum()), away - by_room.sum(axis=0), factor
-
-
-def _inside(rows: Array, least: Array, centre: Array) -> Array:
-    """Return the point nearest to the centre that is some way inside."""
-    for way in INSIDE:
-        try:
-            return np.asarray(
-                quadprog.solve_qp(np.eye(len(centre)), centre, rows.T, least + way)[0]
-            )
-        except ValueError:
-            continue
-    return np.zeros_like(centre)
 
 
 @dataclass(frozen=True, eq=False)

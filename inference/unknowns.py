@@ -60,15 +60,6 @@ class LawBounds:
         most = None if self.largest is None else {**largest, **self.largest}
         return replace(self, least={**least, **self.least}, largest=most)
 
-    def box(self, form: Form, from_values: Array) -> tuple[Array, Array]:
-        """Return lower and upper (free,) of the free coefficients, MPa.
-        Of bounded moduli: the smallest box of all laws that keep them at the control strains."""
-        if self.lower is not None and self.upper is not None:
-            return self.lower, self.upper
-        ends = self.control(form)
-        low, high = from_values * ends[0], from_values * ends[1]
-        return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
-
     def control(self, form: Form) -> tuple[Array, Array]:
         """Return least and largest (free,) modulus at the form's control strains, MPa."""
         assert self.largest is not None
@@ -191,8 +182,12 @@ class Unknowns:
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Return lower and upper (size,) of the free coefficients, MPa."""
-        return self.bounds.box(self.form, self.from_values)
+        """Return lower and upper (size,) of the free coefficients, MPa.
+        Of bounded moduli: the smallest box of all laws that keep them at the control strains."""
+        if self.bounds.lower is not None and self.bounds.upper is not None:
+            return self.bounds.lower, self.bounds.upper
+        low, high = (self.from_values * ends for ends in self.bounds.control(self.form))
+        return np.minimum(low, high).sum(axis=1), np.maximum(low, high).sum(axis=1)
 
     def rows(self, name: str, strain: Array) -> Array:
         """Return (n, size): a modulus (MPa) at strains (n,) is this @ free coefficients."""

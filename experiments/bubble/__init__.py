@@ -4,12 +4,6 @@ from .prepared import candidates, prepare
 from .section import BubbleSection, with_units
 from .test import STUDIED, read
 
-NAMES = (
-    "frame-numbers", "length-unit", "zero-points", "outliers", "z-flipped", "frame-order",
-    "repeated-frame", "deformed-coordinates", "axis-flipped", "radius", "pressure-unit",
-    "flat-sheet", "camera-frame", "off-centre", "tilted", "turned", "swapped",
-)  # fmt: skip
-
 
 class BubbleKind:
     """The kind of [[bubble]] in a project."""
@@ -21,7 +15,11 @@ class BubbleKind:
     fitted = True
     predicted = None
     studied = STUDIED
-    doubts = NAMES
+    doubts = (
+        "frame-numbers", "length-unit", "zero-points", "outliers", "z-flipped", "frame-order",
+        "repeated-frame", "deformed-coordinates", "axis-flipped", "radius", "pressure-unit",
+        "flat-sheet", "camera-frame", "off-centre", "tilted", "turned", "swapped",
+    )  # fmt: skip
     read = staticmethod(read)
     prepare = staticmethod(prepare)
     candidates = staticmethod(candidates)

@@ -71,11 +71,6 @@ def turned(angle: float) -> Placement:
     return Placement(np.zeros(3), np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
 
 
-def shifted(x: float, y: float, z: float = 0.0) -> Placement:
-    """Return the same axes with the origin moved."""
-    return Placement(np.array([x, y, z], dtype=float), np.eye(3))
-
-
 def plane_through(points: Array, up: Array) -> tuple[Placement, float]:
     """Fit a plane through points (n, 3); return it and their robust deviation from it in mm.
     Its origin is the mean of the points that count, its z the normal on the side of `up` (3,), its
@@ -641,7 +636,7 @@ def _centred(
     """Return the same plane with its origin in the centre of the rim."""
     if options.centre is not None:
         place = placement.places(np.array(options.centre, dtype=float))
-        return shifted(place[0], place[1]).after(placement), None
+        return Placement(np.array([*place[:2], 0.0]), np.eye(3)).after(placement), None
     seen = [_whole(frame) for frame in placement.applied(frames)]
     surfaces = [(points[:, :2], displacement[:, 2]) for points, displacement in seen]
     top = surfaces[-1][1].max()
@@ -662,7 +657,7 @@ def _centred(
     about = [(points - start, rise) for points, rise in surfaces]
     if (edge := clamp_of_motion(about, semi_axes, rim.angle)) is not None:
         rim = replace(rim, x=rim.x + edge.x, y=rim.y + edge.y, error=edge.error)
-    return shifted(rim.x, rim.y).after(placement), rim
+    return Placement(np.array([rim.x, rim.y, 0.0]), np.eye(3)).after(placement), rim
 
 
 def _rim_angle(placement: Placement, rim: Rim | None, options: RegistrationOptions) -> float:

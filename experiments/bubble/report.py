@@ -185,12 +185,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
         figures += clock_pictures(taken, out)
     shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
     parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
-    facts, record = _facts(prepared, findings), correlation_table(prepared)
-    return Exhibit(facts, figures, tables, files, parts, record)
-
-
-def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, object]]:
-    numbers = findings.numbers
+    numbers, record = findings.numbers, correlation_table(prepared)
     facts: list[tuple[str, object]] = [("mean |dx| + |dy| + |dz|, mm", numbers["mean_abs_mm"])]
     dropped = numbers["data"]["doubtful_dropped"], numbers["data"]["outside_dropped"]
     if any(dropped):
@@ -201,7 +196,8 @@ def _facts(prepared: PreparedBubble, findings: Findings) -> list[tuple[str, obje
     if pressure is not None:
         facts.append(("pressure offset, kPa", f"{pressure:.3f}"))
     (sheet,) = wording.sheet_lines(numbers["sheet"])
-    return [*facts, ("sheet", sheet.removeprefix("sheet: "))]
+    facts.append(("sheet", sheet.removeprefix("sheet: ")))
+    return Exhibit(facts, figures, tables, files, parts, record)
 
 
 def left_at_nodes(fitted: FittedTest) -> list[Array | None]:

@@ -246,32 +246,27 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
     )
 
 
-@dataclass(frozen=True)
-class ListedFile:
-    """A file of a section, its key below the section, and its direction if it is listed for one."""
-
-    path: Path
-    field: str
-    direction: str | None = None
+#: A file of a section, its key below the section, and its direction if it is listed for one.
+ListedFile = tuple[Path, str, str | None]
 
 
 def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
     """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
-        return [ListedFile(folder / data.polynomials, "data.polynomials")]
+        return [(folder / data.polynomials, "data.polynomials", None)]
     by_direction: dict[str | None, list[str]] = {None: []}
     if isinstance(data.files, list):
         by_direction[None] = data.files
     else:
         by_direction |= {d: getattr(data.files, d) or [] for d in DIRECTIONS}
-    listed = []
+    listed: list[ListedFile] = []
     for direction, names in by_direction.items():
         key = "data.files" if direction is None else f"data.files.{direction}"
         for i, name in enumerate(names):
             if Path(name) in map(Path, names[:i]):
                 problem = f"{name!r} is listed twice; its points would count double"
                 raise place.error(f"{key}[{i}]", problem)
-            listed.append(ListedFile(folder / name, f"{key}[{i}]", direction))
+            listed.append((folder / name, f"{key}[{i}]", direction))
     if not listed:
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
         raise place.error("data.files", problem)
@@ -292,18 +287,18 @@ def measured_curves(
     said = {name: getattr(data, name) for name in keys}
     by_direction: dict[str, list[LoadCurve]] = {direction: [] for direction in DIRECTIONS}
     first: dict[Path, LoadCurve] = {}
-    for file in listed:
+    for path, field, of in listed:
         curves = read_load_curves(
-            file.path, columns=columns or None, width=width, direction=file.direction,
-            gauge_length=gauges, format=format, **said,
+            path, columns=columns or None, width=width, direction=of, gauge_length=gauges,
+            format=format, **said,
         )  # fmt: skip
-        before = first.setdefault(file.path, curves[0])
+        before = first.setdefault(path, curves[0])
         if before.direction != curves[0].direction and all(
             np.array_equal(getattr(before, name), getattr(curves[0], name))
             for name in ("elongation", "load")
         ):
             problem = f"is listed for {before.direction} too, and does not tell the two apart"
-            raise place.error(file.field, problem)
+            raise place.error(field, problem)
         for direction in DIRECTIONS:
             own = [curve for curve in curves if curve.direction == direction]
             parts = split_at_restarts(own[0]) if len(own) == 1 else ()
@@ -328,15 +323,16 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
     folder = place.folder(data.folder)
     tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
     listed = listed_files(place, data, folder)
-    missing = next((file for file in listed if not is_file(file.path)), None)
-    if missing is not None:
+    for path, field, _ in listed:
+        if is_file(path):
+            continue
         ends = {d: (t.gauge_length, t.final_length) for d, t in tables.items()}
         if place.need_data or not ends or any(None in pair for pair in ends.values()):
-            problem = f"there is no file {missing.path}; --data DIR names another folder"
-            raise place.error(missing.field, problem)
+            problem = f"there is no file {path}; --data DIR names another folder"
+            raise place.error(field, problem)
         return {d: _strip(place, d, *pair) for d, pair in ends.items()}
     if data.polynomials is not None:
-        strips = _published(place, data, tables, listed[0])
+        strips = _published(place, data, tables, listed[0][0])
     else:
         strips = _measured(place, data, tables, listed, width)
     if not strips:
@@ -350,10 +346,10 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
 
 
 def _published(
-    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], file: ListedFile
+    place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection], path: Path
 ) -> dict[str, Strip]:
     format = named_format(place, "data.format", "load polynomials", data.format)
-    curves, strips = read_published_polynomials(file.path, format), {}
+    curves, strips = read_published_polynomials(path, format), {}
     for direction in DIRECTIONS:
         if direction not in curves or (tables and direction not in tables):
             continue
@@ -361,7 +357,7 @@ def _published(
         start = own.gauge_length or curve.gauge_length
         end = own.final_length or curve.final_length
         scatter = None if np.isnan(curve.scatter) else curve.scatter
-        known = {"scatter": scatter, "published": file.path}
+        known = {"scatter": scatter, "published": path}
         strips[direction] = _strip(place, direction, start, end, curve.polynomial, **known)
     return strips
 
@@ -370,7 +366,7 @@ def _measured(
     place: Place, data: CurvesSection, tables: Mapping[str, GaugeSection],
     listed: Sequence[ListedFile], width: float,
 ) -> dict[str, Strip]:  # fmt: skip
-    said, strips = {file.direction for file in listed}, {}
+    said, strips = {direction for _, _, direction in listed}, {}
     gauges = {d: t.gauge_length for d, t in tables.items() if t.gauge_length is not None}
     for direction, curves in measured_curves(place, data, listed, width, gauges).items():
         # A table picks among what a file holds; a file listed for a direction is meant.
