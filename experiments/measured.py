@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -29,8 +29,7 @@ class MeasuredKind:
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:
         """Return the test, which was read with its data."""
-        prepared: PreparedTest = self.prepared(test)
-        return prepared
+        return cast(PreparedTest, self.prepared(test))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +63,7 @@ class StrainsPrepared:
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """Return the same comparisons: there is no mesh to refine."""
-        same: tuple[Comparison, ...] = self.comparisons(make_solver, weighting)
-        return same
+        return cast(tuple[Comparison, ...], self.comparisons(make_solver, weighting))
 
 
 class StrainObjective:
@@ -103,7 +101,6 @@ class StrainObjective:
         raise NotImplementedError
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        """Return all blocks one after the other."""
         return self.in_blocks(self.modelled(history) - self.measured)
 
     def jacobian(self, history: History, slope: Array) -> Array:

@@ -72,8 +72,6 @@ def _without_equalities(
     rows: Array, least: Array, centre: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Return the same within the plane that pairs of opposite inequalities leave."""
-    if not len(rows):
-        return rows, least, centre, np.eye(len(centre))
     opposite = rows @ rows.T < -1 + CLOSE
     held = np.flatnonzero((opposite & (least[:, None] + least > -CLOSE)).any(axis=1))
     if not len(held):

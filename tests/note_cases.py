@@ -14,8 +14,7 @@ import pytest
 from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
 from bubblefit.experiments import kinds
 from bubblefit.experiments import registry as experiments
-from bubblefit.experiments.bubble import findings as bubble_findings
-from bubblefit.experiments.bubble.findings import sheet_warnings
+from bubblefit.experiments.bubble.findings import warnings_of
 from bubblefit.experiments.kinds import notes_of, state_said
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
@@ -109,8 +108,7 @@ def notes_of_bubble(folder: Path, _: Any) -> list[Note]:
     match = ('by = "points"', 'by = "surfaces"\ndegree = 4')
     project = bf.read_project(small(folder, match))
     (prepared,) = prepare_fit(project, list(project.tests.values())).tests
-    flat = sheet_warnings(replace(prepared, known=None))
-    return [*bubble_findings.match_warnings(prepared), *flat]
+    return warnings_of(replace(prepared, known=None))
 
 
 def notes_of_certainty(*_: Any) -> Iterable[Note]:

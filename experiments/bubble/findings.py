@@ -88,16 +88,12 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     return ["sheet: " + ("; ".join(words) or "flat and taut, its rim fixed")]
 
 
-def sheet_warnings(prepared: PreparedBubble) -> list[Note]:
-    """Warn of a real test of which nothing is known of the sheet's shape."""
-    known = prepared.known is not None or prepared.test.sheet.known
-    return [] if known else [Note(FLAT_SHEET, NOT_BELIEVED)]
-
-
-def match_warnings(prepared: PreparedBubble) -> list[Note]:
-    """Warn of data computed by the fitted model, and of surfaces too coarse to follow a bubble."""
-    test = prepared.test
-    notes = [Note(INVERSE_CRIME, CRIME)] if prepared.by_this_model else []
+def warnings_of(prepared: PreparedBubble) -> list[Note]:
+    """Warn of a real test of whose sheet nothing is known, of data computed by the fitted model,
+    and of surfaces too coarse to follow a bubble."""
+    test, known = prepared.test, prepared.known is not None or prepared.test.sheet.known
+    notes = [] if known else [Note(FLAT_SHEET, NOT_BELIEVED)]
+    notes += [Note(INVERSE_CRIME, CRIME)] if prepared.by_this_model else []
     if test.match_by == "surfaces" and test.match_degree < FAITHFUL:
         words = (
             f"polynomial surfaces of degree {test.match_degree} do not follow an inflated disk "

@@ -124,10 +124,9 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
     units = {n.name: n.unit for c in fitted.comparisons for n in c.nuisance if n.prior is None}
     said = ", ".join(f"{name} {fitted.nuisance[name]:.3f} {unit}" for name, unit in units.items())
     lines += [f"nuisance: {said}"] if units else []
-    warnings = (*wording.sheet_warnings(prepared), *wording.match_warnings(prepared))
     quality = f"mean |dx|+|dy|+|dz| {mean:.4g} mm"
     summary = f"mean |dx| + |dy| + |dz| = {mean:.3g} mm"
-    return Findings(numbers, warnings, tuple(lines), quality, summary)
+    return Findings(numbers, tuple(wording.warnings_of(prepared)), tuple(lines), quality, summary)
 
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:

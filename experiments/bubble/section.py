@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -76,16 +76,16 @@ class EllipseSection(sections.Section):
     angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
 
 
-def outline_of(section: BubbleSection, place: Place, of_clamp: Callable[[], float]) -> Outline:
+def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Outline:
     """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius.
-    of_clamp : finds the radius of the clamp in the data, mm."""
+    clamp : mm, its radius where the section asks for it."""
     length, ellipse = place.scales.length, section.ellipse
     if section.radius is not None and ellipse is not None:
         raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
-    if section.radius == "clamp":
-        outline = Outline.circle(of_clamp())
-    elif section.radius is not None:
-        outline = Outline.circle(section.radius * length)
+    if section.radius is not None:
+        known = clamp if section.radius == "clamp" else section.radius * length
+        assert known is not None
+        outline = Outline.circle(known)
     elif ellipse is not None:
         outline = Outline(ellipse.major * length, ellipse.minor * length, ellipse.angle)
     else:

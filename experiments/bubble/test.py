@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from itertools import pairwise
 from typing import ClassVar, Literal
 
@@ -211,7 +210,14 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     increments = default_increments(pressures)
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
-    outline = outline_of(section, place, partial(radius_of_clamp, place, measured, pressures))
+    clamp = None
+    if section.radius == "clamp":
+        if measured is None or not place.need_data:
+            raise place.error("radius", "'clamp' is found in measured data; give the radius here")
+        with place.naming(field="radius"):  # by points that stand still
+            fields = measured_fields(place, measured, pressures)
+            clamp, _ = clamp_radius(fields, measured.registration)
+    outline = outline_of(section, place, clamp)
     source = data_source(section, place, pressures, increments, measured)
     camera = None if section.data.points is None else section.data.points.filter
     of_files, offset = isinstance(source, PointFiles), section.nuisance.displacement_offset
@@ -238,14 +244,6 @@ def measured_fields(
         return read_fields(
             data.files, pressures, options=data.options, format=data.format, frames=frames
         )
-
-
-def radius_of_clamp(place: Place, data: PointFiles | None, pressures: Sequence[float]) -> float:
-    """Return the radius of the clamp by its points that stand still, mm; raises InputError."""
-    if data is None or not place.need_data:
-        raise place.error("radius", "'clamp' is found in measured data; give the radius here")
-    with place.naming(field="radius"):
-        return clamp_radius(measured_fields(place, data, pressures), data.registration)[0]
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:

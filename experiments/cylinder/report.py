@@ -154,7 +154,13 @@ def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
             (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
         ]
     if sum(bool(panel.lines) for panel in panels.values()) > 1:
-        rows = _rows(tests)
+        # A row a diameter, where several diameters have several pressures.
+        sizes: dict[float, list[CylinderTest]] = {}
+        for test in tests:
+            sizes.setdefault(round(test.diameter, 6), []).append(test)
+        rows = list(sizes.values())
+        if len(rows) == 1 or max(map(len, rows)) == 1:
+            rows = [tests[i : i + 3] for i in range(0, len(tests), 3)]
         columns = max(map(len, rows))
         laid = [
             panels[row[k].name] if k < len(row) else BendPanel("")
@@ -207,16 +213,6 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
         taken = plain.casefold() in (other.casefold() for other in files.values())
         files[name] = f"{plain}-{number}" if taken else plain
     return files
-
-
-def _rows(tests: Sequence[CylinderTest]) -> list[list[CylinderTest]]:
-    """Return a row a diameter, where several diameters have several pressures."""
-    rows: dict[float, list[CylinderTest]] = {}
-    for test in tests:
-        rows.setdefault(round(test.diameter, 6), []).append(test)
-    if len(rows) > 1 and max(map(len, rows.values())) > 1:
-        return list(rows.values())
-    return [list(tests[i : i + 3]) for i in range(0, len(tests), 3)]
 
 
 def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:

@@ -380,8 +380,7 @@ def _beam(
         )  # fmt: skip
     assumed = ["span"] if section.span is None else []
     assumed += ["constant pressure while bending"]
-    if section.mass_per_length is None:
-        assumed += ["weightless tube"]
+    assumed += ["weightless tube"] if section.mass_per_length is None else []
     return CylinderTest(
         name=name, place=place, diameter=own.diameter, pressure=beam.pressure, length=beam.span,
         seam_width=0.0, size=beam.size, symmetry="quarter", cap_warp="x", supports=beam.supports,

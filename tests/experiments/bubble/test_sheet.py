@@ -319,8 +319,9 @@ def test_every_number():
     ],
 )  # fmt: skip
 def test_a_sheet_of_which_nothing_is_known(sheet, known, warned):
-    test = SimpleNamespace(known=known, test=SimpleNamespace(sheet=sheet))
-    assert [n.kind for n in sheet_report.sheet_warnings(test)] == [sheet_report.FLAT_SHEET] * warned
+    own = SimpleNamespace(sheet=sheet, match_by="points")
+    test = SimpleNamespace(known=known, test=own, by_this_model=False)
+    assert [n.kind for n in sheet_report.warnings_of(test)] == [sheet_report.FLAT_SHEET] * warned
 
 
 #: kPa and mm, as unknowns of a fit.
