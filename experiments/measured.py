@@ -103,9 +103,6 @@ class StrainObjective:
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.in_blocks(self.modelled(history) - self.measured)
 
-    def jacobian(self, history: History, slope: Array) -> Array:
-        raise NotImplementedError
-
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         return np.empty((sum(self.sizes), 0))
 

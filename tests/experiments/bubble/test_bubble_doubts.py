@@ -226,7 +226,7 @@ def field(pressure, moved, points=POINTS, z=None):
 
 def said(check, expected=FABRIC, **seen):
     whole = View(seen.pop("fields", (field(0.2, [0, 0, 30.0]),)), CIRCLE, 0.8, False)
-    names = "outline radius top last fields thickness registered inner rises flat".split()
+    names = "outline top last fields thickness registered inner rises flat".split()
     view = SimpleNamespace(clamp=None, **({name: getattr(whole, name) for name in names} | seen))
     return [(doubt.name, doubt.sure, doubt.text) for doubt in check(view, expected)]
 
@@ -353,7 +353,7 @@ def test_a_frame_given_twice():
     for rise, count in ((5.0, 1), (5.06, 1), (5.08, 0), (6.0, 0)):  # 0.1 of 0.2 ln(2) is 0.07 of 5
         high = field(0.02, [0, 0, rise], POINTS[:4])
         words = ["5 mm at 10 kPa", f"{rise:.4g} mm at 20 kPa", "about 0.74 mm"]
-        finds(doubts.repeated, count, "repeated-frame", True, *words, fields=(moved[0], high))
+        finds(doubts.same_states, count, "repeated-frame", True, *words, fields=(moved[0], high))
 
 
 UP = np.array([1.0, 4.0, 9.0, 2.0, 7.0])
