@@ -89,13 +89,13 @@ def test_every_name_is_there():
 TEXT = (ROOT / "docs" / "adding.md").read_text()
 PLUG_IN = ROOT / "examples" / "plug-in"
 EXTRAS = PLUG_IN / "bubblefit_extras"
-COBYLA = ROOT / "inference" / "methods" / "cobyla.py"
+OPTIMISER = ROOT / "inference" / "methods" / "slsqp.py"
 
 
 def test_the_code_is_that_of_the_example():
     *_, text = TEXT.partition("\n## A form of the moduli")
     blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
-    paths = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", COBYLA]
+    paths = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", OPTIMISER]
     sources = [plain(path.read_text()) for path in paths]
     assert len(blocks) > 6
     for block in blocks:

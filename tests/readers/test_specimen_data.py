@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.data import (
     KNOWN,
-    cycles_of,
     evaluated_paths,
     find_cycles,
     nearest_ratio,
     plain_ratio,
     read_biaxial_table,
 )
+from bubblefit.experiments.biaxial.test import BiaxialSection, TablesSection, read_biaxial
+from bubblefit.experiments.kinds import Fabric, Place
 from bubblefit.materials.designers import shares
 from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
 from bubblefit.readers.machine_tables import Channel
@@ -222,7 +223,7 @@ def test_cycles_are_told_apart_and_begin_and_end_where_the_loads_turn(table):
 
 
 def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
-    cycles = cycles_of([table], [None])
+    cycles = [find_cycles(table.load, table.ratio)]
     last = evaluated_paths([table], cycles)
     assert [(p.ratio, p.cycle.number, p.cycles) for p in last] == [(r, 3, 3) for r in FIVE]
     first = evaluated_paths([table], cycles, 1)
@@ -236,7 +237,7 @@ def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
     complaint_with(["ratio 1:1", "3 cycles", "number 4"], asked, 4)
     complaint_with(["3:1", "the ratios there: 1:1, 2:1"], asked, ratios=["1:1", "3:1"])
     complaint_with(["any", "after the conditioning"], asked, conditioning=15)
-    path = evaluated_paths([table], cycles_of([table], [None]))[1]
+    path = evaluated_paths([table], cycles)[1]
     assert path.ratio == "2:1" and len(path.load) == 30
     np.testing.assert_array_equal(path.since[0], [0.0, 0.0])
     np.testing.assert_allclose(path.since, path.strain - path.strain[0])
@@ -253,9 +254,11 @@ def test_the_last_cycle_of_each_ratio_counts_unless_another_is_asked_for(table):
 def test_a_file_listed_for_a_ratio_is_of_that_ratio(tmp_path):
     path = write_rows(tmp_path / "x.csv", rows_of(BENT, ["1:2"], cycles=2))
     table = read_biaxial_table(path)
-    (cycles,) = cycles_of([table], ["2:1"])
+    cycles = find_cycles(table.load, ["2:1"] * len(table.load))
     assert [c.ratio for c in cycles] == ["2:1", "2:1"]
     flat = write_rows(
         tmp_path / "flat.csv", [("1:1", 2.0, 2.0, 0.1 * k, 0.2) for k in range(5)], HEAD
     )
-    complaint_with(["flat.csv", "no loading"], cycles_of, [read_biaxial_table(flat)], [None])
+    place = Place(tmp_path / "project.toml", "biaxial[0]", Fabric("fabric", 0.8))
+    section = BiaxialSection(data=TablesSection(files=[flat.name]))
+    complaint_with(["flat.csv", "no loading"], read_biaxial, place, section)
