@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
@@ -106,7 +106,7 @@ class StrainObjective:
     def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
         return np.empty((sum(self.sizes), 0))
 
-    def shifted(self, here: History, there: History) -> StrainObjective:
+    def shifted(self, here: History, there: History) -> Self:
         other = copy.copy(self)
         other.strain = self.strain - (self.modelled(here) - self.modelled(there))
         return other
