@@ -401,8 +401,9 @@ def _terms(local: Array, still: bool = False) -> Array:
 @dataclass(frozen=True)
 class Axes:
     """Two axes of symmetry at right angles, one at `angle` (0 to 90 degrees) from x towards y.
-    error : standard error, degrees, from frame to frame and between parts of the points. clear : 1
-    where the field is wholly symmetric about the axes, 0 where no axes are better."""
+    error : standard error, degrees, from frame to frame and between parts of the points, or between
+    the components of the displacement. clear : 1 where the field is wholly symmetric about these
+    axes, 0 where no axes are better."""
 
     angle: float
     error: float
@@ -417,22 +418,24 @@ class Axes:
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:
     """Return the axes of the frames' even part; frames about the rim's centre, rising pressure."""
     costs = _costs(frames, radius)
-    together = costs.sum(axis=0)
+    together = costs.sum(axis=(0, 1))
     best = float(ANGLES[np.argmin(together)])
     # Frames share the noise of the one that is subtracted; parts of the points do not.
-    error = _scatter(costs, best)
+    error = _scatter(costs.sum(axis=1), best)
     count = min(PARTS, min(len(frame.points) for frame in frames) // ENOUGH)
     if count > 1:
         parts = [_costs(frames, radius, slice(k, None, count)) for k in range(count)]
-        by_part = np.array([costs.sum(axis=0) for costs in parts])
+        by_part = np.array([costs.sum(axis=(0, 1)) for costs in parts])
         error = float(np.hypot(error, _scatter(by_part, best)))
+    # A sheet that is not symmetric, say ridged, turns the axes of u_r, u_theta and u_z apart.
+    error = max(error, _scatter(costs.sum(axis=0), best))
     total = float(together.max())
     clear = 1.0 - float(together.min()) / total if total > 0 else 0.0
     return Axes(float(np.degrees(best)), error, clear)
 
 
 def _costs(frames: Sequence[Frame], radius: float, every: slice = slice(None)) -> Array:
-    """Return the asymmetry (frames, angles) of some points of each high frame less the lowest."""
+    """Return asymmetries (frames, 3, angles) of some points of each high frame less the lowest."""
     frames = [
         replace(f, points=f.points[every], displacement=f.displacement[every]) for f in frames
     ]
@@ -488,14 +491,14 @@ def _radial(r: Array, k: int, planar: bool) -> Array:
 
 
 def _asymmetry(profile: Array) -> Array:
-    """Return the part that is not symmetric about an axis at each of the angles, mm^2."""
-    total = np.zeros(len(ANGLES))
+    """Return the parts of u_r, u_theta, u_z not symmetric about axes at the angles, (3, n) mm^2."""
+    total = np.zeros((3, len(ANGLES)))
     for k in TELLING:
         cosine, sine = np.cos(k * ANGLES)[:, None], np.sin(k * ANGLES)[:, None]
         for quantity in range(3):
             a, b = profile[quantity, k]
             odd = b * cosine - a * sine if quantity != 1 else a * cosine + b * sine
-            total += (RADII * odd**2).sum(axis=1)
+            total[quantity] += (RADII * odd**2).sum(axis=1)
     return total
 
 
