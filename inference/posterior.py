@@ -217,10 +217,6 @@ class Posterior:
     centre: Array
     covariance: Array
 
-    @property
-    def sigma(self) -> Array:
-        return np.sqrt(np.diag(self.covariance))
-
     @cached_property
     def coefficients(self) -> Array:
         """Return the covariance of the free coefficients, MPa, and of the nuisance in its units."""

@@ -420,7 +420,9 @@ def read_measured(
     assert isinstance(data, PointFiles)
     fields = measured_fields(test.place, data, test.pressures)
     if test.of_clamp:
-        words = f"the radius of {test.radius:.4g} mm is that of the clamp, whose points stand still"
+        words = (
+            f"the radius, {test.outline.radius:.4g} mm, is of the clamp, whose points stand still"
+        )
         source = replace(fields[0].source, notes=(*fields[0].source.notes, words))
         fields = (replace(fields[0], source=source), *fields[1:])
     if data.registration is None:

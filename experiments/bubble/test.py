@@ -134,11 +134,6 @@ class BubbleTest:
         return pace_of([LoadHistory(path, pressure, strain, clock.times[known])])
 
     @property
-    def radius(self) -> float:
-        """Return the radius, mm; of an ellipse the mean of the semi-axes."""
-        return self.outline.radius
-
-    @property
     def reads_files(self) -> bool:
         return isinstance(self.data, PointFiles)
 

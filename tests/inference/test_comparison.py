@@ -242,7 +242,7 @@ def test_a_prior_of_the_thickness_is_the_uncertainty_of_the_moduli():
     (thick, *_) = verdicts(posteriors[0], ENDS)
     assert thick.sigma == pytest.approx(0.02, rel=1e-3) and not thick.determined
     assert "(known to 0.02 mm before)" in thick.words
-    known, free = (p.sigma[:12] / p.best[:12] for p in posteriors)
+    known, free = (np.diag(p.covariance)[:12] ** 0.5 / p.best[:12] for p in posteriors)
     np.testing.assert_allclose(known**2, free**2 + (0.02 / 0.8) ** 2, rtol=1e-3)
 
 
@@ -261,7 +261,7 @@ def test_verdicts_of_bounds_and_of_offsets():
     assert nu12.on == "upper" and nu12.words.startswith("0.24, on its upper bound, 1 sigma 0.")
     assert nu12.numbers["on_bound"] == "upper" and nu12.numbers["determined"]
     assert (shift.name, shift.on, shift.value) == ("bubble: offset_z", "", -0.02)
-    assert shift.sigma == pytest.approx(posterior.sigma[13])
+    assert shift.sigma == pytest.approx(posterior.covariance[13, 13] ** 0.5)
     assert f"1 sigma {shift.sigma:.2g} mm" in shift.words
     assert pressure.unit == "kPa" and pressure.determined and not pressure.shared
     covariance = posterior.covariance

@@ -55,7 +55,7 @@ def test_known_solution_is_table_4_2_in_mpa():
     p = bubble(read_project(KNOWN))
     assert p.pressures == pytest.approx([0.022, 0.059, 0.097, 0.132, 0.186, 0.251, 0.300])
     assert p.increments == p.data.increments == pytest.approx(sorted([0.006, 0.040, *p.pressures]))
-    assert (p.radius, p.elements, p.symmetry) == (100.0, 800, "quarter")
+    assert (p.outline.radius, p.elements, p.symmetry) == (100.0, 800, "quarter")
     assert p.data.beta[[0, 3, 7, 11]] == pytest.approx([-7.96788, 20.0439, 139.437, 806.35])
     assert (p.data.elements, p.data.symmetry) == (800, "quarter")
     assert (p.match_by, p.objective, p.name, p.weight) == ("points", "e", "bubble", 1.0)
@@ -67,7 +67,8 @@ def test_units_of_the_file_do_not_matter(edit):
     assert bar.pressures == pytest.approx(np.array(reference.pressures) * 100)
     mpa = bubble(edit('modulus = "GPa"', 'modulus = "MPa"'))
     assert mpa.data.beta == pytest.approx(reference.data.beta / 1000)
-    assert bubble(edit('length = "mm"', 'length = "m"')).radius == reference.radius * 1000
+    metres = bubble(edit('length = "mm"', 'length = "m"'))
+    assert metres.outline.radius == reference.outline.radius * 1000
 
 
 def test_an_ellipse_in_place_of_the_radius(edit):
