@@ -129,7 +129,7 @@ class BubbleTest:
         if clock is None:
             return Pace()
         known = np.isfinite(clock.pressure + clock.heights)
-        strain = 2.0 / 3.0 * (clock.heights[known] / self.radius) ** 2
+        strain = 2.0 / 3.0 * (clock.heights[known] / self.outline.radius) ** 2
         path, pressure = self.place.path, clock.pressure[known]
         return pace_of([LoadHistory(path, pressure, strain, clock.times[known])])
 
