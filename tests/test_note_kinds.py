@@ -215,18 +215,15 @@ def told_by_simulation(folder, patch, notes):
     return Told(done.lines, _json(folder), folder)
 
 
-def told_by_nu12(folder, patch, notes):
+def told_by_nu12(folder, patch, notes, make=lambda *given: vary_nu12(*given, [0.2])):
     patch.setattr(vega, "rendered", lambda *_: b"")
-    study = vary_nu12(made.bars(patch, notes), made.CARD, [0.2])
+    study = make(made.bars(patch, notes), made.CARD)
     study.write(folder)
     return Told(study.lines(), _json(folder), folder)
 
 
-def told_by_refinement(folder, patch, notes):
-    patch.setattr(vega, "rendered", lambda *_: b"")
-    study = refine(made.bars(patch, notes), made.CARD)
-    study.write(folder)
-    return Told(study.lines(), _json(folder), folder)
+def told_by_refinement(*given):
+    return told_by_nu12(*given, make=refine)
 
 
 def told_by_gauge(folder, _, notes):

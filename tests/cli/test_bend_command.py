@@ -97,24 +97,6 @@ def test_the_files_of_a_study_agree(study, golden):
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
 
 
-BAD = [
-    (("--test", "low"), ["project.toml: --test: ", "'low'", "150 mm, 90 kPa, high"]),
-    (("--card", "none"), ["--card", "soft, stiff"]),
-    (("--resume", "--overwrite"), ["not both"]),
-    (("--fail-above", 0.1), ["no test has measured loads"]),
-    (("--fail-above", -1), ["expected 0 or more"]),
-    (("--solver", "abacus"), ["project.toml: fit.solver (or --solver)", "calculix"]),
-    (("--ccx", "x"), ["--ccx", "means nothing to the solver 'formula'"]),
-]
-
-
-def test_bad_options_end_in_one_line(tmp_path):
-    project = write_project(tmp_path)
-    for options, words in BAD:
-        one_line(bend(project, *options, cwd=tmp_path, code=2), *words)
-        assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.usefixtures("undrawn")
 def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
     project = write_project(tmp_path)
@@ -231,20 +213,3 @@ def test_simulate_bend_on_the_membrane(tmp_path, card, golden):
     assert run["inflation_strain"]["body"]["fill"] == pytest.approx(0.042, abs=0.003)
     assert run["error"]["compared"] == 3
     assert (out / "figures" / "150-mm-140-kPa-beam.png").exists()
-
-
-def test_mistakes_of_simulate_bend_name_the_option(tmp_path, card):
-    usual = ("--diameter", 150, "--pressure", 140, "--card", card)
-    for arguments, words in (
-        (("--diameter", -1), ["--diameter", "greater than 0"]),
-        (("--diameter", 300), ["--collar", "inner_diameter"]),
-        (("--span", 2990), ["--span", "does not fit"]),
-        (("--seam-width", 500), ["--seam-width", "a quarter"]),
-        (("--frames", 0), ["--frames", "1"]),
-        (("--measured", "none.csv"), ["none.csv", "--measured"]),
-        (("--collar", 140, 100), ["--collar", "150 mm"]),
-        (("--card", "none.toml"), ["none.toml", "cannot be read"]),
-    ):
-        done = bend(*usual, *arguments, cwd=tmp_path, command=("simulate", "bend"), code=2)
-        one_line(done, *words)
-        assert not (tmp_path / "out").exists()

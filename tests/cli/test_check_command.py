@@ -283,22 +283,6 @@ def test_what_is_commented_may_be_wanted(tmp_path, schema):
         schema.validate(tomllib.loads(path.read_text()))
 
 
-def test_own_mistakes_end_in_one_line(tmp_path):
-    for options, words in (
-        ([], "--own: name at least one test: --biaxial, --bubble, --strips, --cylinder"),
-        (["--bubble", 1, "--form", "quartic"], "--form: 'quartic' is not one of: constant"),
-        (["--bubble", 1, "--pressures", "1,b"], "--pressures: expected numbers"),
-        (["--bubble", 1, "--pressures", "2,1"], "pressures must increase"),
-        (["--bubble", 1, "--radius", -1], "radius: expected greater than 0"),
-        (["--bubble", 1, "--example", "known"], "give one of them, not both"),
-    ):
-        one_line(own(*options, cwd=tmp_path, code=2), words)
-        assert not (tmp_path / "mine" / "project.toml").exists()
-    one_line(in_process("init", "other", "--radius", 3, cwd=tmp_path, code=2), "without --own")
-    own("--bubble", 1, cwd=tmp_path)
-    one_line(own("--bubble", 1, cwd=tmp_path, code=2), "is already there")
-
-
 def test_questions_on_a_terminal(tmp_path, monkeypatch):
     monkeypatch.setattr(start, "on_a_terminal", lambda: True)
     answers = "Sail\n0.7\n1\n120\n10,20\n1\n0\n1\n150\n90\nspline\n"

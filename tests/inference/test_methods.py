@@ -26,7 +26,6 @@ from bubblefit.inference.linear import (
 )
 from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.noise import Noise
-from bubblefit.inference.problem import Optimum
 from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.inference.unknowns import (
     ProposedStarts,
@@ -72,31 +71,18 @@ def test_the_number_of_analyses_is_a_limit_and_failures_give_none(method):
         assert fit_from(fit, CUBIC.at(LAW.beta), FitOptions(method)) is None
 
 
-class Halving:
-    needs_slope = False
-
-    def minimise(self, problem, start, options):
-        best = problem.evaluate(start, False)
-        step = 0.1 * np.random.default_rng(1).standard_normal(len(start))
-        while best is not None and problem.analyses < options.max_analyses:
-            point = problem.evaluate(best.unknowns + step, False)
-            good = point is not None and point.stable and point.value < best.value
-            best, step = (point, step) if good else (best, -0.5 * step)
-        return None if best is None else Optimum(best, "analyses used up", problem.analyses)
-
-
 def test_an_optimiser_is_a_module_beside_the_others(monkeypatch):
-    names = (*method_names(), "halving")
+    names = (*method_names(), "own")
     monkeypatch.setattr(methods, "method_names", lambda: names)
-    module = SimpleNamespace(METHOD=Halving())
-    monkeypatch.setitem(sys.modules, "bubblefit.inference.methods.halving", module)
+    module = SimpleNamespace(METHOD=lm.LevenbergMarquardt())
+    monkeypatch.setitem(sys.modules, "bubblefit.inference.methods.own", module)
     fit = problem()
     start = feasible_start(fit, 1, 0)
     first = fit.evaluate(start, False).value
-    options = FitOptions("halving", max_analyses=fit.analyses + 12)
+    options = FitOptions("own", max_analyses=fit.analyses + 12)
     optimum = fit_from(fit, start, options)
     assert optimum.value < first and fit.analyses == options.max_analyses
-    assert "lm, cobyla, slsqp, halving" in complaint(fit_from, fit, start, FitOptions("powell"))
+    assert "lm, cobyla, slsqp, own" in complaint(fit_from, fit, start, FitOptions("powell"))
 
 
 class Tempting(MembraneSolver):

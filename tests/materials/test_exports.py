@@ -341,24 +341,6 @@ def test_nothing_is_written_over_without_force(folder):
     assert (folder / "material-calculix.c").exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("csv --out material.toml --force", "--out: material.toml"),
-        ("csv --out ./material.toml --force", "--out: "),
-        ("abaqus-umat --out law.inp", "use .f"), ("csv --out file/t.csv", "--out"),
-        ("calculix --points 50", "--points: "), ("marc --measure true", "--measure: "),
-    ],
-)  # fmt: skip
-def test_options_that_cannot_be(folder, words, said):
-    (folder / "file").write_text("")
-    before = (folder / "material.toml").read_text()
-    text = run("material.toml", "--format", *words.split(), code=2)
-    assert said in text and text.startswith("bubblefit: ") and text.count("\n") == 1
-    assert (folder / "material.toml").read_text() == before
-    assert {path.name for path in folder.iterdir()} == {"file", "material.toml"}
-
-
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_card_without_stiffness_is_bad_input(folder, name):
     for law, words in (

@@ -14,17 +14,12 @@ from bubblefit.readers.machine_tables import Channel, in_unit
 from bubblefit.readers.pressure_log import (
     REPEATED,
     LogOptions,
-    _rest_height,
     apex_height,
     check_pattern,
     choose_frames,
     find_offset,
-    log_at,
-    misfit_of,
     number_in_name,
-    offset_misfits,
     read_pressure_log,
-    straightest,
     values_in_file,
 )
 from bubblefit.readers.tables import PRESSURE_UNITS, TIME_UNITS
@@ -221,26 +216,7 @@ def test_surfaces_that_cannot_be(tmp_path):
             assert read_surfaces(path)[0].scale == 0.5
 
 
-def test_rising_functions_that_are_known():
-    p = np.linspace(0.0, 1.0, 11)
-    assert misfit_of(p, p**2, 0.0) == pytest.approx(0.0, abs=1e-12)
-    # Falling: anchored in (0, 0), nothing that rises explains it.
-    assert misfit_of(p, 1 - p, 0.0) > 0.9
-    # Fewer than six frames, or than four of five less one, tell nothing; six of eight do.
-    few = np.where(np.arange(11) < 5, p, np.nan)
-    assert misfit_of(few, p, 0.0) == 1.0
-    eight, some = np.linspace(0, 1, 8), np.where(np.arange(8) < 6, np.linspace(0, 1, 8), np.nan)
-    assert misfit_of(some, eight, 0.0) == pytest.approx(0.0, abs=1e-12)
-    assert misfit_of(np.where(np.arange(8) < 5, eight, np.nan), eight, 0.0) == 1.0
-    assert misfit_of(np.full(8, 0.3), eight, 0.0) > 0.4  # no variance on one side counts as one
-    for power in (1, 2, 3):
-        assert straightest(p ** (1 / power), [p[::-1], p]) == power
-    # Six standard deviations above the lowest, by second differences; a fiftieth of the most.
-    assert _rest_height(np.linspace(3.0, 60.0, 20)) == pytest.approx(1.2)
-    assert _rest_height(np.linspace(0.0, 60.0, 20)) == pytest.approx(0.0, abs=1e-9)
-    rough = np.arange(20.0) % 2  # second differences of 2, which noise of 1.21 makes
-    assert _rest_height(np.append(rough, 900.0)) == pytest.approx(6 * 2 / 0.6745 / np.sqrt(6))
-    assert _rest_height(np.append(rough, 90.0)) == pytest.approx(1.8)
+def test_the_height_of_the_apex():
     r = np.linspace(0, 1, 2001)
     up = np.outer(50 * (1 - r), [0.6, 0.0, -0.8])
     up[7] = 900.0
@@ -249,32 +225,6 @@ def test_rising_functions_that_are_known():
     # 98 % of points evenly along a cone moved less than 98 % of its height.
     assert apex_height(frame) == pytest.approx(49.0, abs=0.1)
     assert np.isnan(apex_height(Frame(np.zeros((2, 3)), np.full((2, 3), np.nan))))
-
-
-def test_offsets_are_half_a_frame_apart_and_finer_about_the_best():
-    times = np.arange(10.0)
-    log = np.arange(0.0, 40.0, 0.5)
-    pressures = np.clip(log - 20.0, 0, 5) / 50
-    heights = np.clip(times - 3.0, 0, 5)
-    offsets, misfits = offset_misfits(times, heights, log, pressures)
-    assert (np.diff(offsets) >= 0).all() and len(offsets) == len(misfits)
-    # Eight of ten frames lie within the log: from -2 s to 39.5 - 7 s.
-    assert (offsets[0], offsets[-1]) == pytest.approx((-2.0, 32.5))
-    apart = np.diff(offsets)
-    assert np.median(apart[apart > 0.1]) == pytest.approx(0.5, abs=0.02)
-    assert offsets[np.argmin(misfits)] == pytest.approx(17.0, abs=0.05)
-    near = np.abs(offsets - 17.0) < 0.9
-    assert near.sum() > 60 and apart[near[:-1] & near[1:]].max() < 0.03
-    said = complaint(offset_misfits, times * 9, heights, log, pressures)
-    assert "the log lasts 39.5 s, the frames 81 s; are the units of time and the rate" in said
-    times, heights, clock, pressures = recorded(steps, "flat", 37.3, 5e-4, count=100)
-    clock, pressures = clock[:646], pressures[:646]
-    offsets, misfits = offset_misfits(times, heights, clock, pressures)
-    assert len(offsets) == len(misfits) > 100 and (np.diff(offsets) >= 0).all()
-    best = offsets[np.argmin(misfits)]
-    assert offsets[-1] - best < 1.0
-    ends = [np.isfinite(log_at(s, times, clock, pressures)).mean() for s in offsets]
-    assert min(ends) >= 0.8 - 1e-9
 
 
 POINTS = "x [mm];y [mm];dx [mm];dy [mm];dz [mm]"

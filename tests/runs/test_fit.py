@@ -22,7 +22,7 @@ from bubblefit.solvers import registry
 
 from ..commands import in_process, result_in
 from ..cylinder_cases import STOPS, Formula, write_project
-from ..projects import constant_strips, small, with_form
+from ..projects import constant_strips, small
 
 SECOND = """
 [[bubble]]
@@ -166,19 +166,6 @@ def test_two_bubbles_with_offsets_of_their_own(tmp_path):
     for name in ("bubble-1-profiles.png", "softer-reading-heights.png", "pinned.png"):
         assert name in page and (tmp_path / "out" / name).exists()
     maps_and_surface_say_what_the_table_says(fit, tmp_path / "out")
-
-
-def test_another_form_of_the_moduli(tmp_path):
-    spline, quadratic = (
-        bf.fit(bf.read_project(with_form(tmp_path, form)), starts=1, jobs=1)
-        for form in ('form = "spline"\nknots = 5', 'form = "quadratic"')
-    )
-    errors = spline.result["moduli_error"]
-    assert spline.objective < 1e-6 and max(errors["E1"], errors["E2"]) < 1e-3
-    assert len(spline.law.beta) == 15 and quadratic.objective > 1e-3
-    spline.card.write(tmp_path / "material.toml")
-    x = np.linspace(0, spline.best.valid[0], 9)
-    assert bf.read_card(tmp_path / "material.toml").law.E1(x) == pytest.approx(spline.law.E1(x))
 
 
 def test_derivatives_by_the_solver_or_a_surrogate(together):

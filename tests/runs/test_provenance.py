@@ -15,7 +15,7 @@ import pytest
 from bubblefit.errors import InputError
 from bubblefit.inference.unknowns import ProposedStarts
 from bubblefit.materials.forms.spline import TriLinear
-from bubblefit.project.project import Project, project_text, read_project, settings_of
+from bubblefit.project.project import Project, read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
 from bubblefit.runs.fit import facts_of
 from bubblefit.runs.folder import (
@@ -32,7 +32,6 @@ from bubblefit.runs.folder import (
 from bubblefit.runs.setup import fingerprints, prepare_fit, proposals
 
 from ..complaints import complaint
-from ..places import EXAMPLES
 from ..projects import constant_strips, project_file, with_form
 
 PROJECT = """
@@ -185,27 +184,6 @@ def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     assert re.fullmatch(r"the solver calculix: templates = sha256 \w{12}, now sha256 \w{12}", said)
     said = refused(tmp_path / "out", prepared(written(tmp_path)))
     assert said == 'the solver = "calculix", now "membrane"'
-
-
-OWN = [
-    path
-    for path in sorted(EXAMPLES.glob("*/*.toml"))
-    if "[fabric]" in path.read_text() and path.parent.name != "plug-in"
-]
-
-
-@pytest.mark.parametrize("path", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
-def test_every_example_can_be_run_again_as_it_was(path, tmp_path):
-    project = read_project(path, need_data=False).with_fit(starts=7, seed=3, method="slsqp")
-    (tmp_path / "elsewhere.toml").write_text(project_text(settings_of(project, [*project.tests])))
-    again = read_project(tmp_path / "elsewhere.toml", need_data=False)
-    assert again.fit == project.fit and again.law == project.law
-    assert again.fabric == project.fabric and again.scales == project.scales
-    assert again.solver_options[project.fit.solver] == project.solver_options[project.fit.solver]
-    assert list(again.tests) == list(project.tests)
-    for name, test in project.tests.items():
-        assert again.tests[name].settings() == test.settings()
-        assert again.tests[name].weight == test.weight
 
 
 def recorded(setup, command=None):

@@ -376,7 +376,7 @@ def test_ratios_leave_out_what_failed():
                         {"a": 2.0, "b": 4.0})  # fmt: skip
     assert early["a"].to_base == pytest.approx([0.5, 1.0, NAN], nan_ok=True)
     assert early["b"].to_base == pytest.approx([NAN, 0.25, NAN], nan_ok=True)
-    """Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps)."""
+    # Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps).
     model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
 
     def load(nu12):

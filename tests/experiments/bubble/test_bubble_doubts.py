@@ -514,18 +514,3 @@ def test_frames_that_lost_parts_of_the_rim_are_compared_by_places(good, after):
     found = names(each(deformed, False)(fields) if after else fields)
     assert ("deformed-coordinates" in found) == after
     assert not after or "100% of dx and dy" in found["deformed-coordinates"].text
-
-
-def test_rows_of_other_points_say_nothing_of_coordinates():
-    """Two frames of a stretched sheet with as many points, 40 % lost: rows follow by 1980 %."""
-    line = 10.0 * np.arange(-9.0, 10.0)
-    points = np.stack([axis.ravel() for axis in np.meshgrid(line, line)], axis=1)
-    draw = np.random.default_rng(0)
-    some = [points[np.sort(draw.choice(len(points), 220, replace=False))] for _ in range(2)]
-    stretched = [
-        np.column_stack([k * at, at[:, 0]]) for k, at in zip((0.05, 0.051), some, strict=True)
-    ]
-    fields = tuple(field(0.2, u, at) for u, at in zip(stretched, some, strict=True))
-    rows = doubts._follows(some[1] - some[0], (stretched[1] - stretched[0])[:, :2])
-    assert rows == pytest.approx(19.8, abs=0.1)
-    assert said(doubts.deformed_coordinates, fields=fields) == []

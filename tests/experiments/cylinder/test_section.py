@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError
 from bubblefit.experiments.cylinder.test import CylinderTest
-from bubblefit.materials.card import MaterialCard, write_card
+from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES
 from bubblefit.project.project import read_project
@@ -98,18 +98,6 @@ def test_metres_and_bars_are_the_same_cylinder(tmp_path):
         assert other.reading.places == pytest.approx(one.reading.places)
         assert other.reading.slope_over == pytest.approx(one.reading.slope_over)
     assert read_project(path).cards["soft"].card.thickness == pytest.approx(0.81)
-
-
-def test_cards_from_files(tmp_path):
-    law = HypoelasticLaw.linear(500.0, 150.0, 20.0)
-    write_card(MaterialCard(law, 0.7, "mine", "a test"), tmp_path / "card.toml")
-    path = write_project(tmp_path)
-    text = path.read_text()
-    path.write_text(text + '[[card]]\nfile = "card.toml"\n[[card]]\nfile="card.toml"\nname="b"\n')
-    cards = read_project(path).cards
-    assert list(cards) == ["soft", "stiff", "mine", "b"]
-    assert cards["mine"].card.thickness == 0.7
-    np.testing.assert_allclose(cards["b"].card.law.beta, law.beta)
 
 
 D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'

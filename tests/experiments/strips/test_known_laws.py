@@ -176,21 +176,13 @@ def test_loads_between_the_increments_lie_on_a_spline_from_the_origin():
     assert objective.unit == "N"
 
 
-def test_blocks():
+def test_a_block_that_fits_exactly_has_no_slope():
     random = np.random.default_rng(8)
     r, j = random.standard_normal(9), random.standard_normal((9, 4))
-    blocks = Blocks([2, 3, 4])
-    parts = r[:2], r[2:5], r[5:]
-    assert blocks.norms(r) == pytest.approx([np.linalg.norm(p) for p in parts])
-    assert blocks.value(r) == pytest.approx(sum(np.linalg.norm(p) for p in parts))
-    assert blocks.of.tolist() == [0, 0, 1, 1, 1, 2, 2, 2, 2]
-    step = 1e-6 * np.eye(4)
-    numeric = [(blocks.value(r + j @ s) - blocks.value(r - j @ s)) / 2e-6 for s in step]
-    assert blocks.gradient(r, j) == pytest.approx(numeric, rel=1e-6)
-    r[2:5] = 0.0  # fits exactly: without a slope, and without a division by zero
-    rest = Blocks([2, 4])
+    r[2:5] = 0.0
     keep = [0, 1, 5, 6, 7, 8]
-    assert blocks.gradient(r, j) == pytest.approx(rest.gradient(r[keep], j[keep]))
+    rest = Blocks([2, 4]).gradient(r[keep], j[keep])
+    assert Blocks([2, 3, 4]).gradient(r, j) == pytest.approx(rest)
 
 
 @pytest.mark.parametrize("unknowns", [SHIFTED, CUBIC], ids=["offsets", "moduli"])

@@ -14,7 +14,6 @@ from bubblefit.materials.forms.base import (
     form_settings,
     map_in_range,
     moduli_on_grid,
-    modulus_rows,
     pieces_of,
     ratio_map,
     ratios_of,
@@ -28,7 +27,7 @@ from bubblefit.materials.forms.polynomial import (
     LoadRatio,
 )
 from bubblefit.materials.forms.ratio import SplineRatio
-from bubblefit.materials.forms.spline import PARTS, Spline
+from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.pieces import by_pieces, increment_modulus, point_modulus
 from hypothesis import assume, example, given, settings
@@ -36,7 +35,6 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from ...complaints import complaint, refused
-from ...plug_ins import install
 from ...published_laws import TABLE_4_2
 
 BETA = 1e3 * np.array(TABLE_4_2)
@@ -220,16 +218,6 @@ def test_two_knots_are_a_line_and_beyond_the_last_the_modulus_is_held():
     assert law.G12([-0.05, -0.2]) == pytest.approx([15, 20])
 
 
-def test_a_spline_that_is_positive_on_its_grid_hardly_dips_between():
-    form = form_named("spline", {"knots": 6}, RANGE)
-    coarse = moduli_on_grid(form, RANGE)["E1"][:, -6:]
-    fine = modulus_rows(form, "E1", np.linspace(0, RANGE[0], 2000), RANGE)[:, -6:]
-    values = np.random.default_rng(5).uniform(-1, 3, (4000, 6))
-    whole = values[((coarse @ values.T) > 0).all(axis=0)] @ fine.T
-    assert len(whole) > 200
-    assert (-whole.min(axis=1) / np.abs(whole).max(axis=1)).max() < 1.5 * (2 / PARTS) ** 2
-
-
 BAD = [
     ("quartic", {}, "form"), ("cubics", {}, "form"), ("cubic", {"knots": 4}, "knots"),
     ("spline", {"breaks": {}}, "breaks"), ("spline", {}, "knots"),
@@ -388,16 +376,6 @@ def test_the_tangent_of_the_law_is_that_of_its_stress(form):
 
 
 ENDS = (0.1, 0.2, 0.5)
-WORKING = """
-from dataclasses import dataclass, replace
-from bubblefit.materials.forms.polynomial import LINEAR
-from bubblefit.materials.forms.base import Offer
-
-def make(name, settings, strain_range):
-    {body}
-
-THING = Offer("acme", make, ("knee",))
-"""
 
 
 def test_ours_are_there_and_say_their_settings():
@@ -408,12 +386,3 @@ def test_ours_are_there_and_say_their_settings():
     assert form_named("cubic", {}, ENDS) == CUBIC != LINEAR
     assert "did you mean 'cubic'" in complaint(form_named, "cubik", {}, ENDS)
     assert "a cubic law has no knots" in complaint(form_named, "cubic", {"knots": 3}, ENDS)
-
-
-def test_a_plug_ins_form_is_one_of_them(packages):
-    install(packages, "acme", WORKING.format(body="return LINEAR"))
-    assert "acme" in form_names() and form_settings("acme") == ("knee",)
-    assert form_named("acme", {"knee": 0.1}, ENDS).size == 12
-    assert "a acme law has no knots" in complaint(form_named, "acme", {"knots": 1}, ENDS)
-    install(packages, "cubic", "raise RuntimeError", distribution="acme-others")
-    assert form_named("cubic", {}, ENDS).name == "cubic" and form_names().count("cubic") == 1
