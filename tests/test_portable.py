@@ -1,16 +1,25 @@
-"""The main path where the operating system has nothing of POSIX to offer, as on Windows."""
+"""The main path without POSIX, as on Windows; the wheel, which works outside the repository."""
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
+import zipfile
 from pathlib import Path
 
+import bubblefit
+import pytest
 from bubblefit import files
+from bubblefit.project.schema import project_file as project_model
 from bubblefit.solvers.process import run_process
+from bubblefit.solvers.registry import solver_sections
 
-from .projects import small
+from .places import PUBLISHED, ROOT
+from .projects import small, two_exports
+from .scripts import script
 
 #: Put before a program, and before every interpreter that it starts. The code for this
 #: system, platformdirs and numpy need some of these names: they are imported first. SIGKILL stays,
@@ -165,3 +174,164 @@ def test_an_edit_reaches_code_compiled_from_another_file_without_a_cache_too(tmp
     assert after != before
     (tmp_path / "file").write_text("in the way of a cache")
     assert run(tmp_path / "file" / "cache", package.parent) == after
+
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+#: Folders of the repository that are no part of the package.
+OUTSIDE = {"tests", "benchmarks", "docs", "examples", "out", "build", "dist"}
+#: Every folder that is a package, found without setuptools.
+PACKAGES = {
+    ".".join(("bubblefit", *folder.parts))
+    for folder in (f.parent.relative_to(ROOT) for f in ROOT.rglob("__init__.py"))
+    if not {*folder.parts} & OUTSIDE and not any(p.startswith(".") for p in folder.parts)
+}
+
+
+def output_of(*command):
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def site_packages(python):
+    code = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
+    return Path(output_of(python, "-c", code).strip())
+
+
+def shipped():
+    wanted = {"bubblefit/py.typed", "bubblefit/solvers/calculix/law.c"}
+    for package in PACKAGES:
+        folder = ROOT.joinpath(*package.split(".")[1:])
+        files = [f for f in folder.glob("*.py") if f != ROOT / "setup.py"]
+        wanted |= {f"bubblefit/{f.relative_to(ROOT).as_posix()}" for f in files}
+    documents = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    wanted |= {f"bubblefit/{path.relative_to(ROOT).as_posix()}" for path in documents}
+    pages = script("docs/make_api.py").PAGES  # made when the wheel is built
+    wanted |= {f"bubblefit/docs/reference/api/{name}.md" for name in pages}
+    for folder in ("examples", "templates", "runs/verification/published"):
+        for file in (ROOT / folder).rglob("*"):
+            inside = file.relative_to(ROOT)
+            if file.is_file() and not any(p.startswith((".", "out")) for p in inside.parts):
+                wanted.add(f"bubblefit/{inside.as_posix()}")
+    return wanted
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    place = tmp_path_factory.mktemp("wheel")
+    source = place / "source"
+    unwanted = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "out", "build", "dist")
+    shutil.copytree(ROOT, source, ignore=unwanted)
+    # Litter as users leave it.
+    for name in ("out/demo/result.json", "examples/bubble-known-solution/out/result.json"):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        (source / name).write_text("{}")
+    (source / ".venv" / "lib").mkdir(parents=True)
+    (source / ".venv" / "lib" / "junk.py").write_text("")
+    # No build isolation: no network is needed, and the sandbox would be the same setuptools.
+    options = ("--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", place)
+    output_of(sys.executable, "-m", "pip", "--quiet", "wheel", *options, source)
+    (built,) = place.glob("*.whl")
+    return built
+
+
+def test_versions_agree():
+    assert bubblefit.__version__ == PROJECT["project"]["version"]
+    assert f"## {bubblefit.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+#: Libraries that take a tenth of a second or more to import, or are not there on every machine.
+HEAVY = {"numba", "scipy.optimize", "scipy.stats", "matplotlib", "pandas", "pydantic"} | {
+    "gmsh", "nlopt", "dask", "h5py", "jinja2"
+}  # fmt: skip
+KNOWN = "examples/bubble-known-solution/project.toml"
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        ("from bubblefit.cli.main import main; main(['--help'], standalone_mode=False)", HEAVY),
+        ("import bubblefit.cli.fits", {"gmsh", "scipy.stats", "dask", "h5py"}),
+        ("import bubblefit.project.project", HEAVY - {"numba", "nlopt", "pydantic", "jinja2"}),
+        ("import bubblefit", {*HEAVY, "scipy", "click"}),
+        ("import bubblefit; [getattr(bubblefit, name) for name in bubblefit.__all__]",
+         {"click", "bubblefit.cli"}),
+        (f"import bubblefit as b; b.read_project(b.__path__[0] + '/{KNOWN}')",
+         {"matplotlib", "gmsh", "click", "numba", "meshio", "h5py", "pandas", "scipy.sparse",
+          "scipy.spatial", "scipy.linalg"}),
+    ],
+)  # fmt: skip
+def test_start_up_loads_only_what_it_needs(code, absent):
+    # gmsh needs X and GL libraries; the others make `bubblefit --help` slow.
+    done = output_of(sys.executable, "-c", f"import sys; {code}; print(*sys.modules)")
+    loaded = set(done.splitlines()[-1].split())
+    assert not absent & loaded
+    if code == "import bubblefit":
+        assert len([name for name in loaded if name.split(".")[0] == "bubblefit"]) < 15
+
+
+def test_documents_that_speak_of_the_thesis_link_to_it():
+    for document in (ROOT / "docs").glob("*/*.md"):
+        text = re.sub(r"```.*?```|^    .*?$", "", document.read_text(), flags=re.DOTALL | re.M)
+        if re.search(r"\bthe thesis\b", text, re.IGNORECASE):
+            assert re.search(r"he thesis\]\([./]*references\.md", text), document
+
+
+def test_every_key_of_the_project_file_is_documented():
+    text = (ROOT / "docs" / "reference" / "project-file.md").read_text()
+
+    def keys(annotation):
+        for name, field in getattr(annotation, "model_fields", {}).items():
+            yield name
+            yield from keys(field.annotation)
+        for inside in getattr(annotation, "__args__", ()):
+            yield from keys(inside)
+
+    names = {key for model in (project_model(), *solver_sections().values()) for key in keys(model)}
+    missing = {key for key in names if not re.search(rf"\b{key}\b", text)}
+    assert len(names) > 100 and not missing
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_package_and_nothing_else(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {n for n in names if not re.match(r"bubblefit-[^/]+\.dist-info/", n)} == shipped()
+    (licence,) = [n for n in names if n.endswith("LICENSE")]
+    assert "MIT License" in zipfile.ZipFile(wheel).read(licence).decode()
+
+
+@pytest.mark.slow
+def test_the_wheel_works_in_an_empty_environment(wheel, tmp_path, monkeypatch):
+    home = tmp_path / "venv"
+    output_of(sys.executable, "-m", "venv", "--without-pip", home)
+    python, command = home / "bin" / "python", home / "bin" / "bubblefit"
+    pip = (sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index")
+    output_of(*pip, wheel)
+    # Empty but for the dependencies, borrowed from this environment. A .pth line is only a
+    # path: the editable install of bubblefit that hangs on a .pth over there is not read.
+    (site_packages(python) / "borrowed.pth").write_text(f"{site_packages(sys.executable)}\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    place = output_of(python, "-c", "import bubblefit; print(bubblefit.__file__)")
+    assert place.startswith(str(home))
+    assert PROJECT["project"]["version"] in output_of(command, "--version")
+    output_of(command, "init", "measured", "--example", "measured")
+    assert (tmp_path / "measured" / "test3-cubic.toml").exists()
+    # Scripts of a user, checked by the types of what is installed; one is run: fit, chart, export.
+    shutil.copytree(ROOT / "tests" / "typed", typed := tmp_path / "typed")
+    check = ("-m", "mypy", "--strict", "--cache-dir", tmp_path / "types")
+    output_of(sys.executable, *check, "--python-executable", python, typed)
+    two_exports(tmp_path)
+    output_of(python, typed / "two_cameras.py")
+    assert (tmp_path / "moduli.png").exists() and list((tmp_path / "card").glob("*.inp"))
+    assert (tmp_path / "out" / "history.csv").exists()
+
+
+def test_every_published_table_has_a_source_and_says_its_units(shared_data):
+    described = (PUBLISHED / "README.md").read_text()
+    tables = {path.name: path.read_bytes() for path in PUBLISHED.glob("*.csv")}
+    assert len(tables) == 4
+    for name, content in tables.items():
+        assert f"| `{name}` |" in described and content.startswith(b"# ")
+    there = {path.name: path.read_bytes() for path in (shared_data / "benchmarks").glob("*.csv")}
+    assert tables == there

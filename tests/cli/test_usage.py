@@ -115,6 +115,8 @@ FIT, CARD, BEND = "fit known/project.toml", "--card card.toml", "simulate bend -
             ("--bubble 1 --example known", "--own"))),
         ("init ''", "FOLDER"), ("init other --radius 3", "--own"), ("init known --own", "known"),
         ("docs nowhere", "nowhere"),
+        *((f"cache --folder folder {option} {value}", option) for option, value in (
+            ("--prune", "much"), ("--prune", "-1GB"), ("--limit", "'2 K'"), ("--older", "30"))),
         ("gauge empty.csv --lower 0 0 --upper 0 9 --out g.csv", "empty.csv"),
         ("dic sphere folder", "folder"), ("schema --out folder", "folder"),
     ],

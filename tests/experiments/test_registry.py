@@ -3,19 +3,16 @@
 import logging
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.errors import SOLVER, PlugInFailure
+from bubblefit.errors import PlugInFailure
 from bubblefit.experiments import registry
 from bubblefit.experiments.kinds import (
     BEYOND_CARD,
     BEYOND_LAW,
     DOUBTFUL,
     HELD,
-    THICKNESS,
-    UNSTABLE,
     WIDER,
     Doubt,
     Expected,
@@ -26,9 +23,7 @@ from bubblefit.experiments.kinds import (
     named_format,
     notes_beyond,
     notes_of,
-    other_thickness,
     strains_of,
-    unstable_words,
 )
 from bubblefit.experiments.registry import NEEDED, kind_named, kinds, report_of
 from bubblefit.materials.card import MaterialCard
@@ -174,15 +169,3 @@ def test_the_words_of_notes():
         assert [note.kind for note in found] == [kind]
         assert "fill" in found[0] and "21 %" in found[0] and "20 %" in found[0]
     assert by_strain([1, 2, 3]) == {"warp": 1.0, "fill": 2.0, "shear": 3.0}
-    assert other_thickness(CARD, 0.81) == []
-    (note,) = other_thickness(CARD, 0.405)
-    assert note.kind is THICKNESS and "50 % softer" in note
-    record = SimpleNamespace(strain=beyond, remarks=("made up",), unstable=("132 kPa",))
-    assert [n.kind for n in notes_of(record, CARD)] == [
-        SOLVER, BEYOND_CARD, UNSTABLE
-    ]  # fmt: skip
-    record.strain = None
-    assert [n.kind for n in notes_of(record, CARD)] == [SOLVER, UNSTABLE]
-    assert unstable_words(None) == unstable_words(()) == []
-    (note,) = unstable_words(("132 kPa",))
-    assert note.kind is UNSTABLE and "132 kPa" in note

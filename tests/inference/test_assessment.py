@@ -220,16 +220,6 @@ def test_blocks_count_alike_whatever_their_size():
     assert alike([np.zeros(5), np.ones(1)], [PLACES[:5], PLACES[:1]]) == 1.0
 
 
-def test_the_scatter_of_an_estimate():
-    x = PLACES[:, 0] - PLACES[:, 0].mean()
-    fields = noise(1.0, 400, seed=11)
-    scatter = np.std([x @ field / (x @ x) for field in fields])
-    white = np.std(fields) / np.sqrt(x @ x)
-    said = white * np.sqrt(alike(fields[:30], [PLACES] * 30))
-    assert scatter == pytest.approx(said, rel=0.12)
-    assert scatter > 3 * white
-
-
 def test_a_fit_is_as_much_less_sure():
     random = np.random.default_rng(5)
     nodes, found = NODES, {}

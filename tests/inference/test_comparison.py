@@ -139,26 +139,6 @@ def test_what_contracts_asks_for_a_positive_definite_law():
     assert shared_fit(NU12).unknowns.definite_nu12 == 0.5  # free: the largest that it may be
 
 
-def test_only_a_near_guess_is_a_warm_start():
-    plain = Comparison("bar", None, Plain(), None)
-    assert (plain.stage, plain.contracts, plain.must_be_stable) == (0, False, True)
-    assert plain._guess(np.zeros(2)) is None
-    path = np.array([[0.5, -4.0], [1.0, 2.0]])
-    slope = np.zeros((2, 2, 1))
-    slope[0, 1, 0] = 1.0
-    plain._last = np.array([3.0]), path, slope
-    for change in (0.0799, -0.0799):
-        guess = plain._guess(np.array([3.0 + change]))
-        assert guess is not None
-        np.testing.assert_allclose(guess, [[0.5, -4.0 + change], [1.0, 2.0]])
-    plain._last = np.array([0.0]), path, slope
-    assert plain._guess(np.array([0.08])) is not None  # the limit itself
-    for change in (0.0801, -0.0801, 5.0):
-        assert plain._guess(np.array([change])) is None
-    plain.forget()
-    assert plain._guess(np.zeros(1)) is None
-
-
 NU12 = Nuisance("nu12", 0.0, 0.5, "", start=0.3, law_parameter="nu12", shared=True)
 THICKNESS = Nuisance(
     "thickness", 0.6, 1.0, "mm", "thickness", prior=0.02, weight=1e-3, start=0.8, shared=True,

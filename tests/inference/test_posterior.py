@@ -366,17 +366,3 @@ def test_the_shapes():
     quartic = x**3 * y - 2 * y**4 + x
     inside = SHAPES[:, :15] @ (SHAPES[:, :15].T @ quartic)
     assert inside == pytest.approx(quartic, rel=1e-9, abs=1e-5)
-
-
-def test_a_place_on_a_line_is_a_quantile_of_a_truncated_normal_distribution():
-    random = np.random.default_rng(0)
-    ends = [(-1.0, 2.0), (0.5, 0.6), (3.0, 23.0), (-20.0, -10.0), (-1e6, 1e6), (25.0, 26.0)]
-    for low, high in ends:
-        for share in [1e-9, 0.3, *random.random(5), 1 - 1e-9]:
-            place = truncated._between(low, high, share)
-            expected = truncnorm.ppf(share, low, high)
-            if low > 0:  # the lower tail has the digits
-                expected = -truncnorm.ppf(share, -high, -low)
-            assert place == pytest.approx(expected, rel=1e-6, abs=1e-6)
-    for share in (0.1, 0.9):  # beyond, as an exponential distribution
-        assert -41 < truncated._between(-41.0, -40.0, share) < -39.99

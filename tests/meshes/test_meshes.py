@@ -13,7 +13,6 @@ from bubblefit.meshes.disk import (
     rim_form,
     rim_share,
 )
-from bubblefit.meshes.mesh import Mesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -125,22 +124,6 @@ NONSENSE = [
 def test_nonsense_is_refused_by_name(mesh, values, field):
     good = {"radius": RADIUS} if mesh is disk_mesh else {}
     assert refused(mesh, **good | {"elements": 800} | values).field == field
-
-
-@pytest.mark.parametrize(
-    ("corners", "wanted"),
-    [
-        ([(0, 0), (2, 0), (2, 1), (0, 1)], 1.0),
-        ([(0, 0), (1, 0), (1.5, np.sqrt(3) / 2), (0.5, np.sqrt(3) / 2)], np.sqrt(3) / 2),
-        ([(0, 0), (1, 0), (1, 0), (0, 1)], 0.0),  # a collapsed edge
-        ([(0, 0), (4, 0), (1, 1), (0, 4)], -0.8),  # a corner that turns in
-    ],
-)
-def test_scaled_jacobian_of_known_shapes(corners, wanted):
-    turn = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
-    placed = 7 * np.array([(x, y, 0) for x, y in corners], float) @ turn.T + 3
-    mesh = Mesh(placed, np.array([[0, 1, 2, 3]]), {})
-    assert scaled_jacobian(mesh) == pytest.approx([wanted], abs=1e-12)
 
 
 def test_gmsh_makes_a_sound_mesh_too():

@@ -8,7 +8,6 @@ import pytest
 from bubblefit.experiments.strips.gauge import virtual_strain_gauge
 from bubblefit.readers.fields import QUANTITIES, read_fields
 from bubblefit.readers.frames import (
-    Frame,
     FrameOptions,
     FrameRows,
     frame_files,
@@ -44,17 +43,6 @@ def test_frames_are_read_with_holes(tmp_path):
     for scale in (0.0, np.inf):
         assert complaint(FrameOptions, length_scale=scale).startswith("length_scale: ")
     assert FrameOptions(length_scale=1e-300).length_scale == 1e-300
-
-
-def test_arrays_that_make_no_frame():
-    for points, displacement, sigma, shapes in (
-        ((2, 3), (3, 3), None, r"\(2, 3\) and \(3, 3\)"),
-        ((2, 2), (2, 2), None, r"\(2, 2\) and \(2, 2\)"),
-        ((2, 3), (2, 3), (3,), r"sigma, got \(3,\)"), ((2, 3), (2, 3), (2, 3), r"got \(2, 3\)"),
-    ):  # fmt: skip
-        with pytest.raises(ValueError, match=shapes):
-            Frame(np.zeros(points), np.zeros(displacement), sigma=sigma and np.zeros(sigma))
-    assert len(Frame(np.zeros((2, 3)), np.zeros((2, 3)), sigma=np.zeros(2)).points) == 2
 
 
 PATH, PLAIN = Path("a.csv"), FrameOptions()

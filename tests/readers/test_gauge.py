@@ -10,12 +10,10 @@ from bubblefit.experiments.strips.gauge import (
     LOST,
     GaugeRecord,
     GaugeTable,
-    PairedLoads,
     gauge_load_curve,
-    loads_at_frames,
     virtual_strain_gauge,
 )
-from bubblefit.readers.curves import LoadCurve, read_load_curves
+from bubblefit.readers.curves import LoadCurve
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -262,40 +260,3 @@ def test_with_the_loads_of_a_machine(tmp_path):
     read = pd.read_csv(tmp_path / "g.csv", comment="#")
     assert read["file"].tolist() == ["a.csv", "b.csv"] and read["load_N"].tolist() == [5.0, 410.0]
     assert set(read["specimen"]) == {"w1"} and set(read["direction"]) == {"warp"}
-
-
-LOADS = "time_s,load_N\n0,0\n1,10\n2,30\n"
-LOW, HIGH = (1.0, 1.0), (1.0, 9.0)
-
-
-@pytest.fixture
-def record():
-    x, y = (part.ravel() for part in np.meshgrid(np.arange(3.0), np.arange(11.0)))
-    points = np.stack([x, y, 0 * x], axis=1)
-    frames = [Frame(points, points * [0, stretch, 0]) for stretch in (0.0, 0.1, 0.2)]
-    frames[1] = Frame(points[:20], frames[1].displacement[:20])
-    return virtual_strain_gauge(frames, LOW, HIGH)
-
-
-def test_the_table_of_a_gauge_reads_back_as_a_load_curve(record, tmp_path):
-    path = tmp_path / "machine.csv"
-    path.write_text(LOADS)
-    curve = loads_at_frames(record, PairedLoads(path, "weft", " 3 "))
-    np.testing.assert_array_equal(curve.load, [0, 30])
-    table = GaugeTable(["a", "b", "c"], LOW, HIGH, record, curve, "a note")
-    table.write(tmp_path / "gauge.csv")
-    (back,) = read_load_curves(tmp_path / "gauge.csv")
-    assert (back.direction, back.specimen) == ("fill", "3")
-    np.testing.assert_array_equal(back.elongation, curve.elongation)
-    np.testing.assert_array_equal(back.load, curve.load)
-    numbers = table.numbers()
-    assert numbers["lost"] == ["b"] and numbers["points"] == 2 and "a note" in table.notes
-    assert numbers["without_load"] == []
-    path.write_text("F1 (N),F2 (N)\n1,2\n1,2\n1,2\n")
-    assert "with load_column" in complaint(loads_at_frames, record, PairedLoads(path, "warp", "1"))
-    path, times = tmp_path / "machine.csv", tmp_path / "times.csv"
-    path.write_text(LOADS)
-    times.write_text("time_s\n0.5\n1\n1.5\n")
-    for how in ({"frame_interval": 0.5, "time_offset": 0.5}, {"frame_times": times}):
-        paired = PairedLoads(path, "warp", "1", **how)
-        np.testing.assert_allclose(loads_at_frames(record, paired).load, [5, 20])

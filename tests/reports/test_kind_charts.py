@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.reports import bubbles, cylinders, strips
-from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut, point_cut
+from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import axis_ends, scale_ends
 from bubblefit.reports.cylinders import BendLine, BendPanel, beam_charts, bending_charts
 from bubblefit.reports.strips import OrderErrors, StripCurves, load_charts, order_charts
@@ -86,33 +86,8 @@ def test_heights_are_drawn_against_each_other():
     assert [bubbles._below_one(r) for r in (0.999, 0.9991)] == ["0.999", "1 − 9.0e-04"]
 
 
-#: Rows of points along x: on the axis and 2.5 mm beside it, each point 5.6 mm from the next.
-ALONG = np.arange(0.0, 100.0, 10.0)
-ROWS = np.vstack(
-    [np.column_stack([ALONG, 0 * ALONG]), np.column_stack([ALONG + 5, 0 * ALONG + 2.5])]
-)
-
-
 def still(points):
     return np.column_stack([0 * points, points[:, 0]])
-
-
-@pytest.mark.parametrize(
-    ("points", "used"),
-    [
-        # Five points on the axis are its profile; of fewer, those beside it count as well.
-        (ROWS, 10), (np.vstack([ROWS[:5], ROWS[10:]]), 5), (np.vstack([ROWS[:4], ROWS[10:]]), 14),
-        # Half their distance from the axis at most; one alone has to lie on it.
-        ([[3.0, 2.0], [3.0, -2.0]], 2), ([[3.0, 2.0], [7.0, 2.5]], 1), ([[3.0, 2.0]], 0),
-        ([[3.0, 0.0]], 1), ([[3.0, 2.0], [6.0, 2.0]], 0), (np.zeros((0, 2)), 0),
-    ],
-)  # fmt: skip
-def test_points_of_a_cut(points, used):
-    given = np.array(points)
-    cut = point_cut(given, still(given), 0)
-    assert len(cut.position) == used
-    np.testing.assert_array_equal(cut.height, cut.position)
-    assert used == 2 or (np.diff(cut.position) > 0).all()
 
 
 @pytest.mark.parametrize(("on", "taken"), [(5, 5), (4, 81)])

@@ -9,7 +9,7 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, NoFeasibleStart, SolverFailure
+from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
@@ -119,38 +119,6 @@ def test_no_optimum(monkeypatch, problem, own, leads, why):
     cut = SimpleNamespace(**{**vars(OPTIMUM), "failure": "killed", "status": "killed"})
     record, _ = started(monkeypatch, problem, cut)
     assert (record.objective, record.status, record.failure) == (0.75, "killed", "killed")
-
-
-def test_no_feasible_start_is_no_failure(monkeypatch, problem):
-    def none(*_):
-        raise NoFeasibleStart("none in 1000 draws")
-
-    monkeypatch.setattr(room, "feasible_start", none)
-    record = run_start(problem, None, 7, 4, lambda told: None)
-    why = "none in 1000 draws"
-    assert record == StartRecord(4, (7, 4), None, why, 0, (), (), record.wall_s, 0, "")
-    assert problem.watch is None
-
-
-def test_from_the_optimum_of_the_coarse_mesh(monkeypatch):
-    coarse = StartRecord(
-        4, (7, 4), 0.5, "converged", 6, (1.0, 2.0, 3.0), (), 100.0, 0, mesh="coarse"
-    )
-
-    def fit_from(problem, begun, options, near):
-        assert begun.tolist() == [1.0, 2.0, 3.0] and near
-        problem.watch(Y, 0.75, "ok", "membrane")
-        return OPTIMUM
-
-    monkeypatch.setattr(room, "strains_of", lambda history: [0.0] * 3)
-    monkeypatch.setattr(room, "fit_from", fit_from)
-    told = []
-    problem = Problem("membrane", False)
-    record = run_start(problem, None, 7, 4, told.append, coarse=coarse)
-    assert [(e.analysis, e.mesh) for e in told] == [(7, "full")]
-    assert (record.analyses, record.coarse_analyses, record.coarse_objective) == (7, 6, 0.5)
-    assert record.objective == 0.75 and record.mesh == "full" and record.wall_s > 100.0
-    assert StartRecord.read(record.text) == record
 
 
 STARTS = 3

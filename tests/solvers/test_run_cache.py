@@ -246,19 +246,6 @@ def test_where_it_is_and_whether(monkeypatch, tmp_path):
     assert "BUBBLEFIT_RUNS: is 'off': no runs are kept, name a folder instead" in done.output
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("--prune", "much"), ("--prune", "-1GB"), ("--limit", "2 K"), ("--older", "30")],
-)
-def test_what_is_no_size_or_age_is_told_and_drops_nothing(
-    cache, monkeypatch, tmp_path, option, value
-):
-    monkeypatch.setenv(VARIABLE, str(cache.folder))
-    filled(cache, 2)
-    done = in_process("cache", option, value, cwd=tmp_path, code=2)
-    assert f"{option}: " in done.output and len(cache.entries()) == 2
-
-
 LAW = HypoelasticLaw.linear(800.0, 400.0, 80.0)
 MODEL = BarModel(strip_mesh(20.0, 40.0, 2, 4), 0.5, 4)
 

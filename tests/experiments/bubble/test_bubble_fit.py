@@ -15,7 +15,6 @@ import pytest
 import scipy.sparse as sp
 from bubblefit.errors import InputError
 from bubblefit.experiments.bubble import objective as places
-from bubblefit.experiments.bubble import prepared as preparation
 from bubblefit.experiments.bubble import report
 from bubblefit.experiments.bubble import sheet as shapes
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget, folded, mirrored
@@ -557,17 +556,3 @@ def test_the_residual_points_to_its_cause(cubic, tmp_path, name, change, words, 
     assert all(one.share < 0.5 * first.share for one in found.causes[1:]), found.causes
     said = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e-\d+)?", first.words)]
     assert said == pytest.approx(amounts, abs=0.1, rel=0.2)
-
-
-def test_a_finer_model_begins_at_every_increment_of_the_coarse_path():
-    law, levels = HypoelasticLaw.linear(600.0, 300.0, 14.0), (0.01, 0.05, 0.1, 0.2)
-    own = BubbleModel(disk_mesh(100.0, 108), 0.81, levels)
-    steps = np.sort([*levels, *(0.5 * np.add(levels, (0.0, *levels[:-1])))])
-    fine = BubbleModel(disk_mesh(100.0, 432), 0.81, levels, steps)
-    path = MembraneSolver().run(own, law).path
-    starts = preparation._prolonged(own, fine, path)
-    alone = MembraneSolver().run(fine, law)
-    found = MembraneSolver().run(fine, law, guess=starts)
-    np.testing.assert_allclose(found.displacement, alone.displacement, atol=1e-6)
-    off = np.abs(starts - alone.path).max(axis=(1, 2)) / alone.path.max(axis=(1, 2))
-    assert off.max() < 0.1 and off[1::2].max() < 0.05
