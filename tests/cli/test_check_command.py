@@ -191,6 +191,10 @@ def test_mesh_of_a_bubble(bubble, drawn, golden):
     assert "--overwrite" in study(*run, cwd=bubble, code=2)
 
 
+def test_nu12_of_a_bubble(bubble, golden):
+    golden("study-nu12", study("nu12", "--out", "out", cwd=bubble), bubble)
+
+
 def test_nothing_that_ends_well_is_exit_code_4(bubble):
     card = MaterialCard(HypoelasticLaw(1000 * np.array([*TABLE_4_2[:11], -0.1])), 0.81)
     write_card(card, bubble / "bad.toml")
