@@ -21,15 +21,18 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 from .errors import NOTES, InputError, Note, OutputError, PlugInFailure, rows
 
 if TYPE_CHECKING:
     import jinja2
+    import pandas as pandas
 
+V = TypeVar("V")
 __version__ = "0.2.0"
 ROOT = Path(__file__).resolve().parent
 TEMPLATES = ROOT / "templates"
@@ -211,7 +214,7 @@ def write_text(path: Path | str, text: str) -> None:
 
 def json_text(content: Any) -> str:
     """Return plain values as a JSON file; a number that is not known (not finite) is null."""
-    return json.dumps(_known(content), indent=1, allow_nan=False) + "\n"
+    return json.dumps(known(content), indent=1, allow_nan=False) + "\n"
 
 
 def html_table(caption: str, header: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
@@ -224,12 +227,16 @@ def html_table(caption: str, header: Sequence[object], rows: Iterable[Sequence[o
     return f"<table>{said}<thead>{head}</thead><tbody>{''.join(lines)}</tbody></table>"
 
 
-def _known(value: Any) -> Any:
+def known(value: V) -> V:
+    """Return plain values with None for every number that is not finite."""
+    plain: Any = value
     if isinstance(value, Mapping):
-        return {key: _known(own) for key, own in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_known(own) for own in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        plain = {key: known(own) for key, own in value.items()}
+    elif isinstance(value, (list, tuple)):
+        plain = [known(own) for own in value]
+    elif isinstance(value, float) and not math.isfinite(value):
+        plain = None
+    return cast(V, plain)
 
 
 def remove_unfinished(folder: Path | str) -> None:
@@ -246,6 +253,19 @@ def remove_unfinished(folder: Path | str) -> None:
         with suppress(OSError):
             path.unlink()
 
+
+class Later:
+    """A heavy module that is imported when something of it is first asked for."""
+
+    def __init__(self, name: str) -> None:
+        self.module = name
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(import_module(self.module), name)
+
+
+if not TYPE_CHECKING:
+    pandas = Later("pandas")
 
 # Templates
 

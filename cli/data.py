@@ -37,9 +37,10 @@ from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run
+from ..runs.folder import write_table as write_frame
 from . import options as given
 from .options import check_out, columns_named, frame_options
-from .progress import CountProgress
+from .progress import LiveLine
 from .terminal import FILE, command, group, show, written_to
 
 
@@ -65,9 +66,9 @@ def check_command(**options: Any) -> None:
     """
     read = read_project(options["project"], given.data_folders(options["data"]))
     folder = given.folder_of(options, "check")
-    with CountProgress("steps", given.quiet(options)) as progress:
+    with LiveLine("steps", given.quiet(options)) as progress:
         found = check(
-            read, options["tests"] or None, options["trust"], out=folder, progress=progress.saw
+            read, options["tests"] or None, options["trust"], out=folder, progress=progress
         )
     show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
     if not found.sound:
@@ -274,13 +275,13 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         save(out.with_suffix(".png"), sphere_charts(drawn))
         result["out"] = [str(out), str(out.with_suffix(".png"))]
     known = "radius_mm" in result
-    head = ["frame", "points", "left out", "radius, mm", "+-", "centre, mm", "RMS, mm"]
-    cells = [[*head, *(["off, %"] if known else [])]]
-    for row in result["frames"]:
-        centre = ", ".join(f"{row[f'{axis}_mm']:.2f}" for axis in "xyz")
-        line = [row["frame"], str(row["points"]), str(row["left_out"]), f"{row['radius_mm']:.4f}"]
-        line += [f"{row['radius_error_mm']:.2g}", centre, f"{row['rms_mm']:.2g}"]
-        cells.append([*line, *([f"{row['deviation_percent']:+.2f}"] if known else [])])
+    columns = {
+        "frame": "{frame}", "points": "{points}", "left out": "{left_out}",
+        "radius, mm": "{radius_mm:.4f}", "+-": "{radius_error_mm:.2g}",
+        "centre, mm": "{x_mm:.2f}, {y_mm:.2f}, {z_mm:.2f}", "RMS, mm": "{rms_mm:.2g}",
+        **({"off, %": "{deviation_percent:+.2f}"} if known else {}),
+    }  # fmt: skip
+    cells = [[*columns], *([form.format(**row) for form in columns.values()] for row in rows)]
     widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
     lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
     if known:
@@ -393,8 +394,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}
     for name, table in tables.items():
-        with replacing(folder / f"{name}.csv") as path:
-            table.to_csv(path, index=False, float_format="%.9g")
+        write_frame(table, folder / f"{name}.csv")
     drawn = []
     for k, one in enumerate(found.histories):
         strain, model = one.history.strain - one.zero, None

@@ -18,7 +18,6 @@ from ..solvers.registry import command_line as solver_options
 from .terminal import COMMAND_LINE, FILE, FOLDER, Decorator
 
 if TYPE_CHECKING:
-    from ..materials.card import MaterialCard
     from ..project.project import Project
 
 Command = Callable[..., Any]
@@ -52,17 +51,14 @@ QUIET: Decorator = click.option("--quiet", is_flag=True, help="No progress.")
 
 
 def resume_option(words: str = "Keep the analyses that the output folder holds.") -> Decorator:
-    """Return --resume with its help."""
     return click.option("--resume", is_flag=True, help=words)
 
 
 def fail_above_option(words: str) -> Decorator:
-    """Return --fail-above with its help."""
     return click.option("--fail-above", type=float, metavar="E", help=words)
 
 
 def out_option(usual: str = "out/NAME") -> Decorator:
-    """Return --out, with the usual output folder in its help."""
     return click.option("--out", type=FOLDER, help=f"Output folder [{usual}].")
 
 
@@ -183,22 +179,6 @@ def with_solver(project: Project, given: Mapping[str, Any]) -> Project:
     if not given.get("cache", True):
         project = project.with_fit(cache=False)
     return project.with_solver(given["solver"], mine, given.get("settings", ()))
-
-
-def named_cards(cards: Sequence[Path]) -> dict[str, MaterialCard]:
-    """Read cards by name: the card's own, else its file's, with the path where two agree."""
-    from ..materials.card import read_card
-
-    named: dict[str, MaterialCard] = {}
-    for path in cards:
-        card = read_card(path)
-        name = card.name or path.stem
-        if name in named:
-            name = f"{name} ({path})"
-        if name in named:
-            raise InputError(path, "--card", "is given twice")
-        named[name] = card
-    return named
 
 
 def numbers(text: str, option: str) -> list[float]:

@@ -14,16 +14,15 @@ from ..errors import InputError, SolverFailure
 from ..experiments.kinds import Fabric, Place, Scales
 from ..experiments.registry import kind_named
 from ..materials.card import MaterialCard
-from ..project.project import Project, chosen_cards, read_project
+from ..project.project import Project, chosen_cards, named_cards, read_project
 from ..project.schema import FitSection, LawSection, usual_folder
 from ..readers.sections import first_error
-from ..runs.folder import KeptAnalyses
 from ..runs.predictions import measured_tests, predict
 from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from . import options as given
 from .options import command_line, data_folders, with_solver
-from .progress import CountProgress, SeriesProgress
+from .progress import LiveLine
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
@@ -62,11 +61,11 @@ def run_predictions(
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
-    with resumable(folder), CountProgress("runs", given.quiet(options)) as progress:
+    with resumable(folder), LiveLine("runs", given.quiet(options)) as progress:
         predictions = predict(
             project, tests, cards, samples=options["samples"], jobs=options["jobs"],
             scheduler=options["scheduler"], out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw, command_line=command_line(),
+            overwrite=options["overwrite"], progress=progress, command_line=command_line(),
         )  # fmt: skip
     predictions.report(folder)
     fail_above = options["fail_above"]
@@ -159,53 +158,49 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
     folder = given.result_folder(options, "simulated")
-    kept = KeptAnalyses(folder, options["resume"])
-    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
+    with resumable(folder), LiveLine("increments", options["as_json"]) as progress:
         done = simulate_cards(
-            project, tests, cards, folder, options["within_range"], progress.saw, command, kept
+            project,
+            tests,
+            cards,
+            folder,
+            options["within_range"],
+            progress,
+            command,
+            options["resume"],
         )
     show(done.numbers, [*done.lines, written_to(folder)], options["as_json"])
 
 
-@command(
-    "test",
+def simulation(name: str, words: str, kind: str | None, *lines: str) -> click.Command:
+    """Return the command that runs tests, of a kind or of any, with cards; words : its help."""
+
+    def run(**options: Any) -> None:
+        run_simulation(f"simulate {name}", options, kind)
+
+    run.__doc__ = words
+    return command(name, *lines)(card_options(run))
+
+
+FAILS = (
+    "Measurements are drawn beside them where they are there. A card whose analysis fails is named "
+    "and left out there; when nothing ends well the exit code is 4."
+)
+simulate_test = simulation(
+    "test", f"Run the tests of PROJECT.toml with one or several material cards.\n\n{FAILS}", None,
     "bubblefit simulate test project.toml --card out/project/material.toml",
     "bubblefit simulate test project.toml --test bubble --card one.toml --card two.toml",
-)
-@card_options
-def simulate_test(**options: Any) -> None:
-    """Run the tests of PROJECT.toml with the materials of one or several cards.
-
-    Measurements are drawn beside them where they are there. A card whose analysis fails in a test
-    is named and left out there; when nothing ends well the exit code is 4.
-    """
-    run_simulation("simulate test", options)
-
-
-@command(
-    "bubble",
+)  # fmt: skip
+simulate_bubble = simulation(
+    "bubble", "Inflate the bubbles of PROJECT.toml with one or several material cards.", "bubble",
     "bubblefit simulate bubble project.toml --card material.toml",
     "bubblefit simulate bubble project.toml --card material.toml --within-range",
-)
-@card_options
-def simulate_bubble(**options: Any) -> None:
-    """Inflate the bubbles of PROJECT.toml with the materials of one or several cards."""
-    run_simulation("simulate bubble", options, "bubble")
-
-
-@command(
-    "uniaxial",
+)  # fmt: skip
+simulate_uniaxial = simulation(
+    "uniaxial", f"Pull the strips of PROJECT.toml with one or several cards.\n\n{FAILS}", "strips",
     "bubblefit simulate uniaxial project.toml --card material.toml",
     "bubblefit simulate uniaxial project.toml --card a.toml --card b.toml --out out/both",
-)
-@card_options
-def simulate_uniaxial(**options: Any) -> None:
-    """Pull the strips of PROJECT.toml with the materials of one or several cards.
-
-    Measured curves are drawn beside them where they are there. A card whose analysis fails on a
-    strip is named and left out there; when nothing ends well the exit code is 4.
-    """
-    run_simulation("simulate uniaxial", options, "strips")
+)  # fmt: skip
 
 
 @command(
@@ -259,7 +254,7 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
             raise InputError(path, "--measured", "no such file")
     if options["measured"]:
         section["measured"] = {"files": [str(path) for path in options["measured"]]}
-    named = given.named_cards(options["cards"])
+    named = named_cards(options["cards"], {})
     project = _project(section, named)
     folder = options["out"] or Path("out") / f"bend-{diameter:g}mm-{pressure:g}kPa"
     run_predictions(project, folder, options, None, named)

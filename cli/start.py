@@ -138,7 +138,6 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
 
 
 def on_a_terminal() -> bool:
-    """Return True where questions can be answered on a terminal."""
     return sys.stdin.isatty()
 
 
@@ -188,7 +187,6 @@ def find_document(topic: str, known: Mapping[str, Path]) -> tuple[str, list[str]
 
 
 def title_of(page: Path) -> str:
-    """Return the first heading of a page."""
     lines = page.read_text(encoding="utf-8").splitlines()
     return next((line[2:] for line in lines if line.startswith("# ")), page.stem)
 

@@ -4,15 +4,15 @@ Each reads the project, calls one function of `runs` and ends with `_finish`."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError, Note
-from ..errors import lines as note_lines
+from ..errors import InputError
+from ..project.project import Project
 from ..runs import compare as laws
 from ..runs import validation, weights
 from ..runs.bootstrap import bootstrap
@@ -22,16 +22,35 @@ from ..runs.profile import profile
 from ..runs.refinement import Refined, refine
 from . import options as given
 from .fits import fit_options, settings_given
-from .progress import CountProgress, SeriesProgress, StudyProgress
+from .progress import LiveLine
 from .terminal import Decorator, command, group, resumable, show, written_to
 
 
-def _finish(
-    study: Any, folder: Path, options: Mapping[str, Any], notes: Sequence[Note] = ()
-) -> None:
-    """Print the lines of a study, or result.json with --json."""
-    lines = [*study.lines(), *note_lines(notes), written_to(folder)]
-    show(study.result, lines, options["as_json"])
+def run_study(
+    study: Callable[..., Any], name: str, project: Project, options: Mapping[str, Any],
+    progress: LiveLine, **own: Any,
+) -> None:  # fmt: skip
+    """Run a study into its output folder, and print its lines, or result.json with --json."""
+    folder = given.folder_of(options, name)
+    kept = {key: options[key] for key in ("resume",) if key in options}
+    with resumable(folder) if kept else nullcontext(), progress:
+        found = study(
+            project, tests=options["tests"] or None, out=folder, overwrite=options["overwrite"],
+            progress=progress, **kept, **own,
+        )  # fmt: skip
+    show(found.result, [*found.lines(), written_to(folder)], options["as_json"])
+
+
+def run_fits(
+    study: Callable[..., Any], name: str, options: Mapping[str, Any], starts: int,
+    **own: Any,
+) -> None:  # fmt: skip
+    """Run a study of several fits, each from `starts` unless the command says how many."""
+    project = settings_given(given.read_with_solver(options), options)
+    starts = options["starts"] or starts
+    progress = LiveLine("starts", given.quiet(options), starts)
+    common = {"starts": starts, "trust": options["trust"], "command_line": given.command_line()}
+    run_study(study, name, project, options, progress, **common, **own)
 
 
 # Studies of one fit: derivatives at its optimum, or further fits from there
@@ -82,13 +101,9 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
         name, equals, strains = text.partition("=")
         own = given.numbers(strains, "--modulus") if equals else common
         asked.setdefault(name, []).extend(own)
-    folder = given.folder_of(options, "profile")
-    with CountProgress("sides", given.quiet(options)) as progress:
-        found = profile(
-            project, asked or None, options["card"], options["tests"] or None, out=folder,
-            overwrite=options["overwrite"], progress=progress.saw,
-        )  # fmt: skip
-    _finish(found, folder, options)
+    progress = LiveLine("sides", given.quiet(options))
+    chosen = {"moduli": asked or None, "card": options["card"]}
+    run_study(profile, "profile", project, options, progress, **chosen)
 
 
 @command(
@@ -118,15 +133,9 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     optimum of the fit. Writes percentile bands of the moduli beside those of the fit:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
-    project = given.read_to_refit(options)
-    folder = given.folder_of(options, "bootstrap")
-    with resumable(folder), CountProgress("samples", given.quiet(options)) as progress:
-        done = bootstrap(
-            project, over, samples, options["card"], options["tests"] or None,
-            seed=options["seed"], out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw,
-        )  # fmt: skip
-    _finish(done, folder, options)
+    own = {"over": over, "samples": samples, "card": options["card"], "seed": options["seed"]}
+    progress = LiveLine("samples", given.quiet(options))
+    run_study(bootstrap, "bootstrap", given.read_to_refit(options), options, progress, **own)
 
 
 @command(
@@ -163,16 +172,11 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     Predicts one standard deviation of E1, E2 and G12 for each candidate beside the tests of
     PROJECT.toml, from derivatives at the fit's card. Writes plan.csv, report.html and result.json.
     """
-    project = given.read_with_solver(options)
-    folder = given.folder_of(options, "plan")
-    with CountProgress("tests", given.quiet(options)) as progress:
-        made = plan(
-            project, options["card"], options["tests"] or None,
-            strain=None if strain is None else given.numbers(strain, "--strain"),
-            rank=options["rank"], specimens=options["specimens"], noise=dict(map(_noise, noises)),
-            out=folder, overwrite=options["overwrite"], progress=progress.saw,
-        )  # fmt: skip
-    _finish(made, folder, options)
+    own = {name: options[name] for name in ("card", "rank", "specimens")}
+    own["strain"] = None if strain is None else given.numbers(strain, "--strain")
+    own["noise"] = dict(map(_noise, noises))
+    progress = LiveLine("tests", given.quiet(options))
+    run_study(plan, "plan", given.read_with_solver(options), options, progress, **own)
 
 
 def _noise(text: str) -> tuple[str, float]:
@@ -200,24 +204,15 @@ def _noise(text: str) -> tuple[str, float]:
     "--fold-starts", type=click.IntRange(min=1), default=2, show_default=True, help="Of each fold."
 )
 @fit_options
-def compare_command(forms: tuple[str, ...], folds: int, fold_starts: int, **options: Any) -> None:
+def compare_command(**options: Any) -> None:
     """Fit every form of the moduli to the tests of PROJECT.toml and cross-validate it.
 
     Each form from a few starts [5]; the error at specimens that were left out of the fit shows
     whether more coefficients pay. Writes comparison.csv, figures, report.html and result.json, and
     a folder for each form, into the output folder.
     """
-    folder = given.folder_of(options, "compared")
-    project = given.read_with_solver(options)
-    starts = options["starts"] or laws.STARTS
-    with StudyProgress(starts, given.quiet(options), "{} moduli") as progress:
-        comparison = laws.compare(
-            settings_given(project, options), options["tests"] or None, forms, folds=folds,
-            starts=starts, fold_starts=fold_starts, trust=options["trust"], out=folder,
-            resume=options["resume"], overwrite=options["overwrite"], progress=progress.saw,
-            command_line=given.command_line(),
-        )  # fmt: skip
-    _finish(comparison, folder, options, comparison.notes)
+    own = {name: options[name] for name in ("forms", "folds", "fold_starts")}
+    run_fits(laws.compare, "compared", options, laws.STARTS, **own)
 
 
 @command(
@@ -255,24 +250,10 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
         _one_of(path, {"--form": forms, "--weights": counted})
-    name = "validated" if counted is None else "weights"
-    folder = given.folder_of(options, name)
-    tests, project = options["tests"] or None, given.read_with_solver(options)
-    project = settings_given(project, options)
-    starts = options["starts"] or (validation if counted is None else weights).STARTS
-    study: Any
-    with resumable(folder), StudyProgress(starts, given.quiet(options)) as progress:
-        common: dict[str, Any] = {
-            "starts": starts, "trust": options["trust"], "out": folder,
-            "resume": options["resume"], "overwrite": options["overwrite"],
-            "progress": progress.saw, "command_line": given.command_line(),
-        }  # fmt: skip
-        if counted is not None:
-            study = weights.weights(project, counted, tests, **common)
-        else:
-            common |= {"cards": cards, "leave": leave or validation.TESTS}
-            study = validation.validate(project, tests, forms, **common)
-    _finish(study, folder, options, study.notes)
+        run_fits(weights.weights, "weights", options, weights.STARTS, counted=counted)
+        return
+    own = {"forms": forms, "cards": cards, "leave": leave or validation.TESTS}
+    run_fits(validation.validate, "validated", options, validation.STARTS, **own)
 
 
 def _one_of(path: Path, asked: Mapping[str, object]) -> None:
@@ -311,16 +292,13 @@ card_options = given.with_checks(
 )  # fmt: skip
 
 
-def run_study(name: str, study: Callable[..., Any], options: dict[str, Any]) -> None:
+def run_with_card(
+    name: str, study: Callable[..., Any], options: dict[str, Any], **own: Any
+) -> None:
     """Read the project, run the study of a card, write its folder and print its lines."""
     project = given.read_with_solver(options, need_data=False)
-    folder = given.folder_of(options, name)
-    with resumable(folder), SeriesProgress(options["as_json"]) as progress:
-        done = study(
-            project, options["card"], tests=options["tests"], out=folder, resume=options["resume"],
-            overwrite=options["overwrite"], progress=progress.saw,
-        )  # fmt: skip
-    _finish(done, folder, options)
+    progress = LiveLine("increments", options["as_json"])
+    run_study(study, name, project, options, progress, card=options["card"], **own)
 
 
 @command(
@@ -354,7 +332,7 @@ def study_mesh(what: Refined, **options: Any) -> None:
     """
     asked = {name: options[name] for name in ("levels", "factor", "coarser")}
     name = what if what == "increments" else "mesh"
-    run_study(name, functools.partial(refine, what=what, **asked), options)
+    run_with_card(name, refine, options, what=what, **asked)
 
 
 @command(
@@ -374,7 +352,7 @@ def study_nu12(values: tuple[float, ...], **options: Any) -> None:
     values. A value whose analysis fails is named and left out; when the card's own fails, or all
     others do, the exit code is 4.
     """
-    run_study("nu12", functools.partial(vary_nu12, values=values or NU12), options)
+    run_with_card("nu12", vary_nu12, options, values=values or NU12)
 
 
 for one in (study_mesh, study_nu12):

@@ -218,7 +218,6 @@ class Suggesting(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return what click returns."""
         name = args[0]
         known = self.list_commands(ctx)
         if name not in known and not name.startswith("-") and not ctx.resilient_parsing:
@@ -304,7 +303,6 @@ class Stderr(logging.Handler):
     """Write to the stderr of the moment, so that a live line of progress stays below."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print one line a record."""
         own = WARNING if record.levelno >= logging.WARNING else TIMED
         print(own.format(record), file=sys.stderr, flush=True)
 

@@ -101,6 +101,12 @@ class FitProblem:
         sizes = [sum(c.objective.sizes) for c in self.comparisons]
         return slice(sum(sizes[:number]), sum(sizes[: number + 1]))
 
+    def norms(self, residual: Array) -> dict[str, Array]:
+        """Return the norms of the blocks of each comparison by name; those of priors left out."""
+        ends = np.cumsum([len(c.objective.sizes) for c in self.comparisons])
+        each = np.split(self.blocks.norms(residual), ends)
+        return {c.name: own for c, own in zip(self.comparisons, each, strict=False)}
+
     def with_solvers(self, solvers: Sequence[Solver]) -> FitProblem:
         """Return the same problem for other solvers, one a comparison: a surrogate."""
         pairs = zip(self.comparisons, solvers, strict=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +15,13 @@ from ..experiments.bubble.findings import registration_line, registration_number
 from ..experiments.bubble.prepared import read_measured
 from ..experiments.bubble.registration import Registration
 from ..experiments.kinds import Fabric
+from ..files import pandas as pd
 from ..readers.bending import read_bending_curves
 from ..readers.curves import read_load_curves
 from ..readers.frames import QUANTITIES, FrameOptions, read_frames
 from ..readers.sections import LENGTH_UNITS
 from .objects import Biaxial, Bubble, Files, Numbers, file_names
 from .project import Project
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def read(files: Files, of: str | None = None, **how: Any) -> pd.DataFrame:
@@ -51,8 +49,6 @@ def read(files: Files, of: str | None = None, **how: Any) -> pd.DataFrame:
 
 
 def _frames(paths: Sequence[Path], length_unit: str = "mm", **how: Any) -> pd.DataFrame:
-    import pandas as pd
-
     format, scale = how.pop("format", None), LENGTH_UNITS[length_unit]
     options = FrameOptions(("x", "y", "dx", "dy", "dz"), length_scale=scale, **how)
     tables = [
@@ -64,19 +60,20 @@ def _frames(paths: Sequence[Path], length_unit: str = "mm", **how: Any) -> pd.Da
     return pd.concat(tables, ignore_index=True)
 
 
-def _curves(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
-    curves = [curve for path in paths for curve in read_load_curves(path, **how)]
-    return _stacked(curves, ("direction", "specimen", "elongation", "load"))
+def _of_curves(
+    read: Callable[..., Iterable[Any]], names: Sequence[str]
+) -> Callable[..., pd.DataFrame]:
+    def table(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
+        curves = [curve for path in paths for curve in read(path, **how)]
+        return pd.concat(
+            [pd.DataFrame({name: getattr(curve, name) for name in names}) for curve in curves],
+            ignore_index=True,
+        )
 
-
-def _bending(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
-    curves = [curve for path in paths for curve in read_bending_curves(path, **how)]
-    return _stacked(curves, ("repetition", "deflection", "load"))
+    return table
 
 
 def _biaxial(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
-    import pandas as pd
-
     tables = []
     for one in (read_biaxial_table(path, **how) for path in paths):
         values = np.column_stack([one.load, one.strain])
@@ -86,17 +83,11 @@ def _biaxial(paths: Sequence[Path], **how: Any) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def _stacked(curves: Sequence[Any], names: Sequence[str]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.concat(
-        [pd.DataFrame({name: getattr(curve, name) for name in names}) for curve in curves],
-        ignore_index=True,
-    )
-
-
 READERS: dict[str, Callable[..., pd.DataFrame]] = {
-    "bubble": _frames, "strips": _curves, "biaxial": _biaxial, "cylinder": _bending,
+    "bubble": _frames,
+    "strips": _of_curves(read_load_curves, ("direction", "specimen", "elongation", "load")),
+    "biaxial": _biaxial,
+    "cylinder": _of_curves(read_bending_curves, ("repetition", "deflection", "load")),
 }  # fmt: skip
 
 
@@ -110,7 +101,6 @@ class Registered:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return plain values."""
         return registration_numbers(self.registration)
 
     def __str__(self) -> str:

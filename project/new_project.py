@@ -48,7 +48,6 @@ def write_project(
 def project_text(
     tests: Mapping[str, int], name: str, thickness: float, form: str, **said: Any
 ) -> str:
-    """Return the text of a project file, see `write_project`."""
     values = {**USUAL, **{key: value for key, value in said.items() if value is not None}}
     values["deflection"] = 1.6 * values["diameter"]
     asked = [kind for kind, count in tests.items() if count]

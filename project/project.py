@@ -69,14 +69,13 @@ class Written:
     """The words of a project file, in its own units.
     common : [fabric] and [units]. tests : the section of each test by its name, with the folder of
     its data, without defaults (which need not go with each other when they are said). whole : each
-    with its defaults. kinds : of the tests, by name. cards : each [[card]]. made : the objects that
+    with its defaults. cards : each [[card]]. made : the objects that
     the tests are of, by name, with arrays and cards in files below `held`; none of a file."""
 
     text: str
     common: Mapping[str, Any]
     tests: Mapping[str, Settings]
     whole: Mapping[str, Settings]
-    kinds: Mapping[str, str]
     cards: Sequence[Settings] = ()
     made: Mapping[str, Definition] = field(default_factory=dict)
     held: Path | None = None
@@ -123,7 +122,7 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
         settings["solver"] = {project.fit.solver: options}
     for name in tests:
         if name in written.tests:  # the others were made from Python, beside the file
-            settings.setdefault(written.kinds[name], []).append(written.tests[name])
+            settings.setdefault(project.tests[name].kind, []).append(written.tests[name])
     return settings
 
 
@@ -259,7 +258,7 @@ class Project:
         """Return the tests as objects, by name; those of a file with the folder of their data."""
         if (written := self.written) is None:
             return {}
-        return {name: written.made.get(name) or _definition(written.kinds[name], said, self.scales)
+        return {name: written.made.get(name) or _definition(self.tests[name], said, self.scales)
                 for name, said in written.tests.items()}  # fmt: skip
 
     @property
@@ -367,15 +366,14 @@ class Project:
             own = tests[name]
             own_kind = isinstance(own, OwnTest)
             tests[name] = own.changed(weight=w) if own_kind else replace(own, weight=float(w))
-        written = self.written
-        if written is not None:
-            said, whole = (
-                {name: {**own, **({"weight": given[name]} if name in given else {})}
-                 for name, own in sections.items()}
-                for sections in (written.tests, written.whole)
-            )  # fmt: skip
-            objects = {name: made.get(name, own) for name, own in written.made.items()}
-            written = replace(written, tests=said, whole=whole, made=objects)
+        if (written := self.written) is None:
+            return replace(self, tests=tests)
+        said, whole = (
+            {n: {**own, "weight": given[n]} if n in given else own for n, own in sections.items()}
+            for sections in (written.tests, written.whole)
+        )
+        objects = {name: made.get(name, own) for name, own in written.made.items()}
+        written = replace(written, tests=said, whole=whole, made=objects)
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:
@@ -477,16 +475,16 @@ def _project(
     return Project(
         path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
         cards=read_cards(place, file.card), solver_options=solver_settings(path, file.solver),
-        written=_written(file, path, text, tests, data, made),
+        written=_written(file, path, text, data, made),
     )  # fmt: skip
 
 
-def _definition(kind: str, said: Settings, scales: Scales) -> Definition:
+def _definition(test: Test, said: Settings, scales: Scales) -> Definition:
     """Return a test of a file as an object, its numbers in mm, N and MPa."""
-    own = kind_named(kind)
+    own = kind_named(test.kind)
     if (text_units := getattr(own, "with_units", None)) is not None:
         said = text_units(said, scales)
-    return definition_of(kind, in_base_units(own.section, said, scales))
+    return definition_of(test.kind, in_base_units(own.section, said, scales))
 
 
 def _card_tables(
@@ -529,8 +527,7 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
 
 
 def _written(
-    file: ProjectFile, path: Path, text: str, tests: Mapping[str, Test], data: Folders | None,
-    made: Sequence[Definition],
+    file: ProjectFile, path: Path, text: str, data: Folders | None, made: Sequence[Definition],
 ) -> Written:  # fmt: skip
     sections, whole = {}, {}
     objects: dict[str, Definition] = {}
@@ -546,8 +543,7 @@ def _written(
         objects |= dict(zip(_names(name, own), given, strict=bool(made)))
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
-    by_kind = {name: test.kind for name, test in tests.items()}
-    return Written(text, common, sections, whole, by_kind, cards, objects)
+    return Written(text, common, sections, whole, cards, objects)
 
 
 def _reads(test: Test) -> bool:
@@ -561,41 +557,42 @@ def _names(kind: str, sections: Sequence[Any]) -> list[str]:
     return [s.name or (kind if alone else f"{kind} {i}") for i, s in enumerate(sections, start=1)]
 
 
-def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
-    """Return cards by name: those given, else the project's, else that of its fit; InputError."""
-    if isinstance(cards, Mapping):
-        return dict(cards)
-    own = {name: named.card for name, named in project.cards.items()}
-    if not cards and not own:
-        fitted = usual_folder(project.path) / FITTED
-        if not is_file(fitted):
-            problem = f"the project has no card and there is none in {fitted}: fit first "
-            problem += "(bubblefit fit), name a card's file with --card, or add [[card]]"
-            raise InputError(project.path, "card", problem)
-        card = read_card(fitted)
-        return {card.name or fitted.stem: card}
-    if not cards:
-        return own
-    chosen = {name: card for name, card in own.items() if name in map(str, cards)}
-    for given in cards:
-        if str(given) in own:
-            continue
-        if not is_file(Path(given)):
-            problem = f"there is no card (and no file) {str(given)!r}; the project has: "
-            raise InputError(project.path, "--card", problem + (", ".join(own) or "none"))
-        if list(map(str, cards)).count(str(given)) > 1:
-            raise InputError(Path(given), "--card", "is given twice")
-        card = read_card(Path(given))
-        name = card.name or Path(given).stem
-        chosen[f"{name} ({given})" if name in chosen else name] = card
-    return chosen
+def fitted_card(project: Project) -> Path:
+    """Return the file of the card that the project's fit leaves in its usual folder."""
+    return usual_folder(project.path) / FITTED
 
 
 def card_sources(project: Project, cards: Cards = None) -> list[str | Path] | None:
     """Return names in the project and files of `chosen_cards`; None where Python gave them."""
     if isinstance(cards, Mapping):
         return None
-    if not cards:
-        return list(project.cards) or [usual_folder(project.path) / FITTED]
-    named = [name for name in project.cards if name in map(str, cards)]
-    return [*named, *(card for card in cards if str(card) not in project.cards)]
+    given = cards or list(project.cards) or [fitted_card(project)]
+    named = [name for name in project.cards if name in map(str, given)]
+    return [*named, *(card for card in given if str(card) not in project.cards)]
+
+
+def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCard]:
+    """Return cards by name: those given, else the project's, else that of its fit; InputError."""
+    if isinstance(cards, Mapping):
+        return dict(cards)
+    sources = card_sources(project, cards) or []
+    files = [Path(one) for one in sources if str(one) not in project.cards]
+    for path in files:
+        if not is_file(path):
+            problem = f"there is no card (and no file) {str(path)!r}; the project has: "
+            problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "
+            raise InputError(project.path, "--card", problem + "card's file, or add [[card]]")
+    own = {name: named.card for name, named in project.cards.items() if name in sources}
+    return named_cards(files, own)
+
+
+def named_cards(files: Sequence[Path], own: Mapping[str, MaterialCard]) -> dict[str, MaterialCard]:
+    """Return cards, beside `own`, by their names or their files', the path where two agree."""
+    named = dict(own)
+    for path in files:
+        if files.count(path) > 1:
+            raise InputError(path, "--card", "is given twice")
+        card = read_card(path)
+        name = card.name or path.stem
+        named[f"{name} ({path})" if name in named else name] = card
+    return named

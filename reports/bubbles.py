@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,12 +24,8 @@ AXES = (("Cut along the warp", "x, mm"), ("Cut along the fill", "y, mm"))
 ENOUGH = 5
 
 
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """Deformed positions along an axis and heights above the reference plane, (k,) mm each."""
-
-    position: Array
-    height: Array
+#: Deformed positions along an axis and heights above the reference plane, (k,) mm each.
+Cut = tuple[Array, Array]
 
 
 def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
@@ -66,7 +61,7 @@ def _on_axis(xy: Array, axis: int) -> NDArray[np.bool_]:
 
 def _sorted(along: Array, displacement: Array, axis: int) -> Cut:
     order = np.argsort(along)
-    return Cut((along + displacement[:, axis])[order], displacement[order, 2])
+    return (along + displacement[:, axis])[order], displacement[order, 2]
 
 
 def chosen(count: int) -> list[int]:
@@ -103,10 +98,9 @@ def cut_charts(
         series: list[Series] = []
         for rank, k in zip(ranks(len(numbers)), numbers, strict=True):
             cut, words = node_cut(points, shown[k], axis), kilo(frames[k])
-            series.append(line(words, cut.position, cut.height, rank=rank))
+            series.append(line(words, *cut, rank=rank))
             if measured:
-                spots = point_cut(*measured[k], axis)
-                series.append(dots(words, spots.position, spots.height, rank=rank))
+                series.append(dots(words, *point_cut(*measured[k], axis), rank=rank))
         what = "modelled and measured " if measured else ""
         alt = f"{title}: heights {what}at {len(numbers)} pressures"
         charts.append(Chart(title, label, "height z, mm", series, alt))

@@ -117,18 +117,11 @@ class Report:
 
     @property
     def parts(self) -> Iterator[Part]:
-        """Parts of all sections, in order."""
         return (part for section in self.sections for part in section.parts)
 
     @property
     def tables(self) -> list[Table]:
-        """Tables of all sections, in order."""
         return [part for part in self.parts if isinstance(part, Table)]
-
-    @property
-    def figures(self) -> list[tuple[str, str]]:
-        """File and caption of the pictures of all sections, in order."""
-        return [(part.file, part.caption) for part in self.parts if isinstance(part, Picture)]
 
 
 @dataclass(frozen=True, eq=False)

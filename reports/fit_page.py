@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from ..errors import NOTES, NOTES_ARE, InputError
 from ..experiments.kinds import Findings, FittedTest, Output, by_strain
 from ..experiments.registry import report_of
-from ..files import __version__, replacing, write_notes
+from ..files import __version__, write_notes
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
 from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
-from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store
+from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
 from ..runs.result import USABLE, Fit, answers, next_step, reaches
 from .charts import Chart, Charts, dots, line
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
@@ -358,8 +358,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
     tables = {MODULI: fit.moduli(), COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
     for name, table in tables.items():
-        with replacing(folder / name) as path:
-            table.to_csv(path, index=False, float_format="%.9g")
+        write_table(table, folder / name)
     write_notes(folder, fit.notes)
     page = write_report(folder, _page(fit, folder))
     store.finish(fit.result)

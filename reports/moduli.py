@@ -26,8 +26,6 @@ NOT_DETERMINED = 1000.0
 SMALLEST = 1e-3
 #: Times what the curves need, to which an axis is stretched for a band.
 MOST = 3.0
-#: Of the percentiles of a bootstrap, which are two curves.
-SAMPLES = "percentiles of the samples"
 
 
 def moduli_charts(
@@ -53,7 +51,7 @@ def moduli_charts(
             series.append(line("known", x[m], truth[m], colour=1, dashes=1))
             drawn.append(truth[m].max())
         first, *_, last = fits[0, m]
-        top, cut = _top(1.12 * float(max(drawn)), () if own is None else own[1])
+        top, cut = axis_top(1.12 * float(max(drawn)), () if own is None else own[1])
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
@@ -61,7 +59,7 @@ def moduli_charts(
     return Charts("moduli", charts, caption, columns=3)
 
 
-def _top(curves: float, upper: ArrayLike) -> tuple[float, str]:
+def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
     """Return the end of the axis, and words where the band goes beyond `MOST` of the curves'."""
     band = np.asarray(upper, dtype=float)
     high = float(band[np.isfinite(band)].max(initial=0.0))
@@ -122,22 +120,3 @@ def pinned_charts(strains: ArrayLike, sigma: Mapping[str, ArrayLike], caption: s
         charts.append(Chart(title, label, up, series + marks, alt, log_y=True, level=level))
     words = f"{caption}; above {NOT_DETERMINED:g} % a modulus is not determined: triangles"
     return Charts("pinned", charts, words)
-
-
-def bootstrap_charts(
-    strains: Mapping[str, Array], best: Mapping[str, Array], samples: Mapping[str, Array],
-    fit: Mapping[str, Array], caption: str,
-) -> Charts:  # fmt: skip
-    """Return moduli (n,) MPa with the ends (2, n) of samples and of the fit's band."""
-    charts = []
-    for (title, label), name in zip(PANELS, strains, strict=True):
-        x, low, high = PERCENT * strains[name], samples[name][0], samples[name][1]
-        series = [
-            line("fit, with its band by the noise", x, best[name], (fit[name][0], fit[name][1])),
-            line(SAMPLES, x, low, colour=1, dashes=1),
-            line(SAMPLES, x, high, colour=1, dashes=1),
-        ]
-        top, cut = _top(1.08 * max(float(best[name].max()), float(high.max())), fit[name][1])
-        alt = f"{title}: at rest {best[name][0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
-    return Charts("bootstrap", charts, caption)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -16,10 +15,10 @@ from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
-from ..files import __version__, json_text, replacing, write_notes, write_text
+from ..files import __version__, json_text, write_notes, write_text
 from ..inference.posterior import LEVEL
 from ..runs.fit import Check
-from ..runs.folder import DIGITS, PROVENANCE, RESULT, RUN, RUNS, Record, Store
+from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
 from ..runs.predictions import Predictions
 from ..runs.result import answers
 from ..runs.starts import HISTORY, STARTS, RunningFiles
@@ -53,8 +52,7 @@ def write_predictions(predictions: Predictions, folder: Path) -> Path:
         for kind, (outcome, _) in predictions.outcomes.items()
     }
     write_notes(folder, predictions.notes)
-    with replacing(folder / RUNS_TABLE) as path:
-        predictions.runs().to_csv(path, index=False)
+    write_table(predictions.runs(), folder / RUNS_TABLE, None)
     page = write_report(folder, _page(predictions, exhibits))
     Store(folder).finish(predictions.result)
     return page
@@ -254,6 +252,7 @@ def write_constants(
     return write_report(folder, report)
 
 
+NOTHING = Words(["Nothing is recorded of what this is of."])
 UNFINISHED = (
     "Unfinished: there is no result yet, only what was recorded so far; --resume continues."
 )
@@ -275,14 +274,16 @@ def page_of_folder(folder: Path) -> Report:
     within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
     if not (folder / RUN).exists() and not within:
         raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
-    project = _provenance(folder).get("project", {})
-    named = project.get("file") if isinstance(project, dict) else None
+    record, shown = Record.read(folder), list[Part]([NOTHING])
+    if record is not None:
+        with suppress(AttributeError, KeyError, TypeError):  # damaged by another hand
+            shown = [*record_tables(record)]
     return Report(
-        title=f"{Path(str(named)).name if named else folder.resolve().name}: unfinished",
+        title=f"{folder.resolve().name if record is None else record.project.name}: unfinished",
         summary=UNFINISHED,
         sections=[
             Section("So far", [*_starts(folder), *_runs(folder), *within]),
-            Section("The record", _record(folder)),
+            Section("The record", shown),
         ],
     )
 
@@ -309,27 +310,3 @@ def _runs(folder: Path) -> list[Part]:
     """Return the number of predictions that are kept."""
     kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
     return [Facts([("runs that ended", len(kept))])] if kept else []
-
-
-def _provenance(folder: Path) -> dict[str, Any]:
-    """Read the provenance of the results; empty where it is missing or damaged."""
-    try:
-        content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def _record(folder: Path) -> list[Part]:
-    content = _provenance(folder)
-    if not content:
-        return [Words(["Nothing is recorded of what this is of."])]
-    rows: list[list[object]] = [["project file", str(content.get("project", {}).get("file", ""))]]
-    for run in content.get("runs", []):
-        rows.append(["command", " ".join(map(str, run.get("command_line") or ["Python"]))])
-        rows.append(["begun", str(run.get("date", ""))])
-    rows += [
-        [f"data: {row.get('name')}", f"sha256 {str(row.get('sha256', ''))[:DIGITS]} …"]
-        for row in content.get("data", [])
-    ]
-    return [Table("What it is of", ["", ""], rows, text=(1,))]

@@ -49,28 +49,6 @@ class StripCurves:
     rms: Sequence[float] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class OrderErrors:
-    """One direction's polynomials by order: RMSE and leave-one-out error (k,) N, the choice."""
-
-    direction: str
-    orders: Sequence[int]
-    rmse: ArrayLike
-    left_out: ArrayLike
-    chosen: int
-
-
-@dataclass(frozen=True, eq=False)
-class BiaxialPanel:
-    """One ratio: the larger load (n,) kN/m and the strains (n, 2) % along warp and fill; models by
-    name with loads and strains of their own, best first."""
-
-    ratio: str
-    load: ArrayLike
-    strain: ArrayLike
-    models: Sequence[tuple[str, ArrayLike, ArrayLike]] = ()
-
-
 def load_charts(name: str, curves: Sequence[StripCurves], caption: str = "") -> Charts:
     """Return loads over elongation, and differences from the polynomial, else the points."""
     # The same model has the same colour in every chart.
@@ -155,24 +133,22 @@ def specimen_charts(
     return Charts("curves", charts, "")
 
 
-def order_charts(directions: Sequence[OrderErrors]) -> Charts:
-    """Return RMSE and leave-one-out error over the order; a ring is the chosen one."""
-    charts = []
-    for row in directions:
-        errors = [np.asarray(values, dtype=float) for values in (row.rmse, row.left_out)]
-        words, log = ("RMSE of the fit", "leave-one-out error"), spans_a_decade(errors)
-        series = [
-            line(name, row.orders, values, colour=k, marks=True)
-            for k, (name, values) in enumerate(zip(words, errors, strict=True))
-        ]
-        at = list(row.orders).index(row.chosen) if row.chosen in row.orders else None
-        if at is not None:
-            both = [own[at] for own in errors]
-            series.append(dots("chosen order", [row.chosen] * 2, both, colour=3, hollow=True))
-        title = f"{TITLES.get(row.direction, row.direction)}: order {row.chosen}"
-        axes = "order of the polynomial", "error of the load, N"
-        charts.append(Chart(title, *axes, series, title, log_y=log, from_zero=not log))
-    return Charts("orders", charts, "")
+def order_chart(
+    direction: str, orders: Sequence[int], rmse: ArrayLike, left_out: ArrayLike, chosen: int
+) -> Chart:
+    """Return RMSE and leave-one-out error (k,) N over the order; a ring is the chosen one."""
+    errors = [np.asarray(values, dtype=float) for values in (rmse, left_out)]
+    words, log = ("RMSE of the fit", "leave-one-out error"), spans_a_decade(errors)
+    series = [
+        line(name, orders, values, colour=k, marks=True)
+        for k, (name, values) in enumerate(zip(words, errors, strict=True))
+    ]
+    if chosen in orders:
+        both = [own[list(orders).index(chosen)] for own in errors]
+        series.append(dots("chosen order", [chosen] * 2, both, colour=3, hollow=True))
+    title = f"{TITLES.get(direction, direction)}: order {chosen}"
+    axes = "order of the polynomial", "error of the load, N"
+    return Chart(title, *axes, series, title, log_y=log, from_zero=not log)
 
 
 def strip_charts(
@@ -245,18 +221,19 @@ def cycle_charts(
     return Charts("cycles", charts, "Load over strain; unloading dashed")
 
 
-def biaxial_charts(name: str, panels: Sequence[BiaxialPanel], caption: str = "") -> Charts:
-    """Return the strains of both yarns over the larger load, a chart a ratio."""
-    charts = []
-    for panel in panels:
-        series: list[Series] = []
-        for k, yarn in enumerate(YARNS):
-            measured = np.asarray(panel.strain)[:, k]
-            series.append(dots(f"{yarn}, measured", panel.load, measured, colour=k))
-        for rank, (model, load, strain) in enumerate(panel.models):
-            for k, yarn in enumerate(YARNS):
-                own = np.asarray(strain)[:, k]
-                series.append(line(f"{yarn}, {model}", load, own, colour=k, dashes=rank))
-        alt = f"ratio {panel.ratio}: strains along warp and fill over the larger load"
-        charts.append(Chart(f"ratio {panel.ratio}", "larger load, kN/m", "strain, %", series, alt))
-    return Charts(name, charts, caption)
+def ratio_chart(
+    ratio: str, load: ArrayLike, strain: ArrayLike,
+    models: Sequence[tuple[str, ArrayLike, ArrayLike]] = (),
+) -> Chart:  # fmt: skip
+    """Return the strains (n, 2) % along warp and fill over the larger load (n,) kN/m of a ratio.
+    models : by name, with loads and strains of their own, best first."""
+    measured = np.asarray(strain)
+    series = [dots(f"{yarn}, measured", load, measured[:, k], colour=k)
+              for k, yarn in enumerate(YARNS)]  # fmt: skip
+    series += [
+        line(f"{yarn}, {model}", at, np.asarray(own)[:, k], colour=k, dashes=rank)
+        for rank, (model, at, own) in enumerate(models)
+        for k, yarn in enumerate(YARNS)
+    ]
+    alt = f"ratio {ratio}: strains along warp and fill over the larger load"
+    return Chart(f"ratio {ratio}", "larger load, kN/m", "strain, %", series, alt)

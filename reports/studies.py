@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..materials.forms.base import COMPONENTS
+from ..runs.bootstrap import Bootstrap
+from ..runs.compare import FormFit
+from ..runs.plan import Plan
+from ..runs.poisson import Nu12Study
+from ..runs.profile import Profile
+from ..runs.refinement import Level, Refinement, ended, largest_load, rms_changes
+from ..runs.validation import Validation
+from ..runs.weights import PLACES, WeightStudy
 from .charts import TITLES, Chart, Charts, Series, dots, line, spans_a_decade
+from .moduli import MODULUS, PANELS, PERCENT, axis_top
 
 #: What a perfect fit (zero) is drawn as on a logarithmic axis.
 PERFECT = 1e-16
@@ -30,44 +39,6 @@ AS_WRITTEN = 1.0
 ROOM, POINTS = 1.6, 81
 
 
-@dataclass(frozen=True, eq=False)
-class ConvergencePanel:
-    """One model of a study of refinement; sizes, work and seconds are (levels,), coarse to fine.
-    changes : by quantity, (levels - 1,) percent, from each level to the next finer one. work :
-    element-increments. seconds : wall clock."""
-
-    name: str
-    sizes: Sequence[float]
-    changes: Mapping[str, Sequence[float]]
-    work: Sequence[float]
-    seconds: Sequence[float]
-
-
-@dataclass(frozen=True, eq=False)
-class LawRow:
-    """Errors of one form of the law: of the fit, cross-validated, and of every fold; or NaN."""
-
-    name: str
-    coefficients: int
-    fitted: float
-    validated: float = float("nan")
-    folds: ArrayLike = ()
-
-
-@dataclass(frozen=True, eq=False)
-class ProfilePanel:
-    """One modulus at one strain: MPa, -2 log L; ends None where the curve does not pass the line.
-    sigma : MPa, one standard deviation; band : MPa, within the bounds."""
-
-    title: str
-    values: Sequence[float]
-    ratios: Sequence[float]
-    best: float
-    sigma: float
-    ends: tuple[float | None, float | None]
-    band: tuple[float, float]
-
-
 def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     """Return the optima (starts,), worst to best; starts without one (NaN) are counted."""
     values = np.atleast_1d(np.asarray(objectives, dtype=float))
@@ -83,24 +54,33 @@ def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
     return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")
 
 
-def convergence_charts(models: Sequence[ConvergencePanel], what: str, caption: str) -> Charts:
+def convergence_charts(study: Refinement, caption: str) -> Charts:
     """Return the changes of each model under refinement, with slopes 1 and 2, and the cost."""
-    charts = [_changes(model, SIZES[what]) for model in models]
+    every = {TITLES.get(name, name): ended(runs) for name, runs in study.runs.items()}
+    charts = [_changes(title, good, SIZES[study.what]) for title, good in every.items()]
     cost = [
-        line(TITLES.get(m.name, m.name), m.work, m.seconds, colour=rank, marks=True)
-        for rank, m in enumerate(models)
-    ]
+        line(title, [run.elements * run.part.increments for run in good],
+             [run.seconds for run in good], colour=rank, marks=True)
+        for rank, (title, good) in enumerate(every.items())
+    ]  # fmt: skip
     across, alt = "elements × increments", "wall clock over elements times increments"
     charts.append(Chart("cost", across, "seconds", cost, alt, log_y=True, log_x=True))
     words = f"{caption}. Grey: what falls with the first and the second power of the size"
     return Charts("convergence", charts, f"{words}; changes below {SMALLEST:g} % are not drawn.")
 
 
-def _changes(model: ConvergencePanel, size: str) -> Chart:
-    sizes = np.asarray(model.sizes[:-1], dtype=float)
-    loads = [name for name in model.changes if re.match(SERIES, name)]
+def _changes(title: str, good: Sequence[Level], size: str) -> Chart:
+    """Return the relative changes of one model, from each level that ended to the next finer."""
+    sizes = np.array([run.size for run in good[:-1]])
+    every = [run.values or {} for run in good]
+    changes = {
+        quantity: 100 * np.abs(np.diff([own.get(quantity, np.nan) for own in every]) / last)
+        for quantity, last in (every[-1] if every else {}).items()
+    }
+    if rms := rms_changes(good):
+        changes["RMS along the load curve"] = 100 * np.array(rms) / largest_load(good)
+    loads = [name for name in changes if re.match(SERIES, name)]
     rising = dict(zip(loads, np.linspace(0.0, 1.0, max(2, len(loads))).tolist(), strict=False))
-    changes = {name: np.asarray(own, dtype=float) for name, own in model.changes.items()}
     drawn = {name: np.where(own > SMALLEST, own, np.nan) for name, own in changes.items()}
     series: list[Series] = [
         line(name, sizes, change, colour=rank, rank=rising.get(name), marks=True)
@@ -113,27 +93,24 @@ def _changes(model: ConvergencePanel, size: str) -> Chart:
                  colour=7, dashes=p, faint=True)
             for p in (1, 2)
         ]  # fmt: skip
-    title = TITLES.get(model.name, model.name)
     extent = f"largest {seen.max():.3g} %, least {seen.min():.3g} %" if len(seen) else "none"
     label = "change to the next finer level, %"
     return Chart(title, size, label, series, f"{title}: {label}: {extent}", log_y=True, log_x=True)
 
 
-def nu12_charts(
-    models: Mapping[str, Mapping[str, tuple[ArrayLike, ArrayLike]]], base: float, response: str,
-    caption: str,
-) -> Charts:  # fmt: skip
-    """Return responses over that at the base nu12, a chart a model: nu12 and ratio (n,)."""
-    charts, label = [], f"{response} / that at nu12 = {base:g}"
-    for name, lines in models.items():
-        many = len(lines) > NAMED
+def nu12_charts(study: Nu12Study, caption: str) -> Charts:
+    """Return responses over that at the base nu12, a chart a model."""
+    charts, label = [], f"{study.response} / that at nu12 = {study.base:g}"
+    for name, part in study.parts.items():
+        count = len(part.responses)
         series = [
-            line(own, x, y, colour=k, rank=k / (len(lines) - 1) if many else None, marks=True)
-            for k, (own, (x, y)) in enumerate(lines.items())
-        ]
-        series.append(dots("", [base], [1.0], colour=3, shape="diamond"))
+            line(own, found.nu12, found.to_base, colour=k,
+                 rank=k / (count - 1) if count > NAMED else None, marks=True)
+            for k, (own, found) in enumerate(part.responses.items())
+        ]  # fmt: skip
+        series.append(dots("", [study.base], [1.0], colour=3, shape="diamond"))
         title = TITLES.get(name, name)
-        ratios = [np.asarray(y, dtype=float) for _, y in lines.values()]
+        ratios = [found.to_base for found in part.responses.values()]
         known = np.concatenate([y[np.isfinite(y)] for y in ratios] or [np.ones(1)])
         extent = f"{known.min():.4g} to {known.max():.4g}" if len(known) else "none known"
         alt = f"{title}: {label}: {extent}"
@@ -141,54 +118,53 @@ def nu12_charts(
     return Charts("nu12", charts, caption)
 
 
-def profile_charts(panels: Sequence[ProfilePanel], threshold: float, caption: str) -> Charts:
+def profile_charts(profiles: Sequence[Profile], threshold: float, caption: str) -> Charts:
     """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends."""
-    return Charts("profiles", [_profile(panel, threshold) for panel in panels], caption)
+    return Charts("profiles", [_profile(one, threshold) for one in profiles], caption)
 
 
-def _profile(panel: ProfilePanel, threshold: float) -> Chart:
-    x = np.linspace(min(panel.values), max(panel.values), POINTS)
-    parabola = ((x - panel.best) / panel.sigma) ** 2
+def _profile(one: Profile, threshold: float) -> Chart:
+    values, ratios = one.curve
+    x = np.linspace(min(values), max(values), POINTS)
+    parabola = ((x - one.best) / one.sigma) ** 2
     inside = np.where(parabola <= ROOM * threshold, parabola, np.nan)
     series: list[Series] = [
-        line("profile", panel.values, panel.ratios, marks=True),
+        line("profile", values, ratios, marks=True),
         line("by the 1 sigma of the fit", x, inside, colour=1, dashes=1),
     ]
-    known = [end for end in panel.ends if end is not None]
+    known = [end for end in one.ends if end is not None]
     series += [line("ends", [end, end], [0.0, threshold], dashes=2) for end in known]
-    low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in panel.ends)
-    alt = f"{panel.title}: best {panel.best:.4g} MPa, lower end {low}, upper end {high}"
+    low, high = ("not closed" if end is None else f"{end:.4g} MPa" for end in one.ends)
+    alt = f"{one.name}: best {one.best:.4g} MPa, lower end {low}, upper end {high}"
     return Chart(
-        panel.title, "tangent modulus, MPa", "-2 log L", series, alt, from_zero=True,
+        one.name, "tangent modulus, MPa", "-2 log L", series, alt, from_zero=True,
         top=ROOM * threshold, level=threshold,
     )  # fmt: skip
 
 
-def weights_charts(
-    counted: str, counts: Sequence[float], errors: Mapping[str, Sequence[float]],
-    moduli: Mapping[str, Mapping[float, Sequence[float]]],
-    sigma: Mapping[str, Sequence[float] | None],
-) -> list[Charts]:  # fmt: skip
+def weights_charts(study: WeightStudy) -> list[Charts]:
     """Return errors of the tests, then moduli (MPa, with 1 sigma), over the weight of some."""
-    across = f"weight of {counted}, times that of the project"
+    across = f"weight of {study.counted}, times that of the project"
+    ended, counts = study.ended, [run.count for run in study.ended]
     drawn = [
-        line(name, counts, 100 * np.asarray(values), colour=rank, marks=True)
-        for rank, (name, values) in enumerate(errors.items())
+        line(name, counts, [100 * run.relative[name] for run in ended], colour=rank, marks=True)
+        for rank, name in enumerate(ended[0].relative)
     ]
     label = "relative RMS error, %"
-    alt = f"{label} of {', '.join(errors)} over the weight of {counted}"
+    alt = f"{label} of {', '.join(ended[0].relative)} over the weight of {study.counted}"
     first = Chart("Errors of the tests", across, label, drawn, alt, from_zero=True, log_x=True)
     others = []
-    for name, by_strain in moduli.items():
-        bars = sigma.get(name) or [0.0] * len(by_strain)
+    for name in COMPONENTS:
+        bars = study.sigma(name) or [0.0] * len(PLACES)
         series: list[Series] = []
-        for rank, ((strain, moved), bar) in enumerate(zip(by_strain.items(), bars, strict=True)):
-            own = float(np.interp(AS_WRITTEN, counts, moved))
-            series.append(line(f"at {100 * strain:.3g} %", counts, moved, dashes=rank, marks=True))
+        for rank, (place, bar) in enumerate(zip(PLACES, bars, strict=True)):
+            moved = [run.moduli[name][rank] for run in ended]
+            own, said = float(np.interp(AS_WRITTEN, counts, moved)), study.strain(name, place)
+            series.append(line(f"at {100 * said:.3g} %", counts, moved, dashes=rank, marks=True))
             if bar:
                 ends = [own * (1 - bar)], [own * (1 + bar)]
                 series.append(dots("1 sigma", [AS_WRITTEN], [own], ends, colour=7))
-        alt = f"{name} at {len(by_strain)} strains over the weight of {counted}"
+        alt = f"{name} at {len(PLACES)} strains over the weight of {study.counted}"
         others.append(Chart(name, across, "MPa", series, alt, from_zero=True, log_x=True))
     return [
         Charts("errors", [first], "Errors of the tests over the weight."),
@@ -196,31 +172,52 @@ def weights_charts(
     ]
 
 
-def held_out_charts(
-    tests: Sequence[str], predicted: Mapping[str, Sequence[float]],
-    fitted: Mapping[str, Sequence[float]], caption: str,
-) -> Charts:  # fmt: skip
+def bootstrap_charts(study: Bootstrap, caption: str) -> Charts:
+    """Return moduli (MPa) with the ends of samples and of the fit's band."""
+    charts = []
+    for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
+        x, (low, high), fit = PERCENT * strain, study.bands[name], study.of_fit[name]
+        best = study.found.best.law.modulus(name, strain)
+        series = [
+            line("fit, with its band by the noise", x, best, (fit[0], fit[1])),
+            line("percentiles of the samples", x, low, colour=1, dashes=1),
+            line("percentiles of the samples", x, high, colour=1, dashes=1),
+        ]
+        top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit[1])
+        alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
+        charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
+    return Charts("bootstrap", charts, caption)
+
+
+def held_out_charts(study: Validation, caption: str) -> Charts:
     """Return relative errors by law at each test: predicted, and by the fit to all of them."""
-    errors = {f"{law}, predicted": 100 * np.asarray(own) for law, own in predicted.items()}
-    errors |= {f"{law}, fitted": 100 * np.asarray(own) for law, own in fitted.items()}
+    table = study.table().drop_duplicates(["law", "test"])
+    tests, laws = table["test"].unique().tolist(), table["law"].unique()
+    errors: dict[str, np.ndarray] = {}
+    for column, words in (("foretold", "predicted"), ("fitted", "fitted")):
+        found = 100 * table.pivot(index="test", columns="law", values=f"{column}_relative")
+        errors |= {
+            f"{law}, {words}": found.loc[tests, law].to_numpy(float)
+            for law in laws
+            if words == "predicted" or found[law].notna().any()
+        }
     alt = f"errors at {', '.join(tests)}"
     chart = _named("left out", "relative RMS error, %", tests, errors, alt)
     return Charts("held out", [chart], caption)
 
 
-def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption: str) -> Charts:
+def law_charts(forms: Sequence[FormFit], noise: float | None, label: str, caption: str) -> Charts:
     """Return errors of forms: of the fit, cross-validated, of every fold; noise, a line."""
-    names = [_form(row) for row in rows]
+    names, folds = [_form(form) for form in forms], [form.left_out() for form in forms]
     errors = {
-        "error of the fit": np.array([row.fitted for row in rows]),
-        "cross-validated error": np.array([row.validated for row in rows]),
+        "error of the fit": np.array([form.fitted for form in forms]),
+        "cross-validated error": np.array([form.validated for form in forms]),
     }
     alt = "; ".join(
-        f"{name}: fit {row.fitted:.4g}, cross-validated {row.validated:.4g}"
-        for name, row in zip(names, rows, strict=True)
+        f"{name}: fit {form.fitted:.4g}, cross-validated {form.validated:.4g}"
+        for name, form in zip(names, forms, strict=True)
     )
-    folds = [np.asarray(row.folds, dtype=float).ravel() for row in rows]
-    place = [1.0 + k + 0.5 * ASIDE + FURTHER for k in range(len(rows))]
+    place = [1.0 + k + 0.5 * ASIDE + FURTHER for k in range(len(forms))]
     own = [
         dots("single folds", np.full(len(values), at), values, colour=1, hollow=True)
         for at, values in zip(place, folds, strict=True)
@@ -231,26 +228,28 @@ def law_charts(rows: Sequence[LawRow], noise: float | None, label: str, caption:
     return Charts("laws", [chart], caption)
 
 
-def _form(row: LawRow) -> str:
-    lost = int(np.sum(~np.isfinite(np.asarray(row.folds, dtype=float))))
-    text = f"{row.name} ({row.coefficients})"
+def _form(form: FormFit) -> str:
+    lost = int(np.sum(~np.isfinite(form.left_out())))
+    text = f"{form.name} ({form.coefficients})"
     text += f", {lost} fold{'s' if lost > 1 else ''} without a result" if lost else ""
-    return text if np.isfinite(row.fitted) else f"{text}, no fit"
+    return text if np.isfinite(form.fitted) else f"{text}, no fit"
 
 
-def plan_charts(tests: Sequence[str], sigma: Mapping[str, Sequence[float]], caption: str) -> Charts:
+def plan_charts(study: Plan, caption: str) -> Charts:
     """Return 1 sigma, %, of each modulus with each test; from 100 % on unknown, a ring."""
-    every = {name: np.asarray(own, dtype=float) for name, own in sigma.items()}
+    tests = ["the present tests alone"]
+    tests += [f"{k}. {one.title}" for k, one in enumerate(study.candidates, start=1)]
+    sigmas = [one.summary for one in (study.now, *study.candidates)]
+    every = {name: 100 * np.array([own[name] for own in sigmas]) for name in COMPONENTS}
     known = {name: np.where(own < MOST, own, np.nan) for name, own in every.items()}
-    aside = _aside(len(sigma))
     rings = [
         dots(f"{name}, not known", 1.0 + np.flatnonzero(~(own < MOST)) + by,
              np.full(int((~(own < MOST)).sum()), MOST), colour=rank, hollow=True)
-        for rank, ((name, own), by) in enumerate(zip(every.items(), aside, strict=True))
+        for rank, ((name, own), by) in enumerate(zip(every.items(), _aside(3), strict=True))
         if not (own < MOST).all()
     ]  # fmt: skip
     words = f"{caption}. From {MOST:g} % on a modulus is not known: a ring."
-    alt = f"1 sigma of {', '.join(sigma)} with {', '.join(tests)}"
+    alt = f"1 sigma of {', '.join(every)} with {', '.join(tests)}"
     chart = _named("test", "1 σ, % of the modulus", tests, known, alt, more=rings)
     return Charts("plan", [chart], words)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,11 +71,6 @@ class BestFit:
     records: Sequence[StartRecord]
     reached: Array
     certainty: Certainty | None = None
-
-    @property
-    def objective(self) -> float:
-        """Return the objective of the best fit, from the unloaded state."""
-        return self.point.value
 
     @property
     def valid(self) -> Array:
@@ -154,15 +150,8 @@ def limit_of_meshes(setup: FitSetup, problem: FitProblem, best: BestFit) -> Limi
         return None
     if not all(isinstance(test, Refinable) for test in setup.tests):
         return None
-    finer = [
-        comparison
-        for test, weighting in zip(setup.tests, setup.weightings, strict=True)
-        if isinstance(test, Refinable)
-        for comparison in setup.judged(
-            test, test.finer(setup.make_solver, weighting, FINER), weighting
-        )
-    ]
-    finer = [*with_shared(finer, problem.unknowns.nuisance.shared)]
+    make: Any = lambda test, w: test.finer(setup.make_solver, w, FINER)  # noqa: E731
+    finer = [*with_shared(setup.each(make), problem.unknowns.nuisance.shared)]
     residual = residual_of(problem, finer, best.differentiated, best.law)
     return limit_of(problem, best.differentiated, residual, FINER)
 
@@ -213,8 +202,12 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         return best
     settings = setup.project.fit
     out = settings.mesh_error == CORRECTED
-    limit, notes = _limit(setup, problem, best)
-    law = best.law
+    limit, law, notes = None, best.law, list[Note]()
+    try:
+        limit = limit_of_meshes(setup, problem, best)
+    except (InputError, SolverFailure) as error:
+        words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
+        notes.append(Note(UNKNOWN, words))
     if limit is None and out and "mesh_error" in settings.model_fields_set:
         notes.append(Note(UNKNOWN, NOT_TAKEN_OUT))
     if limit is not None and (np.abs(limit.step) <= NOTHING * np.abs(slopes.unknowns)).all():
@@ -263,14 +256,6 @@ def _certainty(
     return replace(sure, order=order)
 
 
-def _limit(setup: FitSetup, problem: FitProblem, best: BestFit) -> tuple[Limit | None, list[Note]]:
-    try:
-        return limit_of_meshes(setup, problem, best), []
-    except (InputError, SolverFailure) as error:
-        words = f"the error of the mesh is not known: {str(error).splitlines()[0]}"
-        return None, [Note(UNKNOWN, words)]
-
-
 def card_certainty(
     problem: FitProblem, best: BestFit, law: HypoelasticLaw, tests: Sequence[str]
 ) -> CardCertainty | None:
@@ -310,7 +295,6 @@ class Optimum:
 
     @property
     def sure(self) -> Certainty:
-        """Return the certainty."""
         assert self.best.certainty is not None
         return self.best.certainty
 
@@ -322,7 +306,6 @@ class Optimum:
 
     @property
     def point(self) -> Evaluation:
-        """Return the optimum."""
         return self.best.point
 
     @property

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, Note, NoteKind, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
-from ..files import __version__
+from ..files import pandas as pd
 from ..inference.descent import descend
 from ..inference.linear import moduli_of, summary
 from ..inference.posterior import LEVEL, bands_of
@@ -31,15 +31,12 @@ from ..inference.problem import (
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
-from .executor import Task, cores, executor_of
-from .folder import Presented, Store, check_asked, finished
-from .progress import listener
+from .executor import Task, cores
+from .folder import Presented, check_asked, finished
+from .progress import Listener, listener
 from .setup import fingerprints
-from .simulation import StudyRecord
+from .simulation import StudyRecord, begin_study
 from .validation import TESTS, name_of, parts_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Kinds of notes that are made here.
 FEW_UNITS = NoteKind("few to draw from")
@@ -65,8 +62,6 @@ COUNT = 100
 MOST, DAMPING = 4, 1e-9
 #: Predicted decrease of the sum of squares, relative, that is not worth an analysis.
 NEGLIGIBLE = 1e-5
-#: Called with the samples done, all samples, and what is running.
-Progress = Callable[[int, int, str], None]
 SAMPLES = "bootstrap-samples.json"
 
 
@@ -93,12 +88,10 @@ class Bootstrap(Presented):
 
     @property
     def project(self) -> Project:
-        """The project of the fit."""
         return self.found.setup.project
 
     @property
     def analyses(self) -> int:
-        """Number of all analyses."""
         return self.before + sum(sample.analyses for sample in self.samples)
 
     @property
@@ -148,8 +141,6 @@ class Bootstrap(Presented):
 
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: value, sigma of samples and of the fit, correlations."""
-        import pandas as pd
-
         own, known = self.found.problem.unknowns, self.found.posterior
         turn = np.eye(own.count)
         turn[: own.size, : own.size] = own.to_coefficients
@@ -169,8 +160,6 @@ class Bootstrap(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return the moduli along their strains, with both bands."""
-        import pandas as pd
-
         found = []
         for name, strain in self.strains.items():
             best, own = self.found.best.law.modulus(name, strain), self.moduli[name]
@@ -202,7 +191,6 @@ class Bootstrap(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
         setup = self.found.setup
         return {
             "command": "bootstrap", "title": setup.project.title,
@@ -218,7 +206,6 @@ class Bootstrap(Presented):
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return the result in words, for the terminal."""
         drawn = ", ".join(f"{group.name} ({len(group.units)})" for group in self.groups)
         each = [f"{n} {percent(own)} (fit {percent(of)})" for n, (own, of) in self.sigma.items()]
         lines = [
@@ -235,7 +222,7 @@ def bootstrap(
     project: Project, over: str, samples: int = COUNT, card: Card = None,
     tests: str | Sequence[str] | None = None, *, seed: int | None = None,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | bool | None = None,
+    progress: Listener = None,
 ) -> Bootstrap:  # fmt: skip
     """Draw parts of the data with replacement and fit every draw.
     Every refit begins at the optimum of the fit that wrote the card and takes a few analyses. What
@@ -253,61 +240,45 @@ def bootstrap(
     found = find_optimum(project, card, tests)
     groups = groups_of(found, over)
     folder = None if out is None else Path(out)
-    if folder is not None:
-        Store(folder).begin({"version": __version__, "over": over}, resume, overwrite, (SAMPLES,))
+    begin_study(folder, {"over": over}, resume, overwrite, records=(SAMPLES,))
     at = [f"{value:.6g}" for value in found.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)
-    done = {n: sample for n, sample in record.rows.items() if n < samples}
-    tell = listener(progress)
-    tell(len(done), samples, "")
-    missing = [n for n in range(samples) if n not in done]
+    missing = [n for n in range(samples) if n not in record.rows]
+    tell, others = listener(progress), len(record.rows) + len(missing) - samples
+    tell(len(record.rows) - others, samples, "")
     prepare = functools.partial(_task, found, groups, project.fit.seed)
-    for sample in executor_of(project).run_tasks(prepare, missing, "samples"):
-        if isinstance(sample, Sample):
-            done[sample.number] = sample
-            record.write(sample)
-        tell(len(done), samples, "")
+    for _ in record.run(project, prepare, missing, "samples"):
+        tell(len(record.rows) - others, samples, "")
     # Every process runs the optimum once more.
     before = found.analyses + min(project.fit.jobs or cores(), len(missing))
-    return finished(Bootstrap(found, over, groups, [done[n] for n in sorted(done)], before), out)
+    drawn = [record.rows[n] for n in range(samples)]
+    return finished(Bootstrap(found, over, groups, drawn, before), out)
 
 
 def groups_of(found: Optimum, over: str) -> list[Group]:
-    """Return the units that are drawn, each among its group; raises InputError without any."""
-    return _tests(found) if over == TESTS else _parts(found, over)
-
-
-def _tests(found: Optimum) -> list[Group]:
-    """Return tests, grouped by kind."""
-    setup, problem = found.setup, found.problem
-    numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
-    kinds: dict[str, list[Unit]] = {}
-    for test in setup.tests:
-        rows = np.zeros(len(problem.blocks.of), dtype=bool)
-        for comparison in setup.own(test):
-            rows[problem.rows(numbers[comparison.name])] = True
-        kinds.setdefault(test.test.kind, []).append(Unit(test.test.name, rows))
-    several = [Group(kind, units) for kind, units in kinds.items() if len(units) > 1]
-    if not several:
-        said = "no kind of which the project has two tests or more"
-        raise InputError(setup.project.path, "--over", said)
-    return several
-
-
-def _parts(found: Optimum, sort: str) -> list[Group]:
-    """Return parts of tests, grouped by comparison (specimens by direction), else by test."""
+    """Return the units that are drawn, each among its group; raises InputError without any.
+    Groups are kinds of test; of parts, comparisons (specimens by direction), else tests."""
     setup, problem = found.setup, found.problem
     grouped: dict[str, list[Unit]] = {}
-    for part in parts_of(setup, sort, "--over"):
-        alone = {name: mask for name, mask in part.alone.items() if mask.any()}
-        shared = [name for name, mask in alone.items() if not mask.all()]
-        own = shared[0] if shared else setup.tests[part.test].test.name
-        unit = Unit(name_of(setup, part), rows_of(problem, alone))
-        grouped.setdefault(own, []).append(unit)
+    if over == TESTS:
+        numbers = {c.name: k for k, c in enumerate(problem.comparisons)}
+        for test in setup.tests:
+            rows = np.zeros(len(problem.blocks.of), dtype=bool)
+            for comparison in setup.own(test):
+                rows[problem.rows(numbers[comparison.name])] = True
+            grouped.setdefault(test.test.kind, []).append(Unit(test.test.name, rows))
+    else:
+        for part in parts_of(setup, over, "--over"):
+            alone = {name: mask for name, mask in part.alone.items() if mask.any()}
+            shared = [name for name, mask in alone.items() if not mask.all()]
+            own = shared[0] if shared else setup.tests[part.test].test.name
+            unit = Unit(name_of(setup, part), rows_of(problem, alone))
+            grouped.setdefault(own, []).append(unit)
     several = [Group(name, units) for name, units in grouped.items() if len(units) > 1]
     if not several:
-        raise InputError(setup.project.path, "--over", f"no test has two {sort} to draw from")
+        what = "kind" if over == TESTS else "test"
+        raise InputError(setup.project.path, "--over", f"no {what} has two {over} or more")
     return several
 
 

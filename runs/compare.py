@@ -4,32 +4,31 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, NoFeasibleStart, Note, NoteKind, checked, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import Masks
-from ..files import __version__
+from ..files import known
+from ..files import pandas as pd
 from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
 from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from .best import noise_of
-from .executor import executor_of
-from .fit import FitEvent, stored_fit
+from .executor import Task
+from .fit import stored_fit
 from .folder import Presented, check_asked, finished
-from .progress import listener
+from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Kinds of notes that are made here.
 FOLD = NoteKind("fold without an error")
@@ -94,10 +93,6 @@ class FoldError:
     rms: Mapping[str, float]
 
 
-#: Called with the name of each form, then the records of its starts and folds; None now and then.
-Progress = Callable[[str | FitEvent | FoldError | None], None]
-
-
 def specimens_of(setup: FitSetup) -> dict[str, list[int]]:
     """Return the specimen's number of each point that can be left out, by comparison."""
     return {name: list(own) for test in setup.tests for name, own in test.specimens.items()}
@@ -110,28 +105,6 @@ def folds(setup: FitSetup, count: int) -> list[Masks]:
     return folds_of(specimens, min([count, *several]), setup.project.fit.seed)
 
 
-def validate(
-    setup: FitSetup, count: int, starts: int, done: Collection[int] = ()
-) -> Iterator[FoldError | None]:
-    """Fit without the points of each fold and judge at these points; None now and then.
-    Strain range and breaks of the law, and scales of relative errors, follow from the points
-    matched, and the fits begin at random starts of their own: the points left out enter only by how
-    far the models are strained. count : of folds, at most. starts : random starts a fold, the best
-    of which counts."""
-    parts = folds(setup, count)
-    missing = [fold for fold in range(len(parts)) if fold not in done]
-    prepare = functools.partial(_task, setup, parts, starts)
-    if not missing:
-        return iter(())
-    return executor_of(setup.project).run_tasks(prepare, missing, "folds")
-
-
-def _task(
-    setup: FitSetup, parts: list[Masks], starts: int
-) -> Callable[[int, Callable[[Any], None]], FoldError]:
-    return lambda fold, tell: _fold(setup, fold, parts[fold], starts)
-
-
 def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.ndarray | None]:
     """Fit a law to the points that the masks keep; unknowns are None where all starts fail."""
     law = law_of(setup.project, [test.reach(masks) for test in setup.tests])
@@ -139,17 +112,21 @@ def fit_of(setup: FitSetup, masks: Masks, starts: int) -> tuple[FitSetup, np.nda
     return own, best_of(own, own.problem(masks), starts)
 
 
-def _fold(setup: FitSetup, fold: int, masks: Masks, starts: int) -> FoldError:
-    own, unknowns = fit_of(setup, masks, starts)
-    if unknowns is None:
-        return FoldError(fold, None, {})
-    whole = own.problem({name: ~mask for name, mask in masks.items()})
-    judged = whole.part([k for k, c in enumerate(whole.comparisons) if c.name in masks])
-    point = judged.evaluate(unknowns, False, warm=False)
-    if point is None:
-        return FoldError(fold, None, {})
-    value = float(judged.blocks.norms(point.residual).sum())
-    return FoldError(fold, value, errors(judged, point.residual))
+def _task(setup: FitSetup, parts: list[Masks], starts: int) -> Task:
+    def error(fold: int, tell: Callable[[Any], None]) -> FoldError:
+        masks = parts[fold]
+        own, unknowns = fit_of(setup, masks, starts)
+        if unknowns is None:
+            return FoldError(fold, None, {})
+        whole = own.problem({name: ~mask for name, mask in masks.items()})
+        judged = whole.part([k for k, c in enumerate(whole.comparisons) if c.name in masks])
+        point = judged.evaluate(unknowns, False, warm=False)
+        if point is None:
+            return FoldError(fold, None, {})
+        value = float(judged.blocks.norms(point.residual).sum())
+        return FoldError(fold, value, errors(judged, point.residual))
+
+    return error
 
 
 def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | None:
@@ -177,15 +154,19 @@ def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
 
 
 def errors_of_folds(
-    setup: FitSetup, found: Fit, folds: int, starts: int, folder: Path | None,
-    tell: Callable[[FoldError | None], None],
+    setup: FitSetup, count: int, starts: int, folder: Path | None = None,
+    tell: Callable[[FoldError | None], None] = lambda event: None,
 ) -> tuple[FoldError, ...]:  # fmt: skip
-    """Return the errors of at most so many folds, read where the folder has them of this fit."""
-    depends = {**fingerprints(setup, found.problem), "folds": folds, "starts": starts}
+    """Fit without the points of each fold and judge at these points; those of the folder are kept.
+    Strain range and breaks of the law, and scales of relative errors, follow from the points
+    matched, and the fits begin at random starts of their own: the points left out enter only by how
+    far the models are strained. count : of folds, at most. starts : random starts a fold, the best
+    of which counts."""
+    parts = folds(setup, count)
+    depends = {**fingerprints(setup, setup.problem()), "folds": count, "starts": starts}
     record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
-    for event in validate(setup, folds, starts, tuple(record.rows)):
-        if event is not None:
-            record.write(event)
+    prepare = functools.partial(_task, setup, parts, starts)
+    for event in record.run(setup.project, prepare, range(len(parts)), "folds"):
         tell(event)
     return tuple(record.rows[fold] for fold in sorted(record.rows))
 
@@ -201,18 +182,19 @@ class FormFit:
 
     @property
     def coefficients(self) -> int:
-        """Number of coefficients that are fitted."""
         return self.fit.problem.unknowns.size
 
     @property
     def rms(self) -> dict[str, float]:
         """Error of the fit to all points, by comparison, in its unit."""
-        return errors(self._judged, self._residual)
+        every = errors(self.fit.problem, self.fit.best.point.residual)
+        return {name: rms for name, rms in every.items() if name in self.compared}
 
     @property
     def fitted(self) -> float:
         """Share of those comparisons in the objective of the fit to all points."""
-        return float(self._judged.blocks.norms(self._residual).sum())
+        norms = self.fit.problem.norms(self.fit.best.point.residual)
+        return float(np.concatenate([own for n, own in norms.items() if n in self.compared]).sum())
 
     def left_out(self, comparison: str | None = None) -> list[float]:
         """Return each fold's part of the objective, or RMS of a comparison; NaN if it failed."""
@@ -226,18 +208,10 @@ class FormFit:
         return float(np.mean(self.left_out()))
 
     @property
-    def _numbers(self) -> list[int]:
-        whole = self.fit.problem.comparisons
-        return [k for k, c in enumerate(whole) if c.name in self.compared]
-
-    @property
-    def _judged(self) -> Any:
-        return self.fit.problem.part(self._numbers)
-
-    @property
-    def _residual(self) -> np.ndarray:
-        rows = [self.fit.problem.rows(k) for k in self._numbers]
-        return np.concatenate([self.fit.best.point.residual[part] for part in rows])
+    def noise(self) -> dict[str, float]:
+        """Share of the data's noise in the objective, by comparison."""
+        every = noise_of(self.fit.problem)
+        return {name: every[name] for name in self.compared}
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +223,6 @@ class LawComparison(Presented):
 
     @property
     def project(self) -> Project:
-        """The project, with the first of the forms."""
         return self.forms[0].fit.project
 
     @property
@@ -280,9 +253,9 @@ class LawComparison(Presented):
             "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
                       if c.name in first.compared},
             "fold_starts": self.fold_starts,
-            "forms": [_form(f) for f in forms],
-            "noise": sum(noise(first).values()),
-            "noise_by_part": noise(first),
+            "forms": known([_form(f) for f in forms]),
+            "noise": sum(first.noise.values()),
+            "noise_by_part": first.noise,
             "least_cross_validated": best.name if best else None,
             "simplest_as_good": simplest.name if simplest else None,
             "as_good_within": AS_GOOD,
@@ -291,8 +264,6 @@ class LawComparison(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a form: errors of the fit and at points left out, also by comparison."""
-        import pandas as pd
-
         rows = []
         for form in self.forms:
             units = {c.name: c.objective.unit for c in form.fit.problem.comparisons}
@@ -308,7 +279,6 @@ class LawComparison(Presented):
         return pd.DataFrame(rows)
 
     def lines(self) -> list[str]:
-        """Return a table for the terminal, and the conclusion."""
         result = self.result
         lines = [
             f"error: {result['objective_is']}",
@@ -320,7 +290,8 @@ class LawComparison(Presented):
             lines.append(
                 f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
             )
-        return [*lines, f"the data's own noise: {result['noise']:.4g}", *self.conclusion]
+        lines.append(f"the data's own noise: {result['noise']:.4g}")
+        return [*lines, *self.conclusion, *note_lines(self.notes)]
 
     @property
     def conclusion(self) -> list[str]:
@@ -341,7 +312,7 @@ def compare(
     forms: Sequence[str] = (),
     *, folds: int = FOLDS, starts: int = STARTS, fold_starts: int = FOLD_STARTS,
     trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
-    overwrite: bool = False, progress: Progress | bool | None = None,
+    overwrite: bool = False, progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> LawComparison:  # fmt: skip
     """Fit every form to the tests, then without some specimens, and judge it at those.
@@ -367,18 +338,16 @@ def compare(
         )
         raise InputError(project.path, "", problem)
     folder = None if out is None else Path(out)
-    if folder is not None:
-        parts = {"version": __version__, "folds": str(folds), "fold starts": str(fold_starts)}
-        begin_study(folder, parts, resume, overwrite, map(plain, projects))
-    done = []
+    of = {"folds": str(folds), "fold starts": str(fold_starts)}
+    begin_study(folder, of, resume, overwrite, map(plain, projects))
+    names, done = [test.name for test in chosen], []
     for name, own in projects.items():
-        tell(name)
-        place = None if folder is None else folder / plain(name)
         found = stored_fit(
-            own, [test.name for test in chosen], place, resume=resume, overwrite=overwrite,
-            progress=tell, command_line=command_line,
+            own, names, f"{name} moduli", plain(name), folder=folder, resume=resume,
+            overwrite=overwrite, progress=tell, command_line=command_line,
         )  # fmt: skip
-        errors = errors_of_folds(setups[name], found, folds, fold_starts, place, tell)
+        place = None if folder is None else folder / plain(name)
+        errors = errors_of_folds(setups[name], folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return finished(LawComparison(tuple(done), fold_starts), out)
 
@@ -387,20 +356,14 @@ def _form(form: FormFit) -> dict[str, Any]:
     return {
         "form": form.name, **form.fit.law.form.to_card(), "coefficients": form.coefficients,
         "objective": form.fit.objective, "fitted": form.fitted, "rms": form.rms,
-        "cross_validated": _number(form.validated),
+        "cross_validated": form.validated,
         "cross_validated_by_part": {
-            name: _number(float(np.mean(form.left_out(name)))) for name in form.compared
+            name: float(np.mean(form.left_out(name))) for name in form.compared
         },
-        "folds": [_number(value) for value in form.left_out()],
+        "folds": form.left_out(),
         "starts_objective": [r.objective for r in form.fit.best.ranked],
     }  # fmt: skip
 
 
 def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def noise(form: FormFit) -> dict[str, float]:
-    """Return the share of the data's noise in the objective, by comparison."""
-    every = noise_of(form.fit.problem)
-    return {name: every[name] for name in form.compared}

@@ -91,12 +91,10 @@ class Estimate:
 
     @property
     def thickness(self) -> float:
-        """Return the thickness before the test, mm."""
         return self.project.fabric.thickness
 
     @property
     def result(self) -> dict[str, Any]:
-        """Return everything in plain values."""
         moduli: dict[str, list[dict[str, Any]]] = {}
         for one in answers(self):
             entry = {"strain": one.strain, "MPa": one.value, "sigma": one.sigma, "band": one.band}
@@ -108,7 +106,6 @@ class Estimate:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return chi of every comparison in words."""
         return [f"{gap.name}: {gap.words}" for gap in self.gaps]
 
 

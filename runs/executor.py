@@ -111,15 +111,11 @@ class Executor:
             at = number, (seed, number)
             return StartRecord(*at, None, why, 0, (), (), 0.0, failure=why, mesh=mesh)
 
-        prepare = functools.partial(_starting, build, options, seed, mesh)
+        def prepare() -> Task:
+            problem = build()
+            return lambda number, tell: run_start(problem, options, seed, number, tell, mesh)
+
         return self.run_tasks(prepare, numbers, lost=lost)
-
-
-def _starting(
-    build: Callable[[], FitProblem], options: FitOptions, seed: int, mesh: MeshName
-) -> Task:
-    problem = build()
-    return lambda number, tell: run_start(problem, options, seed, number, tell, mesh)
 
 
 def executor_of(project: Project) -> Executor:

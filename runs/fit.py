@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, Note, SolverFailure, checked
 from ..experiments.kinds import (
-    DataFile,
     Expected,
     Fabric,
     Judgement,
@@ -44,13 +43,14 @@ from .folder import (
     solver_facts,
     write_report,
 )
-from .progress import listener
+from .progress import Listener, listener
 from .result import Fit
 from .setup import UNCOUNTED, FitSetup, Saw, coarse_problem, fingerprints, prepare_fit
 from .starts import (
     HISTORY,
     STARTS,
     EvaluationRecord,
+    MeshName,
     RunningFiles,
     Stage,
     StartRecord,
@@ -92,9 +92,8 @@ def _are_one(problem: FitProblem, a: StartRecord, b: StartRecord, tolerance: flo
     if a.objective is None or b.objective is None:
         return False
     room = tolerance + SAME_OBJECTIVE * min(a.objective, b.objective)
-    if abs(a.objective - b.objective) > room:
-        return False
-    return moduli_apart(problem, a, b) <= SAME_MODULI
+    near = abs(a.objective - b.objective) <= room
+    return near and moduli_apart(problem, a, b) <= SAME_MODULI
 
 
 def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
@@ -142,7 +141,6 @@ def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Proj
 
 
 Event = EvaluationRecord | StartRecord
-Records = Iterator[Event | None]
 
 
 def every_start(
@@ -157,21 +155,22 @@ def every_start(
     fit, executor = setup.project.fit, executor_of(setup.project)
     full, coarse = ({r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
                     for mesh in ("full", "coarse"))  # fmt: skip
-    if not fit.coarse_to_fine or coarse_problem(setup) is None:
-        told(Stage("starts", fit.starts))
-        for record in full.values():
+
+    def every(
+        what: str, known: dict[int, StartRecord], build: Any, mesh: MeshName
+    ) -> dict[int, StartRecord]:
+        told(Stage(what, fit.starts))
+        for record in known.values():
             told(record)
-        missing = [n for n in range(fit.starts) if n not in full]
-        full |= _ended(executor.run_starts(setup.problem, setup.options, fit.seed, missing), ran)
+        missing = [n for n in range(fit.starts) if n not in known]
+        made = executor.run_starts(build, setup.options, fit.seed, missing, mesh)
+        return known | _ended(made, ran)
+
+    if not fit.coarse_to_fine or coarse_problem(setup) is None:
+        full = every("starts", full, setup.problem, "full")
         return [full[n] for n in sorted(full)]
-
-    told(Stage("starts on the coarse mesh", fit.starts))
-    for record in coarse.values():
-        told(record)
-    missing = [n for n in range(fit.starts) if n not in coarse]
-    build: Any = functools.partial(coarse_problem, setup)
-    coarse |= _ended(executor.run_starts(build, setup.options, fit.seed, missing, "coarse"), ran)
-
+    build = functools.partial(coarse_problem, setup)
+    coarse = every("starts on the coarse mesh", coarse, build, "coarse")
     groups = distinct(setup.problem(), list(coarse.values()), fit.tolerance)
     told(Stage("distinct optima on the full mesh", len(groups)))
     for group in groups:
@@ -241,11 +240,6 @@ def one_fit(group: Sequence[StartRecord], full: Mapping[int, StartRecord]) -> It
         )  # fmt: skip
 
 
-FitEvent = EvaluationRecord | StartRecord | Stage
-#: Receives analyses and starts as they end, stages as they begin, and None as time passes.
-Progress = Callable[[FitEvent | None], None]
-
-
 @checked
 def fit(
     project: Project | Definition | OwnTest | Sequence[Definition | OwnTest],
@@ -255,7 +249,7 @@ def fit(
     seed: int | None = None, starts_from: str | None = None, earlier: Path | str | None = None,
     method: str | None = None, jobs: int | None = None, scheduler: str | None = None,
     trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
-    overwrite: bool = False, progress: Progress | bool | None = None,
+    overwrite: bool = False, progress: Listener = None,
     command_line: Sequence[str] | None = None, **settings: Any,
 ) -> Fit:  # fmt: skip
     """Fit the law of a project to its tests, from random feasible starts.
@@ -271,7 +265,8 @@ def fit(
         the folder `earlier`.
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
-        content. progress : receives every `FitEvent`, None now and then; unless given a bar in
+        content. progress : receives analyses and starts as they end,
+        stages as they begin, None now and then; unless given a bar in
         notebooks, False for none. command_line : for the record. settings : any other key of [fit].
     InputError : in the project or its data, or nothing to resume. OutputError. NoFeasibleStart : of
         all starts. SolverFailure : the solver is not there, failed in every start, or the best fit
@@ -346,7 +341,10 @@ def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project)
 
 
 def _records(
-    setup: FitSetup, files: RunningFiles | None, done: Sequence[StartRecord], progress: Progress
+    setup: FitSetup,
+    files: RunningFiles | None,
+    done: Sequence[StartRecord],
+    progress: Callable[..., None],
 ) -> list[StartRecord]:
     """Return finished starts and run the others side by side."""
 
@@ -367,11 +365,14 @@ def _records(
 
 
 def stored_fit(
-    project: Project, tests: Sequence[str], place: Path | None, *, resume: bool, overwrite: bool,
-    progress: Callable[[Any], None], command_line: Sequence[str] | None,
+    project: Project, tests: Sequence[str], words: str, name: str, *, folder: Path | None,
+    resume: bool, overwrite: bool, progress: Callable[[Any], None],
+    command_line: Sequence[str] | None,
 ) -> Fit:  # fmt: skip
-    """Fit one of a series and write its page into the folder `place`, if any.
-    resume : continue what the folder holds, if anything. Raises the errors of `fit`."""
+    """Fit one of a series, announced by `words`, and write its page into `name` of the folder.
+    resume : continue what it holds there, if anything. Raises the errors of `fit`."""
+    progress(words)
+    place = None if folder is None else folder / name
     found = fit(
         project, tests, out=place, resume=resume and place is not None and Store(place).used,
         overwrite=overwrite, progress=progress, command_line=command_line,
@@ -416,15 +417,6 @@ def judge(setup: FitSetup, saw: Saw = lambda words: None) -> tuple[Judgement, ..
     return tuple(judgements)
 
 
-def _choices(files: Sequence[DataFile]) -> list[str]:
-    """Return the choices of the readers once each, then counts of rows that were left out."""
-    said, dropped = dict.fromkeys(n for f in files for n in f.source.notes), Counter[str]()
-    for file in files:
-        dropped.update(file.dropped)
-    gone = ", ".join(f"{count} {why}" for why, count in dropped.items() if count)
-    return [*said, f"rows of the files left out: {gone}"] if gone else [*said]
-
-
 NOTHING = "nothing doubtful"
 
 
@@ -440,12 +432,10 @@ class Check:
 
     @property
     def sound(self) -> bool:
-        """Return True if a fit would begin."""
         return not any(judgement.errors for judgement in self.judgements)
 
     @property
     def result(self) -> dict[str, Any]:
-        """Return everything in plain values, as check.json holds it."""
         tests = {
             j.test: [
                 {"name": d.name, "severity": "error" if d.sure else "warning",
@@ -461,7 +451,16 @@ class Check:
     @property
     def choices(self) -> dict[str, list[str]]:
         """Return choices in reading the files of each test, and rows left out, in words."""
-        return {one.test.name: _choices(files_of(one)) for one in self.setup.tests}
+        choices = {}
+        for one in self.setup.tests:
+            files, dropped = files_of(one), Counter[str]()
+            for file in files:
+                dropped.update(file.dropped)
+            gone = ", ".join(f"{count} {why}" for why, count in dropped.items() if count)
+            said = list(dict.fromkeys(note for file in files for note in file.source.notes))
+            left_out = [f"rows of the files left out: {gone}"] if gone else []
+            choices[one.test.name] = [*said, *left_out]
+        return choices
 
     @property
     def joined(self) -> list[Note]:
@@ -484,7 +483,6 @@ class Check:
         return rows
 
     def lines(self) -> list[str]:
-        """Return the lines for a terminal."""
         return [f"{test}: {severity}" + (f" [{name}]: {text}" if name else f": {text}")
                 for test, severity, name, text in self.rows()]  # fmt: skip
 
@@ -503,7 +501,7 @@ class Check:
 def check(
     project: Project, tests: str | Sequence[str] | None = None, trust: Sequence[str] = (),
     *, out: Path | str | None = None,
-    progress: Callable[[int, int, str], None] | bool | None = None,
+    progress: Listener = None,
 ) -> Check:  # fmt: skip
     """Look at the data of tests, by default of all that can be fitted.
 
@@ -548,11 +546,9 @@ def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
     if written is None:  # of no file
         return {"settings": {}, "tests": {name: {} for name in names}}
     whole = settings_of(project, names)
-    law = {f"law.{key}": value for key, value in whole["law"].items()}
-    fit = {f"fit.{k}": v for k, v in whole["fit"].items() if k not in UNCOUNTED}
-    fabric = {f"fabric.{k}": v for k, v in whole["fabric"].items() if k not in NAMES}
-    units = {f"units.{key}": value for key, value in whole["units"].items()}
-    return {"settings": {**fabric, **units, **law, **fit},
+    others = {"fabric": NAMES, "units": (), "law": (), "fit": UNCOUNTED}
+    return {"settings": {f"{part}.{key}": value for part, left_out in others.items()
+                         for key, value in whole[part].items() if key not in left_out},
             "tests": {name: _without(written.whole.get(name, {})) for name in names}}  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -35,13 +35,11 @@ from ..files import (
     replacing,
     write_text,
 )
+from ..files import pandas as pd
 from ..project.objects import with_kept_arrays
 from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 R = TypeVar("R")
 #: Digits of a checksum that are shown.
@@ -214,8 +212,8 @@ class Store:
 CSV, PARQUET = ".csv", ".parquet"
 
 
-def write_table(table: pd.DataFrame, path: Path | str) -> Path:
-    """Write a table as .csv (nine digits) or .parquet (exact), by the ending of the file's name.
+def write_table(table: pd.DataFrame, path: Path | str, digits: int | None = 9) -> Path:
+    """Write a table as .csv (of so many digits) or .parquet (exact), by the ending of the name.
     InputError : another ending, or Parquet without pyarrow. OutputError."""
     path = Path(path)
     kind = path.suffix.lower()
@@ -228,7 +226,8 @@ def write_table(table: pd.DataFrame, path: Path | str) -> Path:
         if kind == PARQUET:
             table.to_parquet(temporary, engine="pyarrow", index=False)
         else:
-            table.to_csv(temporary, index=False, float_format="%.9g")
+            form = None if digits is None else f"%.{digits}g"
+            table.to_csv(temporary, index=False, float_format=form, lineterminator="\n")
     return path
 
 
@@ -355,7 +354,8 @@ def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
 
 
 class Presented:
-    """A result that its presenter writes."""
+    """A result that its presenter writes, with `notes`; `result` is the content of result.json,
+    `table` that of the CSV, `lines` what a terminal shows."""
 
     def write(self, folder: Path | str) -> None:
         """Write all files and the page into a folder; raises OutputError."""
@@ -414,6 +414,16 @@ class Record:
         facts = solver_facts(project.fit.solver, solver.identity)
         return cls(project.path, text, settings, data_rows(tests), facts, [this_run(command_line)])
 
+    @classmethod
+    def read(cls, folder: Path) -> Record | None:
+        """Read the record of a folder; None where it is missing or damaged."""
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            content = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+            runs, data = ([dict(one) for one in content[name]] for name in ("runs", "data"))
+            project = content["project"]
+            return cls(Path(project["file"]), project["text"], None, data, content["solver"], runs)
+        return None
+
     def to_json(self) -> dict[str, Any]:
         """Return plain values, as provenance.json holds them."""
         text = self.text
@@ -431,12 +441,8 @@ class Record:
 
     def after(self, folder: Path) -> Record:
         """Return the record after the runs of the folder's own, unless that is damaged."""
-        try:
-            runs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["runs"]
-            before = [dict(run) for run in runs]
-        except (OSError, ValueError, KeyError, TypeError):
-            return self
-        return replace(self, runs=[*before, *self.runs])
+        before = Record.read(folder)
+        return self if before is None else replace(self, runs=[*before.runs, *self.runs])
 
     def write(self, folder: Path) -> None:
         """Write provenance.json, and the project as run; raises OutputError."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from ..experiments.kinds import (
     Weighting,
     by_strain,
     notes_beyond,
+    other_thickness,
     strains_of,
     unstable_words,
 )
 from ..experiments.registry import kinds
+from ..files import pandas as pd
 from ..inference.linear import Array, LawQuery, information, information_of, summary
 from ..inference.noise import Noise
 from ..inference.problem import Evaluation, FitProblem
@@ -35,19 +37,14 @@ from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
-from .progress import listener
+from .progress import Listener, listener
 from .setup import FitSetup, prepare_fit
-from .simulation import FAILED, card_of, card_words, thickness_notes
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .simulation import FAILED, card_of, card_words
 
 #: 1 sigma, relative, from which a modulus is called unknown.
 UNKNOWN = 1.0
 #: Shares of the largest strains at which moduli are listed.
 SHARES = (0.0, 0.5, 1.0)
-#: Called with the analyses done, all analyses, and what is running.
-Progress = Callable[[int, int, str], None]
 #: Rank by the least certain of the three moduli.
 WORST = "worst"
 #: Name of the row of the present tests.
@@ -79,7 +76,6 @@ class Prospect:
 
     @property
     def title(self) -> str:
-        """The name with the number of specimens."""
         return self.name if self.specimens == 1 else f"{self.name}, {self.specimens} specimens"
 
     @property
@@ -93,7 +89,6 @@ class Prospect:
 
     @property
     def row(self) -> dict[str, Any]:
-        """The test in tables and JSON."""
         return {"test": self.name, "kind": self.kind, "specimens": self.specimens,
                 "noise": self.noise}  # fmt: skip
 
@@ -136,8 +131,6 @@ class Plan(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a test, with relative sigma of each modulus; rank 0 is the present."""
-        import pandas as pd
-
         table = []
         for place, test in enumerate((self.now, *self.candidates)):
             row: dict[str, object] = {"rank": place, **test.row}
@@ -150,7 +143,6 @@ class Plan(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
         return {
             "command": "plan", "title": self.project.title,
             "project": str(self.project.path), "card": self.card,
@@ -169,7 +161,6 @@ class Plan(Presented):
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return a table for the terminal, and its assumptions."""
         every = (self.now, *self.candidates)
         wide = max(len(test.title) for test in every) + 2
         head = "".join(f"{name:>10}" for name in COMPONENTS)
@@ -198,11 +189,6 @@ class Present:
     point: Evaluation
     law: HypoelasticLaw
     precision: Mapping[str, Precision]
-
-    @property
-    def reached(self) -> Array:
-        """Largest strains, (3,)."""
-        return np.max([strains_of(history) for history in self.point.histories], axis=0)
 
     @property
     def information(self) -> Array:
@@ -248,7 +234,7 @@ def plan(
     tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,
     rank: str = WORST, specimens: int | None = None, noise: Mapping[str, float] | None = None,
     out: Path | str | None = None, overwrite: bool = False,
-    progress: Progress | bool | None = None,
+    progress: Listener = None,
 ) -> Plan:  # fmt: skip
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
     The information of the present tests (misfit or noise, whichever is larger; neighbours that err
@@ -288,7 +274,7 @@ def plan(
         planning = Planning(place, own, present.precision, present.law, make, given)
         offered += [(name, candidate) for candidate in kind.candidates(planning)]
     found: list[tuple[Prospect, Array]] = []
-    notes = thickness_notes(project, material)
+    notes = other_thickness(material, project.fabric.thickness)
     for done, (name, candidate) in enumerate(offered):
         tell(done, len(offered), candidate.name)
         count = candidate.specimens if specimens is None else specimens
@@ -323,8 +309,8 @@ def _ends(
             raise InputError(None, "--strain", problem)
         return ends
     own = card.law.strain_range
-    return np.where(own < 0.1 * UNLIMITED, np.minimum(own, present.law.strain_range),
-                    present.reached)  # fmt: skip
+    reached = np.max([strains_of(history) for history in present.point.histories], axis=0)
+    return np.where(own < 0.1 * UNLIMITED, np.minimum(own, present.law.strain_range), reached)
 
 
 def _added(

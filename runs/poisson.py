@@ -5,31 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, Note, SolverFailure, rows
 from ..errors import lines as note_lines
+from ..experiments.kinds import notes_of, other_thickness
+from ..files import known
+from ..files import pandas as pd
 from ..project.project import Project
-from ..solvers.base import History
 from .folder import Presented, check_unused, finished
+from .progress import Listener
 from .simulation import (
     FAILED,
+    Analyses,
     GivenCard,
     Part,
-    Progress,
-    Series,
+    attempt,
     card_of,
     card_words,
     parts_of,
     studied_tests,
-    thickness_notes,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Array = NDArray[np.float64]
 #: The range of coated fabrics, in equal steps.
@@ -57,17 +56,6 @@ def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
     v = np.asarray(values, dtype=float)
     mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
     return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)
-
-
-def by_response(
-    nu12: Sequence[float], responses: Sequence[Mapping[str, float] | None],
-    base: Mapping[str, float],
-) -> dict[str, Ratios]:  # fmt: skip
-    """Return the ratios of every response of the base run; a run that failed is None."""
-    return {
-        name: ratios(nu12, [np.nan if r is None else r.get(name, np.nan) for r in responses], value)
-        for name, value in base.items()
-    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +86,7 @@ class Nu12Study(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
-        return {
+        return known({
             "command": "study nu12", "project": str(self.project.path),
             "card": self.card,
             "solver": self.solver, "base_nu12": self.base, "response": self.response,
@@ -107,8 +94,8 @@ class Nu12Study(Presented):
                 name: {
                     "responses": {
                         response: {
-                            "nu12": r.nu12.tolist(), "value": _known(r.values),
-                            "to_base": _known(r.to_base), "to_mean": _known(r.to_mean),
+                            "nu12": r.nu12.tolist(), "value": r.values.tolist(),
+                            "to_base": r.to_base.tolist(), "to_mean": r.to_mean.tolist(),
                         }
                         for response, r in part.responses.items()
                     },
@@ -117,12 +104,10 @@ class Nu12Study(Presented):
                 for name, part in self.parts.items()
             },
             "notes": rows(self.notes),
-        }  # fmt: skip
+        })  # fmt: skip
 
     def table(self) -> pd.DataFrame:
         """Return columns model, response, nu12, value, to_base, to_mean."""
-        import pandas as pd
-
         frames = [
             pd.DataFrame({"model": name, "response": response, "nu12": r.nu12, "value": r.values,
                           "to_base": r.to_base, "to_mean": r.to_mean})
@@ -132,7 +117,6 @@ class Nu12Study(Presented):
         return pd.concat(frames, ignore_index=True)
 
     def lines(self) -> list[str]:
-        """Return the result in words, for the terminal."""
         words = [f"{self.response}, relative to that at nu12 = {self.base:g}"]
         named = {
             f"{n}, {k}": r for n, part in self.parts.items() for k, r in part.responses.items()
@@ -156,7 +140,7 @@ class Nu12Study(Presented):
 def vary_nu12(
     project: Project, card: GivenCard | None = None, values: Sequence[float] = NU12,
     tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Progress | bool | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Listener = None,
 ) -> Nu12Study:  # fmt: skip
     """Run tests with a card whose nu12 is changed; arguments and errors as of `refine`."""
     check_unused(out, resume, overwrite)
@@ -164,43 +148,37 @@ def vary_nu12(
         if not 0 <= value < 1:
             raise InputError(None, "--nu12", f"expected 0 <= nu12 < 1, got {value:g}")
     material, several = card_of(project, card), tuple(sorted(set(values)))
-    series = Series(project, material, progress, out, resume)
+    analyses, base = Analyses(project, progress, out, resume), material.law.nu12
     parts = parts_of(project, studied_tests(project, tests), material.thickness)
-    series.total = len(parts) * (1 + len(several))
+    analyses.total = len(parts) * (1 + len(several))
+
+    def run(part: Part) -> PartRatios:
+        """Run a part at every value; raises SolverFailure where its own, or all, fail."""
+        responses: dict[float | None, Mapping[str, float]] = {}
+        failed, notes = {}, []
+        for value in (None, *several):
+            nu12 = base if value is None else value
+            law = replace(material.law, nu12=nu12)
+            history = attempt(analyses.run, part.name, part.model, law, part.increments)
+            if isinstance(history, SolverFailure):
+                failed[f"{nu12:g}"] = history.reason
+                if value is None or len(failed) == len(several):
+                    raise history
+                own = [Note(FAILED, history.reason)]
+            else:
+                responses[value] = part.studied.responses(part.model, history)
+                own = notes_of(history, material)
+            notes += [note.about(f"nu12 = {nu12:g}") for note in own]
+        every = [responses.get(value, {}) for value in several]
+        found = {
+            name: ratios(several, [own.get(name, np.nan) for own in every], at_base)
+            for name, at_base in responses[None].items()
+        }
+        return PartRatios(part.studied.response, found, failed, notes)
+
     study = Nu12Study(
-        project, card_words(card), series.solver.name, material.law.nu12,
-        {name: _part(series, part, several) for name, part in parts.items()},
-        tuple(thickness_notes(project, material)),
+        project, card_words(card), analyses.solver.name, base,
+        {name: run(part) for name, part in parts.items()},
+        tuple(other_thickness(material, project.fabric.thickness)),
     )  # fmt: skip
     return finished(study, out)
-
-
-def _part(series: Series, part: Part, values: Sequence[float]) -> PartRatios:
-    law = series.card.law
-
-    def run(nu12: float) -> History:
-        return series.run_part(part, replace(law, nu12=nu12))
-
-    base = run(law.nu12)
-    notes, failed = [note.about(f"nu12 = {law.nu12:g}") for note in series.notes(base)], {}
-    responses: list[Mapping[str, float] | None] = []
-    for value in values:
-        at = f"nu12 = {value:g}"
-        try:
-            history = run(value)
-        except SolverFailure as failure:
-            responses.append(None)
-            failed[f"{value:g}"] = failure.reason
-            notes.append(Note(FAILED, failure.reason, at))
-            if len(failed) == len(values):
-                raise
-            continue
-        responses.append(part.studied.responses(part.model, history))
-        notes += [note.about(at) for note in series.notes(history)]
-    own = part.studied.responses(part.model, base)
-    return PartRatios(part.studied.response, by_response(values, responses, own), failed, notes)
-
-
-def _known(values: Array) -> list[float | None]:
-    """Return numbers for JSON, which has no NaN."""
-    return [float(v) if np.isfinite(v) else None for v in values]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError, Note, SolverFailure, as_note, checked, marks
 from ..errors import lines as note_lines
@@ -26,6 +26,7 @@ from ..experiments.kinds import (
     record_of,
 )
 from ..experiments.registry import kind_named
+from ..files import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
@@ -43,11 +44,9 @@ from .folder import (
     versions,
     write_report,
 )
-from .progress import listener
+from .progress import Listener, listener
+from .simulation import attempt
 from .starts import log_run
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def predicted_kind(name: str) -> Predicted:
@@ -80,7 +79,6 @@ class Predictions:
 
     @property
     def result(self) -> dict[str, Any]:
-        """Return everything in plain values, as result.json holds it."""
         tests: dict[str, Any] = {}
         for outcome, numbers in self.outcomes.values():
             for i in numbers:
@@ -143,8 +141,6 @@ class Predictions:
 
     def runs(self) -> pd.DataFrame:
         """Return a row a run: test, card, wall, numbers, how it ended, marks, notes, seconds."""
-        import pandas as pd
-
         rows = []
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
@@ -160,8 +156,6 @@ class Predictions:
 
     def curves(self) -> pd.DataFrame:
         """Return every run frame by frame, with its test, card and wall."""
-        import pandas as pd
-
         curves = []
         for i, run in enumerate(self.each):
             outcome, own = self._own(i)
@@ -209,16 +203,12 @@ class RunEvent:
     again: bool = False
 
 
-#: Receives every run as it ends, and None as time passes.
-Progress = Callable[[RunEvent | None], None]
-
-
 @checked
 def predict(
     project: Project, tests: str | Sequence[str] | None = None, cards: Cards = None, *,
     samples: int | None = None, jobs: int | None = None, scheduler: str | None = None,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | bool | None = None, command_line: Sequence[str] | None = None,
+    progress: Listener = None, command_line: Sequence[str] | None = None,
 ) -> Predictions:  # fmt: skip
     """Run every chosen test that is predicted with every chosen card.
 
@@ -305,11 +295,8 @@ def run_card(kind: Predicted, solver: Solver, model: Any, card: MaterialCard) ->
     """Run one test with one card; a failure is a record too."""
     check_carries(solver, card.law)
     begun = time.perf_counter()
-    try:
-        outcome: Any = solver.run(model, card.law)
-    except SolverFailure as failure:
-        outcome = failure
-    return record_of(kind, model, outcome, time.perf_counter() - begun)
+    ended = attempt(solver.run, model, card.law)
+    return record_of(kind, model, ended, time.perf_counter() - begun)
 
 
 def mark_of(kind: Predicted, model: Any, law: HypoelasticLaw, solver: Solver) -> str:
@@ -355,7 +342,7 @@ def _around(
 
 def _run(
     project: Project, pairs: Sequence[PredictedRun], records: RunRecords | None, jobs: int | None,
-    progress: Progress,
+    progress: Callable[..., None],
 ) -> list[PredictedRun]:  # fmt: skip
     """Return every pair with its record: from the folder, or run side by side."""
     kinds = [predicted_kind(pair.test.kind) for pair in pairs]
@@ -382,11 +369,8 @@ def _run(
     missing = [number for number in range(len(pairs)) if number not in ended]
     prepare = functools.partial(_runner, project, pairs)
     executor = executor_of(project.with_fit(jobs=jobs))
-    told: Iterable[Any] = ()
-    if missing:
-        lost = lambda number, why: (number, RunRecord(0.0, why))  # noqa: E731
-        told = executor.run_tasks(prepare, missing, "runs", lost)
-    for item in told:
+    lost = lambda number, why: (number, RunRecord(0.0, why))  # noqa: E731
+    for item in executor.run_tasks(prepare, missing, "runs", lost) if missing else ():
         if item is None:
             progress(None)
             continue

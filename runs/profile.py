@@ -6,12 +6,13 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, apart, checked, rows
 from ..errors import lines as note_lines
+from ..files import pandas as pd
 from ..inference.likelihood import (
     BOUND,
     FAILED,
@@ -28,11 +29,8 @@ from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Presented, check_unused, finished
-from .progress import listener
+from .progress import Listener, listener
 from .setup import FitSetup
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Kinds of notes that are made here.
 NOT_CLOSED = NoteKind("profile not closed")
@@ -42,8 +40,6 @@ NOT_CLOSED = NoteKind("profile not closed")
 ASYMMETRIC = 1.3
 #: -2 log L below the best from which another optimum is better.
 BETTER = -0.5
-#: Called with the sides done, all sides, and the one that takes its next step.
-Progress = Callable[[int, int, str], None]
 #: Share of the strain reached at which a modulus is profiled unless strains are given.
 SHARE = 0.5
 #: Downwards and upwards.
@@ -74,7 +70,6 @@ class Profile:
 
     @property
     def name(self) -> str:
-        """The modulus and its strain in words."""
         return f"{self.modulus} at {100 * self.strain:.4g} % of strain"
 
     @property
@@ -84,7 +79,6 @@ class Profile:
 
     @property
     def analyses(self) -> int:
-        """Number of analyses of both sides."""
         return self.below.analyses + self.above.analyses
 
     @property
@@ -103,7 +97,6 @@ class Profile:
 
     @property
     def words(self) -> str:
-        """The interval in a line."""
         low, high = map(_end, self.ends, (self.below, self.above), self.allowed)
         said = (
             f"{self.best:.4g} MPa, {100 * LEVEL:.0f} % from {low} to {high} "
@@ -138,7 +131,6 @@ class Profile:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The content of result.json."""
         values, ratios = self.curve
         return {
             "modulus": self.modulus, "strain": self.strain, "MPa": self.best,
@@ -180,8 +172,6 @@ class Profiles(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a value held; by_sigma : -2 log L by the 1 sigma of the fit."""
-        import pandas as pd
-
         found = []
         for one in self.each:
             values, ratios = (np.array(v) for v in one.curve)
@@ -193,7 +183,6 @@ class Profiles(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
         return {
             "command": "profile", "title": self.project.title,
             "project": str(self.project.path),
@@ -203,7 +192,6 @@ class Profiles(Presented):
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return the result in words, for the terminal."""
         lines = [f"{one.name}: {one.words}" for one in self.each]
         return [*lines, f"{self.analyses} analyses", *note_lines(self.notes)]
 
@@ -212,7 +200,7 @@ class Profiles(Presented):
 def profile(
     project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
     tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,
-    overwrite: bool = False, progress: Progress | bool | None = None,
+    overwrite: bool = False, progress: Listener = None,
 ) -> Profiles:  # fmt: skip
     """Hold moduli away from their best and refit everything else, until the data contradict.
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.

@@ -1,4 +1,4 @@
-"""Progress of what is called from Python: a callback, a bar in a notebook, or nothing."""
+"""Progress: a callback, a bar in a notebook, or nothing; `Count` holds it for terminals as well."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Callable
 from html import escape
 from typing import Any
 
-from .starts import Stage, StartRecord
-
+#: Receives the progress of a study; None: a bar, in a notebook only; True: a bar; False: nothing.
+Listener = Callable[..., None] | bool | None
 #: Seconds between two updates of a bar, and between two lines elsewhere.
 EVERY_S, PLAIN_EVERY_S = 0.2, 10.0
 
 
-def listener(progress: Callable[..., None] | bool | None) -> Callable[..., None]:
+def listener(progress: Listener) -> Callable[..., None]:
     """Return what receives progress: a callback as it is; None: a bar, in a notebook only.
     True : a bar, and outside notebooks a line every ten seconds. False : nothing."""
     if callable(progress):
@@ -31,42 +31,89 @@ def in_notebook() -> bool:
     return hasattr(shell, "kernel")
 
 
-class Bar:
-    """A line that shows what is done, of how many, and the time left; it is updated in place."""
+class Count:
+    """Hold what is done, of how many, what runs, and the time left; `show` is the subclass's.
+    total : also of the starts of each fit, where several are made in turn."""
 
-    def __init__(self) -> None:
-        self.done, self.total, self.words = 0, 0, ""
+    def __init__(self, what: str = "", total: int = 0) -> None:
+        self.starts, self.words, self.analyses = total, "", 0
+        self.begin(what, total)
+
+    def begin(self, what: str, total: int) -> None:
+        """Begin a new count: objectives of another mesh are another sum."""
+        self.what, self.total, self.already = what, total, 0
+        self.done: float = 0
+        self.best: float | None = None
+        #: The start that last had an analysis, and what that left of the objective.
+        self.under_way: tuple[int, float | None] | None = None
         self.begun = time.monotonic()
-        self.shown, self.handle = 0.0, None
 
     def __call__(self, *event: Any) -> None:
-        """Take the progress of any study, or the records of a fit; None: time passes."""
-        one = event[0]
+        """Take the count and the words of a study, or an event of a fit, of predictions or of a
+        series of analyses by the name of its class; None: time passes."""
+        one, kind = event[0], type(event[0]).__name__
         if len(event) == 3:
             self.done, self.total = event[:2]
             self.words = event[2] or self.words
-        elif isinstance(one, str):
+        elif isinstance(one, str):  # the name of a fit that begins
+            self.begin(self.what, self.starts)
             self.words = one
-        elif isinstance(one, Stage):
-            self.done, self.total, self.words = 0, one.total, one.what
-            self.begun = time.monotonic()
-        elif isinstance(one, StartRecord):
-            self.done += 1
-        elif hasattr(one, "analyses"):  # a step of a series
-            self.done, self.total, self.words = one.analysis - 1, one.analyses, one.part
-        elif hasattr(one, "total"):  # the end of a run
-            self.done, self.total = one.done, one.total
+        elif kind == "Stage":
+            self.begin(one.what, one.total)
+        elif kind == "EvaluationRecord":
+            self.analyses += 1
+            self.under_way = one.start, one.objective
+        elif kind == "StartRecord":
+            self.done, self.under_way = self.done + 1, None
+            if one.objective is not None:
+                self.best = min(self.best or one.objective, one.objective)
+        elif kind == "Step":
+            if one.done == 0:
+                self.begin("increments", one.increments)
+            self.done, self.words = (
+                one.done,
+                f"analysis {one.analysis} of {one.analyses}, {one.part}",
+            )
+        elif kind == "RunEvent":
+            self.done, self.total, self.already = one.done, one.total, self.already + one.again
+            if one.run is not None:
+                record = one.run.record
+                how = "ended early" if record.early else "finished"
+                how = f"failed ({record.failure})" if record.failure else how
+                self.words = f"last: {one.run.title}: {how} in {record.seconds:.0f} s"
         self.show()
+
+    def show(self) -> None:
+        """Show the line."""
+
+    @property
+    def note(self) -> str:
+        """Return the words beside the count, the last of them the time left."""
+        parts = [self.words] if self.words else []
+        if self.best is not None:
+            parts.append(f"best {self.best:.3g}")
+        if self.under_way is not None:
+            start, value = self.under_way
+            parts.append(f"start {start} at {'a failure' if value is None else f'{value:.3g}'}")
+        if self.analyses:
+            parts.append(f"{self.analyses} analys{'is' if self.analyses == 1 else 'es'}")
+        left, fresh = "time left not known yet", self.done - self.already
+        if fresh > 0:
+            each = (time.monotonic() - self.begun) / fresh
+            left = f"{each * (self.total - self.done):.0f} s left"
+        return ", ".join([*parts, left])
 
     @property
     def line(self) -> str:
-        """Return the line in words."""
-        count = f"{self.done} of {self.total} " if self.total else ""
-        left = ""
-        if 0 < self.done < self.total:
-            each = (time.monotonic() - self.begun) / self.done
-            left = f", {each * (self.total - self.done):.0f} s left"
-        return f"{count}{self.words}{left}"
+        """Return the count with its note."""
+        count = f"{self.done:g} of {self.total} {self.what}".rstrip() + ", " if self.total else ""
+        return f"{count}{self.note}"
+
+
+class Bar(Count):
+    """A bar in a notebook that is updated in place; a line now and then elsewhere."""
+
+    shown, handle = 0.0, None
 
     def show(self) -> None:
         """Show the line, unless it was shown a moment ago and there is more to come."""
@@ -78,7 +125,7 @@ class Bar:
         if not notebook:
             print(self.line, file=sys.stderr, flush=True)
             return
-        bar = f"<progress value={self.done} max={max(self.total, 1)}></progress> "
+        bar = f"<progress value={self.done:g} max={max(self.total, 1)}></progress> "
         shown = {"text/plain": self.line, "text/html": bar + escape(self.line)}
         if self.handle is None:
             display: Any = sys.modules["IPython"].display

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,25 +19,23 @@ from scipy.optimize import brentq
 
 from ..errors import InputError, Note, SolverFailure, as_note, checked, rows
 from ..errors import lines as note_lines
-from ..experiments.kinds import Refined
+from ..experiments.kinds import Refined, notes_of, other_thickness
+from ..files import pandas as pd
 from ..meshes.mesh import Mesh
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
+from .progress import Listener
 from .simulation import (
     FAILED,
+    Analyses,
     GivenCard,
     Part,
-    Progress,
-    Series,
+    attempt,
     card_of,
     card_words,
     parts_of,
     studied_tests,
-    thickness_notes,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
@@ -139,40 +136,31 @@ def _sizes(sizes: ArrayLike, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One refinement of a part by a factor; size : edge (mm), or step (share of the load)."""
-
-    part: Part
-    factor: float
-    size: float
-
-    @property
-    def elements(self) -> int:
-        """Number of quads of the mesh."""
-        return len(self.part.model.mesh.quads)
-
-    @property
-    def row(self) -> dict[str, Any]:
-        """The columns of a level in tables and JSON."""
-        return {
-            "factor": self.factor, "elements": self.elements, "increments": self.part.increments,
-            "size": self.size,
-        }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class LevelRun:
-    """The run of a level.
+    """One refinement of a part by a factor, and its run; size : edge (mm), or share of the load.
     values : quantities of interest by name, None where the run failed, with the reason in
     `failure`. curve : (x, y) of the response, where levels are compared along one. seconds : wall
     clock."""
 
-    level: Level
-    seconds: float
+    part: Part
+    factor: float
+    size: float
+    seconds: float = 0.0
     iterations: int = 0
     values: Mapping[str, float] | None = None
     curve: Curve | None = None
     failure: str = ""
-    notes: tuple[Note, ...] = ()
+    notes: Sequence[Note] = ()
+
+    @property
+    def elements(self) -> int:
+        return len(self.part.model.mesh.quads)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        return {
+            "factor": self.factor, "elements": self.elements, "increments": self.part.increments,
+            "size": self.size, "seconds": self.seconds, "iterations": self.iterations,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +171,7 @@ class Refinement(Presented):
     card: str
     solver: str
     what: Refined
-    runs: Mapping[str, Sequence[LevelRun]]
+    runs: Mapping[str, Sequence[Level]]
     noise: float
     warnings: tuple[Note, ...] = ()
 
@@ -200,18 +188,13 @@ class Refinement(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a part, level and quantity, with its deviation from the finest level."""
-        import pandas as pd
-
         rows: list[dict[str, object]] = []
         for name, runs in self.runs.items():
             good = ended(runs)
             finest = (good[-1].values if good else None) or {}
             changes = rms_changes(runs)
             for run in runs:
-                start = {
-                    "model": name, "refined": self.what, **run.level.row, "seconds": run.seconds,
-                    "iterations": run.iterations,
-                }  # fmt: skip
+                start = {"model": name, "refined": self.what, **run.row}
                 for quantity, value in (run.values or {}).items():
                     off = value - finest.get(quantity, np.nan)
                     percent = 100 * off / finest.get(quantity, np.nan)
@@ -224,7 +207,6 @@ class Refinement(Presented):
         return pd.DataFrame(rows)
 
     def lines(self) -> list[str]:
-        """Return the result in words, for the terminal."""
         words: list[str] = []
         for name, model in self.result["models"].items():
             head = list(model["quantities"])[-2:] or [""]
@@ -255,9 +237,9 @@ class Refinement(Presented):
         notes = []
         for name, runs in self.runs.items():
             for run in runs:
-                size = f"{run.level.elements} quads"
+                size = f"{run.elements} quads"
                 if self.what == "increments":
-                    size = f"{run.level.part.increments} increments"
+                    size = f"{run.part.increments} increments"
                 failed = [Note(FAILED, run.failure)] if run.failure else []
                 notes += [n.about(f"{name}, {size}") for n in (*failed, *map(as_note, run.notes))]
         return [*notes, *self.warnings]
@@ -273,11 +255,10 @@ def _quantity_words(name: str, found: Mapping[str, Any]) -> str:
     return words + (f" ({found['remark']})" if found["remark"] else "")
 
 
-def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
+def _part(runs: Sequence[Level], noise: float) -> dict[str, Any]:
     good = ended(runs)
     levels = [
-        {**run.level.row, "seconds": run.seconds, "iterations": run.iterations,
-         "values": None if run.values is None else dict(run.values),
+        {**run.row, "values": None if run.values is None else dict(run.values),
          **({"failed": run.failure} if run.failure else {})}
         for run in runs
     ]  # fmt: skip
@@ -287,16 +268,16 @@ def _part(runs: Sequence[LevelRun], noise: float) -> dict[str, Any]:
     finest = good[-1].values or {}
     result["quantities"] = {name: _quantity(name, v, good, noise) for name, v in finest.items()}
     if changes := rms_changes(runs):
-        sizes, largest = [run.level.size for run in good], largest_load(good)
+        sizes, largest = [run.size for run in good], largest_load(good)
         clear = min(changes[-2:]) > noise * largest
         order = observed_order(sizes[-3:], changes[-2:]) if len(changes) > 1 and clear else None
         result["rms_N"] = {"to_next_finer": changes, "largest_load": largest, "order": order}
     return result
 
 
-def _quantity(name: str, finest: float, good: Sequence[LevelRun], noise: float) -> dict[str, Any]:
+def _quantity(name: str, finest: float, good: Sequence[Level], noise: float) -> dict[str, Any]:
     # A run that stopped early has no loads from there on.
-    known = {run.level: run.values[name] for run in good if name in (run.values or {})}  # type: ignore[index]
+    known = {run: run.values[name] for run in good if name in (run.values or {})}  # type: ignore[index]
     observed = convergence([level.size for level in known], list(known.values()), noise)
     best = finest if observed.limit is None else observed.limit
     own = next((value for level, value in known.items() if level.factor == 1), None)
@@ -308,19 +289,19 @@ def _quantity(name: str, finest: float, good: Sequence[LevelRun], noise: float) 
     }  # fmt: skip
 
 
-def ended(runs: Sequence[LevelRun]) -> list[LevelRun]:
+def ended(runs: Sequence[Level]) -> list[Level]:
     """Return the levels that have values, coarse to fine."""
     return [run for run in runs if run.values is not None]
 
 
-def largest_load(good: Sequence[LevelRun]) -> float:
+def largest_load(good: Sequence[Level]) -> float:
     """Return the largest load of the finest level's curve."""
     curve = good[-1].curve
     assert curve is not None
     return float(np.abs(curve[1]).max())
 
 
-def rms_changes(runs: Sequence[LevelRun]) -> list[float]:
+def rms_changes(runs: Sequence[Level]) -> list[float]:
     """Return the RMS between the curves of each level that ended well and the next finer one."""
     curves = [run.curve for run in ended(runs) if run.curve is not None]
     return [rms_between(a, b) for a, b in pairwise(curves)]
@@ -347,7 +328,7 @@ def refine(
     project: Project, card: GivenCard | None = None, tests: str | Sequence[str] | None = None,
     what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None, *,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | bool | None = None,
+    progress: Listener = None,
 ) -> Refinement:  # fmt: skip
     """Run tests with a card on finer and finer meshes, or with more and more increments.
     card : itself, its file, or its name in the project; the one that the project's fit left in its
@@ -364,7 +345,7 @@ def refine(
     if below >= levels:
         raise InputError(None, "--coarser", f"expected fewer than the {levels} levels, got {below}")
     material = card_of(project, card)
-    series = Series(project, material, progress, out, resume)
+    analyses = Analyses(project, progress, out, resume)
     chosen = studied_tests(project, tests)
 
     def size(part: Part) -> float:
@@ -383,36 +364,34 @@ def refine(
             if not fine < coarse * (1 - 1e-9):
                 problem = "two levels come out the same: nothing is left to coarsen; use fewer"
                 raise InputError(project.path, "--coarser", problem)
-    series.total = levels * len(every[0])
-    runs = {name: _runs(series, [own[name] for own in every]) for name in every[0]}
+    analyses.total = levels * len(every[0])
+
+    def run(level: Level) -> Level:
+        """Run one level; an analysis that does not end well is a level without values."""
+        part, begun = level.part, time.perf_counter()
+        studied = part.studied
+        history = attempt(analyses.run, part.name, part.model, material.law, part.increments)
+        # Without the keeping, and of a run that was kept earlier what it took then.
+        seconds = time.perf_counter() - begun
+        if isinstance(history, SolverFailure):
+            return replace(level, seconds=seconds, failure=history.reason)
+        return replace(
+            level, seconds=seconds if history.seconds is None else history.seconds,
+            iterations=history.iterations, values=studied.quantities(part.model, history),
+            curve=None if studied.curve is None else studied.curve(part.model, history),
+            notes=notes_of(history, material),
+        )  # fmt: skip
+
+    runs = {}
+    for name, first in every[0].items():
+        if not analyses.solver.external:  # it compiles on first use: once, untimed
+            attempt(analyses.solver.run, first.part.model, material.law)
+        runs[name] = [run(own[name]) for own in every]
     if all(len(ended(several)) < 2 for several in runs.values()):
         reason = next(r.failure for several in runs.values() for r in several if r.failure)
-        raise SolverFailure(f"fewer than two levels ended well: {reason}", series.solver.name)
+        raise SolverFailure(f"fewer than two levels ended well: {reason}", analyses.solver.name)
     # Result files of other programs have 6 digits.
-    noise, notes = 1e-5 if series.solver.external else 1e-7, thickness_notes(project, material)
-    named = project, card_words(card), series.solver.name
-    return finished(Refinement(*named, what, runs, noise, tuple(notes)), out)
-
-
-def _runs(series: Series, levels: Sequence[Level]) -> list[LevelRun]:
-    if not series.solver.external:
-        # In-process solvers compile on first use: once, untimed.
-        with suppress(SolverFailure):
-            series.solver.run(levels[0].part.model, series.card.law)
-    return [run_level(series, level) for level in levels]
-
-
-def run_level(series: Series, level: Level) -> LevelRun:
-    """Run one level; an analysis that does not end well is a level without values."""
-    part, begun = level.part, time.perf_counter()
-    try:
-        history = series.run_part(part, series.card.law)
-    except SolverFailure as failure:
-        return LevelRun(level, time.perf_counter() - begun, failure=failure.reason)
-    # Without the keeping, and of a run that was kept earlier what it took then.
-    seconds = time.perf_counter() - begun if history.seconds is None else history.seconds
-    studied = part.studied
-    values = studied.quantities(part.model, history)
-    along = None if studied.curve is None else studied.curve(part.model, history)
-    notes = tuple(series.notes(history))
-    return LevelRun(level, seconds, history.iterations, values, along, notes=notes)
+    noise = 1e-5 if analyses.solver.external else 1e-7
+    notes = tuple(other_thickness(material, project.fabric.thickness))
+    named = project, card_words(card), analyses.solver.name
+    return finished(Refinement(*named, what, runs, noise, notes), out)

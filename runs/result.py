@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import report_of
 from ..files import __version__, html_table
+from ..files import pandas as pd
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
 from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
 from ..inference.posterior import LEVEL, Posterior
@@ -41,10 +42,6 @@ from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Record, draw, versions, write_report, write_table
 from .setup import CoarseToFine, FitSetup
 from .simulation import Histories
-from .starts import coarse_columns
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Kinds of notes that are made here.
 STARTS = NoteKind("starts that failed", weight=2)
@@ -60,6 +57,8 @@ BEST = 5
 TABLES = ("residuals", "moduli", "coefficients", "starts")
 #: Numbers of a start that are also summed.
 COUNTED = ("analyses", "external_runs", "cached_runs")
+#: Columns of a start that ran coarse to fine.
+COARSE = ("coarse_objective", "coarse_analyses", "same_as")
 #: Last columns of the residuals.
 COMPARED = ("quantity", "measured", "modelled", "difference", "unit")
 #: Number of strains of each modulus in `Fit.moduli`.
@@ -89,7 +88,7 @@ class Fit:
     @property
     def objective(self) -> float:
         """Return the objective (`FitSetup.objective_is`) of the best fit."""
-        return self.best.objective
+        return self.best.point.value
 
     @property
     def law(self) -> HypoelasticLaw:
@@ -138,18 +137,15 @@ class Fit:
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
-        """Return the fitted tests by name."""
         return {t.test.name: self._fitted(t) for t in self.setup.tests}
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
-        """Return the findings of each test by name."""
         return {t.test.name: report_of(t.test.kind).findings(t, self.tests[t.test.name])
                 for t in self.setup.tests}  # fmt: skip
 
     @cached_property
     def result(self) -> dict[str, Any]:
-        """Return everything in plain values, as result.json holds it."""
         return result_of(self)
 
     @cached_property
@@ -202,8 +198,6 @@ class Fit:
         lower_MPa, upper_MPa: 95 %, noise and mesh together, as sigma_relative; mesh_relative: the
         change on ever finer meshes. NaN where not known; then sigma is of the noise alone.
         """
-        import pandas as pd
-
         sure, rows = self.best.certainty, []
         for name, component in COMPONENTS.items():
             strain = np.linspace(0.0, self.best.valid[component], PLACES)
@@ -291,8 +285,6 @@ class Fit:
     def coefficients(self) -> pd.DataFrame:
         """Return a row an unknown: coefficients in the project's unit, then the nuisance.
         `COLUMNS` (sigma by noise, bounds left aside), then correlations. NaN where not known."""
-        import pandas as pd
-
         unknowns, sure, scales = self.problem.unknowns, self.best.certainty, self.project.scales
         size, nuisance = unknowns.size, unknowns.nuisance.all
         names = [*unknowns.labels, *unknowns.nuisance.names]
@@ -313,8 +305,6 @@ class Fit:
 
     def residuals(self) -> pd.DataFrame:
         """Return a row a matched value: test, part, place, then `COMPARED`, modelled - measured."""
-        import pandas as pd
-
         frames = []
         for prepared in self.setup.tests:
             name = prepared.test.name
@@ -332,18 +322,9 @@ class Fit:
 
     def starts(self) -> pd.DataFrame:
         """Return a row a start: objective, status, analyses, runs, seconds, coarse to fine."""
-        import pandas as pd
-
-        rows = [
-            {
-                "start": r.number, "objective": np.nan if r.objective is None else r.objective,
-                "status": r.status, **{name: getattr(r, name) for name in COUNTED},
-                "seconds": r.wall_s,
-                **({} if self.coarse_to_fine is None else coarse_columns(r)),
-            }
-            for r in self.best.records
-        ]  # fmt: skip
-        return pd.DataFrame(rows)
+        table = pd.DataFrame(start_rows(self)).astype({"objective": float})
+        table.insert(4 + len(COUNTED), "seconds", [r.wall_s for r in self.best.records])
+        return table.drop(columns="seed")
 
     @property
     def laws(self) -> list[HypoelasticLaw]:
@@ -504,6 +485,19 @@ NOTHING = 1.0
 TOGETHER = "all together"
 
 
+def start_rows(fit: Fit) -> list[dict[str, Any]]:
+    """Return a row a start in plain values."""
+    coarse = () if fit.coarse_to_fine is None else COARSE
+    return [
+        {
+            "start": r.number, "seed": list(r.seed), "objective": r.objective, "status": r.status,
+            **{name: getattr(r, name) for name in COUNTED},
+            **{name: getattr(r, name) for name in coarse},
+        }
+        for r in fit.best.records
+    ]  # fmt: skip
+
+
 def result_of(fit: Fit) -> dict[str, Any]:
     """Return the result in plain values; numbers of a single test also stand at the top."""
     project, best, law = fit.project, fit.best, fit.law
@@ -519,15 +513,8 @@ def result_of(fit: Fit) -> dict[str, Any]:
         **law.form.to_card(),
         "nu12": law.nu12, "strain_reached": by_strain(best.reached),
         "valid_strain": by_strain(best.valid), "seed": project.fit.seed,
-        "starts": [
-            {
-                "start": r.number, "seed": list(r.seed), "objective": r.objective,
-                "status": r.status, **{name: getattr(r, name) for name in COUNTED},
-                **({} if fit.coarse_to_fine is None else coarse_columns(r)),
-            }
-            for r in records
-        ],
-        "coarse_to_fine": None if fit.coarse_to_fine is None else fit.coarse_to_fine.to_json(),
+        "starts": start_rows(fit),
+        "coarse_to_fine": None if fit.coarse_to_fine is None else asdict(fit.coarse_to_fine),
         **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
         "optima": fit.agreement, "warnings": [], "notes": [], "wall_s": fit.wall_s,
         "versions": versions(),
@@ -584,16 +571,11 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
 
 def _together(fit: Fit) -> dict[str, Any]:
     """Return what a fit of several tests adds to the numbers of each."""
-    every = fit.problem.blocks.norms(fit.best.point.residual)
-    block = np.concatenate(
-        [np.full(len(c.objective.sizes), k) for k, c in enumerate(fit.problem.comparisons)]
-    )
-    norms = every[: len(block)]  # after them come the priors
-    names = [c.name for c in fit.problem.comparisons]
+    norms = fit.problem.norms(fit.best.point.residual)
     errors = {}
     for test, fitted in fit.tests.items():
-        mine = np.isin(block, [names.index(c.name) for c in fitted.comparisons])
-        errors[test] = float(norms[mine].sum() / fit.project.tests[test].weight)
+        own = np.concatenate([norms[c.name] for c in fitted.comparisons])
+        errors[test] = float(own.sum() / fit.project.tests[test].weight)
     return {"mean_relative_error": errors,
             "weights": {name: fit.project.tests[name].weight for name in fit.tests},
             "pinned": pinned_numbers(fit)}  # fmt: skip

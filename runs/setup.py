@@ -6,7 +6,7 @@ import csv
 import functools
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -156,8 +156,12 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
         problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
         raise InputError(path, "law.margin", problem)
     if of_moduli:
+        keys = {name: f"law.bounds.{name}" for name in ranges}
         return LawBounds.of_moduli(
-            {name: _ordered(project, name, getattr(section, name)) for name in ("E1", "E2", "G12")}
+            {
+                name: _ordered(project, key, getattr(section, name), unit)
+                for name, key in keys.items()
+            }
         )
     lower, upper = (_listed(project, form, name) for name in ("lower", "upper"))
     for i, (place, low, high) in enumerate(zip(form.free, lower, upper, strict=True)):
@@ -172,12 +176,12 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
     return LawBounds.of_entries(np.array(lower) * unit, np.array(upper) * unit, margins)
 
 
-def _ordered(project: Project, name: str, pair: Sequence[float]) -> tuple[float, float]:
+def _ordered(project: Project, key: str, pair: Sequence[float], unit: float) -> tuple[float, float]:
     low, high = pair
     if not low < high:
         problem = f"expected [least, largest], got [{low:g}, {high:g}]"
-        raise InputError(project.path, f"law.bounds.{name}", problem)
-    return low * project.scales.modulus, high * project.scales.modulus
+        raise InputError(project.path, key, problem)
+    return low * unit, high * unit
 
 
 def _listed(project: Project, form: Form, name: str) -> list[float]:
@@ -249,16 +253,14 @@ def _bounds(
     project: Project, name: str, section: UnknownSection, usual: tuple[float, float], start: float,
     unit: float,
 ) -> tuple[float, float]:  # fmt: skip
-    low, high = (unit * value for value in section.bounds or usual)
-    if not low < high:
-        problem = f"expected [least, largest], got [{low / unit:g}, {high / unit:g}]"
-        raise InputError(project.path, f"fit.unknowns.{name}.bounds", problem)
+    key = f"fit.unknowns.{name}.bounds"
+    low, high = _ordered(project, key, section.bounds or usual, unit)
     if not low <= start <= high:
         problem = (
             f"expected bounds around {start / unit:g}, from which a fit starts, got "
             f"[{low / unit:g}, {high / unit:g}]"
         )
-        raise InputError(project.path, f"fit.unknowns.{name}.bounds", problem)
+        raise InputError(project.path, key, problem)
     return low, high
 
 
@@ -358,17 +360,18 @@ class FitSetup:
 
     def problem(self, masks: Masks | None = None) -> FitProblem:
         """Return the fit, built anew; masks : measured points that it matches, by comparison."""
-        comparisons = [
-            comparison
-            for test, weighting in zip(self.tests, self.weightings, strict=True)
-            for comparison in self.judged(
-                test, test.comparisons(self.make_solver, weighting, masks), weighting
-            )
-        ]
-        problem = self.problem_of(comparisons)
+        make = self.make_solver
+        problem = self.problem_of(self.each(lambda test, w: test.comparisons(make, w, masks)))
         if masks is not None and isinstance(self.starts, (ProposedStarts, EstimatedStarts)):
             problem.starts = RandomStarts()  # nothing of the points left out may be in them
         return problem
+
+    def each(
+        self, make: Callable[[PreparedTest, Weighting], Sequence[Comparison]]
+    ) -> list[Comparison]:
+        """Return the comparisons that a function makes of each test, with its objective."""
+        pairs = zip(self.tests, self.weightings, strict=True)
+        return [one for test, w in pairs for one in self.judged(test, make(test, w), w)]
 
     def judged(
         self, test: PreparedTest, comparisons: Sequence[Comparison], weighting: Weighting
@@ -403,7 +406,6 @@ class FitSetup:
         return problem
 
     def make_solver(self, name: str | None = None) -> Solver:
-        """Return `make_solver` of the project."""
         return make_solver(self.project, name)
 
     def make_leading(self, name: str | None = None) -> Solver:
@@ -476,7 +478,6 @@ def _starts(setup: FitSetup) -> Starts:
 
 
 def make_solver(project: Project, name: str | None = None) -> Solver:
-    """Return a new solver, the project's or another by name, with the project's settings of it."""
     named = name or project.fit.solver
     return solver_named(named, project.run_cache, **project.options_of(named))
 
@@ -502,16 +503,14 @@ COARSER = 0.5
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
     """Return the fit on coarse meshes, run by the solver that leads; None if no test has any."""
     make = setup.make_leading
-    pairs = list(zip(setup.tests, setup.weightings, strict=True))
-    coarse = [_coarse(test, make, weighting) for test, weighting in pairs]
-    if not any(coarse):
+    coarse = {
+        test.test.name: _coarse(test, make, weighting)
+        for test, weighting in zip(setup.tests, setup.weightings, strict=True)
+    }
+    if not any(coarse.values()):
         return None
-    comparisons = [
-        comparison
-        for (test, weighting), own in zip(pairs, coarse, strict=True)
-        for comparison in setup.judged(test, own or test.comparisons(make, weighting), weighting)
-    ]
-    return setup.problem_of(comparisons)
+    own = setup.each(lambda test, w: coarse[test.test.name] or test.comparisons(make, w))
+    return setup.problem_of(own)
 
 
 def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Comparison, ...]:
@@ -529,7 +528,7 @@ class CoarseToFine:
     quads : of the coarse and the full mesh by comparison, if meshed. starts : on the coarse mesh.
     distinct : optima fitted on the full mesh."""
 
-    quads: dict[str, tuple[int, int]]
+    quads: dict[str, dict[str, int]]
     starts: int
     distinct: int
     coarse_analyses: int
@@ -541,9 +540,13 @@ class CoarseToFine:
         coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
         if coarse is None:
             return None
-        quads = {own.name: (len(other.model.mesh.quads), len(own.model.mesh.quads))
-                 for other, own in zip(coarse.comparisons, setup.problem().comparisons, strict=True)
-                 if hasattr(own.model, "mesh")}  # fmt: skip
+        pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
+        quads = {
+            own.name: {name: len(one.model.mesh.quads) for name, one in both.items()}
+            for other, own in pairs
+            if hasattr(own.model, "mesh")
+            for both in [{"coarse": other, "full": own}]
+        }
         before = sum(record.coarse_analyses for record in records)
         after = sum(record.analyses for record in records) - before
         distinct = sum(record.same_as is None for record in records)
@@ -551,16 +554,10 @@ class CoarseToFine:
 
     @property
     def words(self) -> str:
-        """Return a line for page and terminal."""
         meshes = ", ".join(
-            f"{name} {coarse} of {full} quads" for name, (coarse, full) in self.quads.items()
+            f"{name} {own['coarse']} of {own['full']} quads" for name, own in self.quads.items()
         )
         return (
             f"{self.starts} starts on the coarse mesh ({meshes}; {self.coarse_analyses} analyses), "
             f"{self.distinct} distinct of their optima on the full one ({self.full_analyses})"
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain values."""
-        quads = {name: {"coarse": own[0], "full": own[1]} for name, own in self.quads.items()}
-        return {**asdict(self), "quads": quads}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
@@ -22,16 +23,16 @@ from ..experiments.kinds import (
     other_thickness,
 )
 from ..experiments.registry import kind_named, report_of
-from ..files import json_text, write_notes, write_text
+from ..files import __version__, json_text, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..project.project import Project, chosen_cards
-from ..project.schema import FITTED, usual_folder
+from ..project.project import Project, chosen_cards, fitted_card
 from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
-from ..solvers.run_cache import RunCache, once, run_cache
+from ..solvers.run_cache import once, run_cache
+from .executor import Task, executor_of
 from .folder import RESULT, KeptAnalyses, Store, draw
-from .progress import listener
+from .progress import Listener, listener
 from .starts import timed
 
 #: A remark on a run that has no result.
@@ -39,7 +40,6 @@ FAILED = NoteKind("failed")
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-T = TypeVar("T")
 R = TypeVar("R", bound="DataclassInstance")
 GivenCard = MaterialCard | Path | str
 
@@ -55,27 +55,24 @@ class Step:
     increments: int
 
 
-Progress = Callable[[Step], None]
-
-
 class Analyses:
     """A series of analyses by the project's solver; `total` : their number, for the progress.
-    kept : cache of finished analyses beside the cache of runs. Raises InputError or SolverFailure
-    if the solver cannot be used."""
+    out : folder that keeps finished analyses, from which `resume` goes on. Raises InputError or
+    SolverFailure if the solver cannot be used."""
 
     def __init__(
-        self, project: Project, progress: Progress | bool | None = None,
-        kept: RunCache | None = None,
+        self, project: Project, progress: Listener = None, out: Path | str | None = None,
+        resume: bool = False,
     ) -> None:  # fmt: skip
         name = project.fit.solver
         options = project.options_of(name)
         self.solver: Solver = usable_solver(name, options, project.path, cache=project.run_cache)
-        if kept is not None:
-            once(self.solver, kept, counted(name, options))
+        if out is not None:
+            once(self.solver, KeptAnalyses(Path(out), resume), counted(name, options))
         self.total = self.count = 0
         self._progress = listener(progress)
 
-    def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int) -> History:
+    def run(self, part: str, model: Any, law: HypoelasticLaw, increments: int = 0) -> History:
         """Run the next analysis or raise SolverFailure; increments : 0 where not known."""
         check_carries(self.solver, law)
         self.count += 1
@@ -124,22 +121,22 @@ def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options
 
 def simulate_cards(
     project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], folder: Path,
-    within_range: bool = False, progress: Progress | bool | None = None,
-    command: str = "simulate test", kept: RunCache | None = None,
+    within_range: bool = False, progress: Listener = None, command: str = "simulate test",
+    resume: bool | None = None,
 ) -> Simulation:  # fmt: skip
     """Run tests with cards; write files of their kinds, notes.csv and result.json.
     cards : by name; the thickness of each counts, not the fabric's. within_range : show curves only
-    within a card's valid range. kept : finished analyses, to resume an interrupted series. Numbers
-    of a single test stand at the top level. SolverFailure : nothing ended well. InputError,
-    OutputError."""
-    analyses = Analyses(project, progress, kept)
+    within a card's valid range. resume : go on with the analyses that the folder keeps; None keeps
+    none. Numbers of a single test stand at the top level. SolverFailure : nothing ended well.
+    InputError, OutputError."""
+    analyses = Analyses(project, progress, None if resume is None else folder, bool(resume))
     models = {(test.name, name): test.models(card.thickness) for test in tests
               for name, card in cards.items()}  # fmt: skip
     analyses.total = sum(map(len, models.values()))
     outcomes: dict[tuple[str, str], dict[str, CardRun]] = {}
     for (of, name), parts in models.items():
         outcomes[of, name] = {
-            part: CardRun(model, _outcome(analyses, f"{name}, {part}", model, cards[name]))
+            part: CardRun(model, attempt(analyses.run, f"{name}, {part}", model, cards[name].law))
             for part, model in parts.items()
         }
     every = [run.outcome for parts in outcomes.values() for run in parts.values()]
@@ -169,11 +166,10 @@ def simulate_cards(
     return Simulation(result, [*lines, *note_lines(notes)])
 
 
-def _outcome(
-    analyses: Analyses, part: str, model: Any, card: MaterialCard
-) -> History | SolverFailure:
+def attempt(run: Callable[..., History], *given: Any) -> History | SolverFailure:
+    """Return the history of an analysis, or the failure that ended it."""
     try:
-        return analyses.run(part, model, card.law, 0)
+        return run(*given)
     except SolverFailure as failure:
         return failure
 
@@ -202,26 +198,6 @@ class Part:
     def increments(self) -> int:
         """Number of load increments of the whole analysis."""
         return len(self.studied.steps(self.model))
-
-
-class Series(Analyses):
-    """The analyses of a study, all with one card, kept in the folder `out`; as `Analyses`."""
-
-    def __init__(
-        self, project: Project, card: MaterialCard, progress: Progress | bool | None = None,
-        out: Path | str | None = None, resume: bool = False,
-    ) -> None:  # fmt: skip
-        kept = None if out is None else KeptAnalyses(Path(out), resume)
-        super().__init__(project, progress, kept)
-        self.card = card
-
-    def run_part(self, part: Part, law: HypoelasticLaw) -> History:
-        """Run the next analysis; raises SolverFailure."""
-        return self.run(part.name, part.model, law, part.increments)
-
-    def notes(self, history: History) -> list[Note]:
-        """Return the notes on the values of a run."""
-        return notes_of(history, self.card)
 
 
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
@@ -266,11 +242,7 @@ def card_of(project: Project, card: GivenCard | None) -> MaterialCard:
     None : the one that the project's fit left in its usual folder."""
     if isinstance(card, MaterialCard):
         return card
-    path = usual_folder(project.path) / FITTED
-    if card is None and not path.is_file():
-        problem = f"no fit left a card in {path}: fit first (bubblefit fit), or name a card"
-        raise InputError(project.path, "--card", problem)
-    (chosen,) = chosen_cards(project, [path if card is None else card]).values()
+    (chosen,) = chosen_cards(project, [fitted_card(project) if card is None else card]).values()
     return chosen
 
 
@@ -281,40 +253,17 @@ def card_words(card: GivenCard | None) -> str:
     return card.name if isinstance(card, MaterialCard) else str(card)
 
 
-def thickness_notes(project: Project, card: MaterialCard) -> list[Note]:
-    """Return a note where the card's thickness, which counts, is not the fabric's."""
-    return other_thickness(card, project.fabric.thickness)
-
-
 def begin_study(
-    folder: Path, parts: Mapping[str, str], resume: bool, overwrite: bool, fits: Iterable[str],
-    records: Sequence[str] = (),
+    folder: Path | None, of: Mapping[str, str], resume: bool, overwrite: bool,
+    fits: Iterable[str] = (), records: Sequence[str] = (),
 ) -> None:  # fmt: skip
-    """Prepare the folder of a study with a folder for each fit; raises as `Store.begin`.
+    """Prepare the folder of a study, if any, with a folder for each fit; raises as `Store.begin`.
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
-    for name in fits if overwrite else ():
-        Store(folder / name).forget()
-    Store(folder).begin(parts, resume, overwrite, records)
-
-
-def mark_of(parts: Mapping[str, Any]) -> str:
-    """Return a digest of everything that a record depends on."""
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-def read_marked(path: Path, mark: str, read: Callable[[dict[str, Any]], T]) -> T | None:
-    """Read a record with `read`; None where it has another mark, or there is none."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return read(content) if content["of"] == mark else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-def write_marked(folder: Path, file: str, mark: str, content: Mapping[str, Any]) -> None:
-    """Write a record into an existing folder; raises OutputError."""
-    Store(folder).write(file, json.dumps({"of": mark, **content}, indent=1) + "\n")
+    if folder is not None:
+        for name in fits if overwrite else ():
+            Store(folder / name).forget()
+        Store(folder).begin({"version": __version__, **of}, resume, overwrite, records)
 
 
 class StudyRecord(Generic[R]):
@@ -327,16 +276,31 @@ class StudyRecord(Generic[R]):
         self, folder: Path | None, file: str, name: str, row: type[R], key: str,
         depends: Mapping[str, Any], read: bool = True,
     ) -> None:  # fmt: skip
-        self._folder, self._file, self._name, self._key = folder, file, name, key
-        self._mark = mark_of(depends)
+        self._path = None if folder is None else folder / file
+        self._name, self._key = name, key
+        self._mark = hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
         self.rows: dict[Any, R] = {}
-        if folder is not None and read:
-            rows = read_marked(folder / file, self._mark, lambda c: [row(**own) for own in c[name]])
-            self.rows = {getattr(one, key): one for one in rows or ()}
+        if self._path is not None and read:
+            with suppress(OSError, ValueError, KeyError, TypeError):  # damaged, or not there
+                content = json.loads(self._path.read_text(encoding="utf-8"))
+                if content["of"] == self._mark:
+                    rows = [row(**own) for own in content[name]]
+                    self.rows = {getattr(one, key): one for one in rows}
 
     def write(self, row: R) -> None:
         """Add a row and write the file; raises OutputError."""
         self.rows[getattr(row, self._key)] = row
-        if self._folder is not None:
+        if self._path is not None:
             rows = [asdict(self.rows[key]) for key in sorted(self.rows)]
-            write_marked(self._folder, self._file, self._mark, {self._name: rows})
+            content = {"of": self._mark, self._name: rows}
+            write_text(self._path, json.dumps(content, indent=1) + "\n")
+
+    def run(
+        self, project: Project, prepare: Callable[[], Task], keys: Iterable[Any], what: str
+    ) -> Iterator[R | None]:
+        """Run the tasks of the keys without a row; yield each row written, None now and then."""
+        missing = [key for key in keys if key not in self.rows]
+        for row in executor_of(project).run_tasks(prepare, missing, what) if missing else ():
+            if row is not None:
+                self.write(row)
+            yield row

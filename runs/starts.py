@@ -119,7 +119,9 @@ def run_start(
             optimum = fit_from(problem, np.array(coarse.unknowns), options, True)
         else:
             optimum = fit_from(problem, feasible_start(problem, seed, number), options, False)
-        failure = optimum.failure if optimum is not None else _why(watched)
+        # Of the project's solver, else of the one that leads it.
+        failure = next((p.failure for p in watched if p.failure), "the first analysis failed")
+        failure = failure if optimum is None else optimum.failure
         status = f"{problem.solver.name} failed: {failure}"
     except NoFeasibleStart as error:
         optimum, status, failure = None, str(error), ""
@@ -141,17 +143,6 @@ def run_start(
         unknowns=tuple(optimum.best.unknowns.tolist()),
         coefficients=tuple(optimum.coefficients.tolist()),
     )  # fmt: skip
-
-
-def coarse_columns(record: StartRecord) -> dict[str, Any]:
-    """Return the columns of a start that ran coarse to fine."""
-    names = ("coarse_objective", "coarse_analyses", "same_as")
-    return {name: getattr(record, name) for name in names}
-
-
-def _why(problems: Sequence[FitProblem]) -> str:
-    """Return the failure of the project's solver, else of the one that leads it."""
-    return next((p.failure for p in problems if p.failure), "the first analysis failed")
 
 
 STARTS, HISTORY = "starts.jsonl", "history.csv"
@@ -204,7 +195,6 @@ class RunningFiles:
         self.store.write(HISTORY, _table([rows[0], *body]))
 
     def close(self) -> None:
-        """Close the files, if open."""
         for stream in (self._rows, self._starts):
             if stream is not None:
                 stream.close()

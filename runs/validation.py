@@ -9,11 +9,12 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, checked, rows
+from ..errors import lines as note_lines
 from ..experiments.kinds import (
     Divisible,
     FittedTest,
@@ -27,8 +28,8 @@ from ..experiments.kinds import (
     unstable_words,
 )
 from ..experiments.registry import kind_named, report_of
-from ..files import __version__
-from ..inference.comparison import Blocks
+from ..files import __version__, known
+from ..files import pandas as pd
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
@@ -36,24 +37,19 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project, chosen_cards
 from .best import LEAST_STRAIN
 from .compare import candidates, errors, fit_of, plain
-from .executor import executor_of
-from .fit import FitEvent, stored_fit
+from .executor import Task
+from .fit import stored_fit
 from .folder import Presented, check_asked, check_unused, finished
 from .predictions import predict
-from .progress import listener
+from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
-from .simulation import FAILED, begin_study, mark_of, read_marked, write_marked
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .simulation import FAILED, StudyRecord, begin_study
 
 STARTS = 3
 #: The sort of parts that is left out by default: whole tests.
 TESTS = "tests"
 NO_FIT = "no fit without it ended well"
-#: Called with the words of what is fitted, then the records of its starts; None now and then.
-Progress = Callable[[str | FitEvent | None], None]
 #: Values of nuisance unknowns by comparison and name, in their units.
 NuisanceValues = Mapping[str, Mapping[str, float]]
 
@@ -73,42 +69,36 @@ class HeldOut:
     numbers: Mapping[str, Any] = field(default_factory=dict)
 
 
-def held_out(prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver) -> HeldOut:
-    """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns."""
-    name = prepared.test.name
-    comparisons = prepared.comparisons(make_solver, Weighting(relative=True))
+def held_out(
+    prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver, part: Masks | None = None,
+    nuisance: NuisanceValues | None = None, name: str = "",
+) -> HeldOut:  # fmt: skip
+    """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns.
+    part : judge it at these points alone, with `nuisance` values of the rest; name : of the part.
+    """
+    name = name or prepared.test.name
+    comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
     problem, y = problem_at(law, comparisons)
     units = {c.name: c.objective.unit for c in comparisons}
-    point = evaluate_law(problem, y)
+    if nuisance is None:
+        point = evaluate_law(problem, y)
+    else:
+        for comparison in comparisons:
+            known = nuisance.get(comparison.name, {})
+            places = problem.unknowns.nuisance_places(comparison.name)
+            y[places] = [known.get(n.name, 0.0) for n in comparison.nuisance]
+        point = problem.evaluate(y, False, warm=False)
     if point is None:
         return not_judged(name, f"no analysis: {problem.failure}", units)
     notes = tuple(note.about(name) for note in _notes(problem, point, law))
     rms = errors(problem, point.residual)
+    if nuisance is not None:
+        norms = np.concatenate(list(problem.norms(point.residual).values()))
+        return HeldOut(name, float(norms.sum()), rms, units, notes)
     own = report_of(prepared.test.kind).findings(
         prepared, _fitted(prepared, problem, point, law, make_solver)
     )
     return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
-
-
-def held_out_part(
-    prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver, part: Masks,
-    nuisance: NuisanceValues, name: str,
-) -> HeldOut:  # fmt: skip
-    """Run a law on a test and judge it at a part alone, with nuisance values of the rest."""
-    comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
-    problem, y = problem_at(law, comparisons)
-    units = {c.name: c.objective.unit for c in comparisons}
-    for comparison in comparisons:
-        known = nuisance.get(comparison.name, {})
-        places = problem.unknowns.nuisance_places(comparison.name)
-        y[places] = [known.get(n.name, 0.0) for n in comparison.nuisance]
-    point = problem.evaluate(y, False, warm=False)
-    if point is None:
-        return not_judged(name, f"no analysis: {problem.failure}", units)
-    blocks = point.residual[: sum(sum(c.objective.sizes) for c in comparisons)]
-    error = float(np.sum(Blocks([n for c in comparisons for n in c.objective.sizes]).norms(blocks)))
-    notes = tuple(note.about(name) for note in _notes(problem, point, law))
-    return HeldOut(name, error, errors(problem, point.residual), units, notes)
 
 
 def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
@@ -123,7 +113,7 @@ def _fitted(
     """Return the test as after a fit, in its own objective."""
     reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
     own = prepared.comparisons(make_solver, Weighting())
-    values = [problem.unknowns.nuisance_values(c.name, point.unknowns) for c in own]
+    values = nuisance_of(problem, point.unknowns).values()
     nuisance = {name: value for of_one in values for name, value in of_one.items()}
     valid = np.minimum(reached, law.strain_range)
     return FittedTest(own, point.histories, nuisance, law, [law], reached, valid, None)
@@ -169,13 +159,10 @@ class Validation(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Notes of every law, at every test."""
         return [note.about(one.law) for one in self.judged for note in one.predicted.notes]
 
     def table(self) -> pd.DataFrame:
         """Return a row a law and comparison: law, test, compared, unit, errors."""
-        import pandas as pd
-
         return pd.DataFrame([
             {
                 "law": one.law, "test": one.predicted.test, "compared": name, "unit": unit,
@@ -190,22 +177,16 @@ class Validation(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
         table = self.table()
-        means = {law: None if np.isnan(mean) else mean for law, mean in self.means.items()}
-        return {
+        return known({
             "command": "validate", "title": self.project.title, "version": __version__,
             "left_out": self.leave, "error": "mean relative RMS error of a test, or of its part",
-            "mean_foretold": means,
-            "rows": [
-                {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in row.items()}
-                for row in table.to_dict("records")
-            ],
+            "mean_foretold": self.means,
+            "rows": table.to_dict("records"),
             "notes": rows(self.notes),
-        }  # fmt: skip
+        })  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return a table for the terminal, and the conclusions."""
         table = self.table()
         wide = max([20, *(2 + len(name) for name in table["test"])])
         head = "left out" if self.leave != "tests" else "test left out"
@@ -224,23 +205,7 @@ class Validation(Presented):
         said += [f"{law}: predicted {100 * mean:.3g} % on average" for law, mean in means.items()]
         if len(means) > 1:
             said.append(f"predicts best: {min(means, key=means.__getitem__)}")
-        return said
-
-    def errors(self) -> tuple[list[str], dict[str, list[float]], dict[str, list[float]]]:
-        """Return names of tests or parts, and by law the errors there: predicted, fitted."""
-        names = list(dict.fromkeys(one.predicted.test for one in self.judged))
-        laws = dict.fromkeys(one.law for one in self.judged)
-        of = {(one.law, one.predicted.test): one for one in self.judged}
-
-        def of_law(law: str, fitted: bool) -> list[float]:
-            found = [of.get((law, name)) for name in names]
-            return [
-                np.nan if one is None else _relative(one.fitted if fitted else one.predicted)
-                for one in found
-            ]
-
-        after = {law: own for law in laws if np.isfinite(own := of_law(law, True)).any()}
-        return names, {law: of_law(law, False) for law in laws}, after
+        return [*said, *note_lines(self.notes)]
 
 
 def _relative(one: HeldOut | None) -> float:
@@ -285,12 +250,16 @@ def name_of(setup: FitSetup, part: Part) -> str:
     return f"{setup.tests[part.test].test.name}: {part.name}"
 
 
+def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
+    """Return the values of the nuisance unknowns of every comparison."""
+    return {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
+
+
 def errors_of_fit(found: Fit, part: Part) -> HeldOut:
     """Return the errors of the fit to all of the data at a part of them."""
-    setup, problem, y = found.setup, found.problem, found.best.point.unknowns
-    nuisance = {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
-    name, law, test = name_of(setup, part), found.card.law, setup.tests[part.test]
-    return held_out_part(test, law, setup.make_solver, part.alone, nuisance, name)
+    setup, nuisance = found.setup, nuisance_of(found.problem, found.best.point.unknowns)
+    test, name = setup.tests[part.test], name_of(setup, part)
+    return held_out(test, found.card.law, setup.make_solver, part.alone, nuisance, name)
 
 
 def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
@@ -308,16 +277,34 @@ def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     law = problem.unknowns.law(own.law, unknowns)
     # As of a card: known as far as the rest of the data has strained the fabric.
     law = replace(law, strain_range=np.minimum(reached, law.strain_range))
-    nuisance = {
-        c.name: problem.unknowns.nuisance_values(c.name, unknowns) for c in problem.comparisons
-    }
-    return held_out_part(test, law, own.make_solver, part.alone, nuisance, name)
+    nuisance = nuisance_of(problem, unknowns)
+    return held_out(test, law, own.make_solver, part.alone, nuisance, name)
 
 
-def _task(
-    setup: FitSetup, parts: Sequence[Part], starts: int
-) -> Callable[[int, Callable[[Any], None]], tuple[int, HeldOut]]:
-    return lambda number, tell: (number, fit_without(setup, parts[number], starts))
+@dataclass(frozen=True)
+class LeftOut:
+    """A row of the errors at a part, in plain values; notes : as `errors.rows` has them."""
+
+    number: int
+    part: str
+    error: float | None
+    rms: Mapping[str, float]
+    units: Mapping[str, str]
+    notes: Sequence[Mapping[str, str]]
+
+    @property
+    def judged(self) -> HeldOut:
+        """Return the errors of the part with their notes."""
+        notes = tuple(Note(NoteKind(n["kind"]), n["note"], n["of"]) for n in self.notes)
+        return HeldOut(self.part, self.error, self.rms, self.units, notes)
+
+
+def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
+    def left_out(number: int, tell: Callable[[Any], None]) -> LeftOut:
+        one = fit_without(setup, parts[number], starts)
+        return LeftOut(number, one.test, one.error, one.rms, one.units, rows(one.notes))
+
+    return left_out
 
 
 def errors_left_out(
@@ -327,36 +314,11 @@ def errors_left_out(
     """Return the errors at each part of the fit without it, read where the file has them."""
     names = [name_of(setup, part) for part in parts]
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
-    mark = mark_of(of)
-    written = None if folder is None else read_marked(
-        folder / file, mark, lambda content: [_judged(row) for row in content["parts"]]
-    )  # fmt: skip
-    ended = {one.test: one for one in written or ()}
-    known = {k: ended[name] for k, name in enumerate(names) if name in ended}
-    missing = [k for k in range(len(parts)) if k not in known]
+    record = StudyRecord(folder, file, "parts", LeftOut, "number", of)
     prepare = functools.partial(_task, setup, parts, starts)
-    events = executor_of(setup.project).run_tasks(prepare, missing, "parts") if missing else ()
-    for event in events:
-        if event is not None:
-            number, judged = event
-            known[number] = judged
-            if folder is not None:
-                folder.mkdir(parents=True, exist_ok=True)
-                rows = [_plain(known[k]) for k in sorted(known)]
-                write_marked(folder, file, mark, {"parts": rows})
-        tell(None if event is None else f"without {names[event[0]]}")
-    return [known[k] for k in range(len(parts))]
-
-
-def _plain(one: HeldOut) -> dict[str, Any]:
-    notes = [{"kind": note.kind, "words": str(note), "of": note.of} for note in one.notes]
-    return {"part": one.test, "error": one.error, "rms": dict(one.rms), "units": dict(one.units),
-            "notes": notes}  # fmt: skip
-
-
-def _judged(row: Mapping[str, Any]) -> HeldOut:
-    notes = tuple(Note(NoteKind(n["kind"]), n["words"], n["of"]) for n in row["notes"])
-    return HeldOut(row["part"], row["error"], row["rms"], row["units"], notes)
+    for row in record.run(setup.project, prepare, range(len(parts)), "parts"):
+        tell(None if row is None else f"without {row.part}")
+    return [record.rows[k].judged for k in range(len(parts))]
 
 
 @checked
@@ -366,7 +328,7 @@ def validate(
     forms: Sequence[str] = (),
     *, cards: Sequence[str] | Mapping[str, MaterialCard] = (), leave: str = TESTS,
     starts: int = STARTS, trust: Sequence[str] = (), out: Path | str | None = None,
-    resume: bool = False, overwrite: bool = False, progress: Progress | bool | None = None,
+    resume: bool = False, overwrite: bool = False, progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> Validation:  # fmt: skip
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
@@ -395,28 +357,21 @@ def validate(
         setups = {form: prepare_fit(own, chosen) for form, own in projects.items()}
         parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
     folder = None if out is None else Path(out)
-    if folder is not None:
-        of = {"version": __version__, "forms": ", ".join(projects), "left out": leave}
-        names = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
-        fits = [f"{plain(form)}-{name}" for form in projects for name in names]
-        begin_study(folder, of, resume, overwrite, fits)
-    judged = []
-
-    def fitted(own: Project, name: str, names: Sequence[str], place: str) -> Fit:
-        tell(name)
-        into = None if folder is None else folder / place
-        return stored_fit(
-            own, names, into, resume=resume, overwrite=overwrite, progress=tell,
-            command_line=command_line,
-        )  # fmt: skip
-
+    places = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
+    begin_study(
+        folder, {"forms": ", ".join(projects), "left out": leave}, resume, overwrite,
+        [f"{plain(form)}-{place}" for form in projects for place in places],
+        [f"{plain(form)}-without-{leave}.json" for form in projects],
+    )  # fmt: skip
+    fitted = functools.partial(
+        stored_fit, folder=folder, resume=resume, overwrite=overwrite, progress=tell,
+        command_line=command_line,
+    )  # fmt: skip
+    names, judged = [test.name for test in chosen], []
     for form, own in projects.items():
-        names = [test.name for test in chosen]
-        together = fitted(own, f"{form}: all tests", names, f"{plain(form)}-all")
+        together = fitted(own, names, f"{form}: all tests", f"{plain(form)}-all")
         if leave != TESTS:
             file = f"{plain(form)}-without-{leave}.json"
-            if overwrite and folder is not None:
-                (folder / file).unlink(missing_ok=True)
             tell(f"{form}: without each of {len(parts[form])} {leave}")
             alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
             pairs = zip(parts[form], alone, strict=True)
@@ -425,8 +380,16 @@ def validate(
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]
             words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
-            found = fitted(own, words, others, place)
-            judged.append(Judged(form, _judge(found, test), _judge(together, test)))
+            found = fitted(own, others, words, place)
+            judged.append(
+                Judged(
+                    form,
+                    *(
+                        held_out(test, one.card.law, one.setup.make_solver)
+                        for one in (found, together)
+                    ),
+                )
+            )
     return finished(Validation(project, tuple(judged), leave), out)
 
 
@@ -468,7 +431,3 @@ def _predicted(run: PredictedRun, error: float | None, ended: str) -> HeldOut:
     if error is None:
         return not_judged(name, ended, units)
     return HeldOut(name, error, {name: 100 * error}, units, tuple(run.notes))
-
-
-def _judge(found: Fit, test: PreparedTest) -> HeldOut:
-    return held_out(test, found.card.law, found.setup.make_solver)

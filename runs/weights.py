@@ -5,26 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, Note, checked, rows
+from ..errors import lines as note_lines
 from ..files import __version__
+from ..files import pandas as pd
 from ..inference.problem import FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .compare import errors
-from .fit import FitEvent, stored_fit
+from .fit import stored_fit
 from .folder import Presented, check_asked, finished
-from .progress import listener
+from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints
 from .simulation import FAILED, StudyRecord, begin_study
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 STARTS = 5
 #: Factors of the weight, in steps of the square root of two.
@@ -33,8 +32,6 @@ COUNTS = tuple(2.0 ** (k / 2) for k in range(-4, 5))
 PLACES = (0.0, 0.5, 1.0)
 FITTED, RUNS = "fit", "weights-runs.json"
 ERROR = "mean relative RMS error of a test"
-#: Called with the words of what is fitted, then the records of its starts; None now and then.
-Progress = Callable[[str | FitEvent | None], None]
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,6 @@ class WeightStudy(Presented):
 
     @property
     def ended(self) -> list[WeightedFit]:
-        """The fits that ended well."""
         return [run for run in self.runs if not run.failure]
 
     def strain(self, name: str, place: float) -> float:
@@ -74,8 +70,6 @@ class WeightStudy(Presented):
 
     def table(self) -> pd.DataFrame:
         """Return a row a weight: its factor, errors by test and comparison, moduli."""
-        import pandas as pd
-
         units = {c.name: c.objective.unit for c in self.found.problem.comparisons}
         table = []
         for run in self.ended:
@@ -116,7 +110,6 @@ class WeightStudy(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json."""
         return {
             "command": "validate", "title": self.project.title, "version": __version__,
             "weights_of": self.counted, "tests_counted": list(self.names), "error": ERROR,
@@ -135,7 +128,6 @@ class WeightStudy(Presented):
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Return a table for the terminal, and how far the weight moves each modulus."""
         tests = {name: max(12, 2 + len(name)) for name in self.ended[0].relative}
         half = [f"{name} at {self.strain(name, 0.5):.3g}" for name in COMPONENTS]
         lines = [
@@ -153,7 +145,7 @@ class WeightStudy(Presented):
             sigma = self.sigma(name)
             beside = "" if sigma is None else f" (1 sigma there: {100 * max(sigma):.2g} % at most)"
             lines.append(f"{name} changes by {100 * low:+.2g} to {100 * high:+.2g} %{beside}")
-        return lines
+        return [*lines, *note_lines(self.notes)]
 
 
 @checked
@@ -161,7 +153,7 @@ def weights(
     project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
     starts: int = STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
-    progress: Progress | bool | None = None, command_line: Sequence[str] | None = None,
+    progress: Listener = None, command_line: Sequence[str] | None = None,
 ) -> WeightStudy:  # fmt: skip
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
     counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
@@ -183,13 +175,10 @@ def weights(
         )
         raise InputError(project.path, "--weights", problem)
     folder = None if out is None else Path(out)
-    if folder is not None:
-        of = {"version": __version__, "counted": ", ".join(names)}
-        begin_study(folder, of, resume, overwrite, [FITTED], [RUNS])
-    tell("the fit at the project's weights")
+    begin_study(folder, {"counted": ", ".join(names)}, resume, overwrite, [FITTED], [RUNS])
     found = stored_fit(
-        project, [test.name for test in chosen], None if folder is None else folder / FITTED,
-        resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
+        project, [test.name for test in chosen], "the fit at the project's weights", FITTED,
+        folder=folder, resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
     )  # fmt: skip
     at = [f"{value:.9g}" for value in found.best.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "tests": names, "at": at}
@@ -200,7 +189,7 @@ def weights(
 
 def _runs(
     found: Fit, names: Sequence[str], counts: Sequence[float], record: StudyRecord[WeightedFit],
-    tell: Progress,
+    tell: Callable[..., None],
 ) -> Iterator[WeightedFit]:  # fmt: skip
     """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
@@ -238,12 +227,9 @@ def _weighted(
         name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()
         for name, component in COMPONENTS.items()
     }
-    relative = {}
-    norms, block = problem.blocks.norms(residual), 0
-    number = {c.name: len(c.objective.sizes) for c in problem.comparisons}
+    relative, norms = {}, problem.norms(residual)
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
-        blocks = sum(number[c.name] for c in setup.own(test))
-        relative[test.test.name] = float(norms[block : block + blocks].sum() / weighting.weight)
-        block += blocks
+        own = np.concatenate([norms[c.name] for c in setup.own(test)])
+        relative[test.test.name] = float(own.sum() / weighting.weight)
     rms = errors(problem, residual)
     return WeightedFit(count, relative, rms, moduli, unknowns.tolist(), analyses)

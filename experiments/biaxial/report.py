@@ -12,7 +12,7 @@ from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...reports.charts import Charts
 from ...reports.content import Exhibit, Table
-from ...reports.strips import BiaxialPanel, biaxial_charts
+from ...reports.strips import ratio_chart
 from ...reports.vega import saved
 from .. import kinds
 from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
@@ -89,10 +89,10 @@ def simulate(
                 "rms_warp_percent": warp, "rms_fill_percent": fill, "shown_to_kN_per_m": end,
                 "strain_reached": kinds.by_strain(kinds.strains_of(outcome)),
             }  # fmt: skip
-        panels.append(BiaxialPanel(path.ratio, path.larger, PERCENT * path.since, curves))
+        panels.append(ratio_chart(path.ratio, path.larger, PERCENT * path.since, curves))
     if tables:
         out.write("paths.csv", pd.concat(tables))
-    charts = biaxial_charts("ratios", panels)
+    charts = Charts("ratios", panels, "")
     figures = [saved(out, "paths.png", charts, "Strain over the larger load")]
     return Simulation({"cards": numbers}, lines, figures)
 
@@ -127,9 +127,9 @@ def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
     for p in prepared.fitted_paths(fitted):
         curve = ("model", p.data.larger, PERCENT * p.objective.modelled(p.history))
         strain = PERCENT * p.objective.strain
-        panels.append(BiaxialPanel(p.data.ratio, p.data.larger, strain, (curve,)))
+        panels.append(ratio_chart(p.data.ratio, p.data.larger, strain, (curve,)))
     caption = "Strain over the larger load: measured and modelled"
-    return biaxial_charts(f"{prepared.test.name} ratios", panels, caption)
+    return Charts(f"{prepared.test.name} ratios", panels, caption)
 
 
 #: Charts of a fitted test by name, for notebooks.
@@ -160,8 +160,8 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     """Draw the paths; return a table of all cycles."""
     data = prepared.test.data
-    panels = [BiaxialPanel(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
-    charts = biaxial_charts("ratios", panels)
+    panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
+    charts = Charts("ratios", panels, "")
     used = {(id(path.table), path.cycle.count) for path in data.paths}
     rows: list[list[object]] = []
     for read, cycles in zip(data.tables, data.cycles, strict=True):
@@ -236,9 +236,9 @@ def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
         load = measured.load
         strain = PERCENT * found.chosen.constants.strain(load - load[0])
         curves, seen = (("constants", measured.larger, strain),), PERCENT * measured.since
-        panels.append(BiaxialPanel(measured.ratio, measured.larger, seen, curves))
+        panels.append(ratio_chart(measured.ratio, measured.larger, seen, curves))
     caption = "Strain over the larger load: measured, and by the constants"
-    charts = biaxial_charts(f"{found.test} constants", panels, caption)
+    charts = Charts(f"{found.test} constants", panels, caption)
     files.append(saved(out, "constants.png", charts, "picture of the ratios"))
     note = (
         "Stiffness: change of a yarn's load over that of its strain, along the cycle evaluated; "

@@ -17,10 +17,9 @@ from ...reports.content import Exhibit, Table
 from ...reports.maps import write_vtu
 from ...reports.moduli import moduli_together
 from ...reports.strips import (
-    OrderErrors,
     StripCurves,
     load_charts,
-    order_charts,
+    order_chart,
     specimen_charts,
     strip_charts,
 )
@@ -149,9 +148,9 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
         names = "order", "rmse", "left_out"
         orders, rms, left_out = ([getattr(s, n) for s in scores] for n in names)
         order = strip.polynomial.order
-        panels.append(OrderErrors(strip.direction, orders, rms, left_out, order))
+        panels.append(order_chart(strip.direction, orders, rms, left_out, order))
     if panels:
-        save(picture, order_charts(panels))
+        save(picture, Charts("orders", panels, ""))
     return bool(panels)
 
 

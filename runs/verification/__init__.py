@@ -27,7 +27,7 @@ from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import Solver
 from ...solvers.calculix.solver import CalculixSolver, diagnose
 from ...solvers.membrane.solver import MembraneSolver
-from ..progress import listener
+from ..progress import Listener, listener
 from .closed_forms import Number, bent_tubes, hencky_membranes, loaded_tubes, thin_walls
 
 SOURCE = "MSC Marc; Jekel et al., Composite Structures 161 (2017)"
@@ -259,14 +259,13 @@ class Verification:
         return {"ok": not self.missed, "numbers": rows}
 
     def table(self) -> pd.DataFrame:
-        """Return a row a number."""
         return pd.DataFrame(self.result["numbers"])
 
 
 @checked
 def verify(
     subjects: Sequence[str] | None = None, *, data: Path | str | None = None,
-    progress: Callable[[int, int, str], None] | bool | None = None,
+    progress: Listener = None,
     saw: Callable[[str, Sequence[Number]], None] = lambda subject, found: None,
 ) -> Verification:  # fmt: skip
     """Compare this installation with published numbers and closed forms; takes a few minutes.

@@ -13,7 +13,7 @@ turned against each other: no stress at angles below t from the compressed side,
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -64,12 +64,7 @@ class Number:
 
     @property
     def row(self) -> dict[str, Any]:
-        """The number in tables and JSON."""
-        return {
-            "what": self.what, "ours": self.ours, "theirs": self.theirs, "unit": self.unit,
-            "deviation": self.deviation, "allowed": self.allowed, "absolute": self.absolute,
-            "met": self.met, "source": self.source,
-        }  # fmt: skip
+        return {**asdict(self), "deviation": self.deviation, "met": self.met}
 
 
 TERMS = 60

@@ -169,7 +169,7 @@ def test_beside_a_fit_its_card_is_taken_and_its_folder_left_alone(tmp_path):
     bubble = "[[bubble]]\nradius = 100\npressures = [20]\n[bubble.data.known_solution]\n"
     path.write_text(text.replace(cards, f"{bubble}beta = [0,0,0,20,0,0,0,150,0,0,0,500]\n"))
     own = Path("out") / tmp_path.name
-    one_line(bend(path, cwd=tmp_path, code=2), "project.toml: card: ", f"{own}/material.toml")
+    one_line(bend(path, cwd=tmp_path, code=2), "project.toml: --card: ", f"{own}/material.toml")
     law = HypoelasticLaw.linear(700.0, 150.0, 20.0)
     write_card(MaterialCard(law, 0.81, "just fitted"), tmp_path / own / "material.toml")
     (tmp_path / own / "result.json").write_text("{}")

@@ -9,7 +9,7 @@ import pytest
 from bubblefit import files
 from bubblefit.cli import terminal
 from bubblefit.cli.main import main
-from bubblefit.cli.progress import COMPILING, StudyProgress
+from bubblefit.cli.progress import COMPILING, LiveLine
 from bubblefit.cli.terminal import EVENTS, Events
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group
@@ -35,16 +35,16 @@ def clock(monkeypatch):
 
 
 def test_the_start_under_way_is_told_from_its_first_analysis_on(clock):
-    shown = StudyProgress(4, quiet=True)
+    shown = LiveLine("starts", True, 4)
     said = []
     records = [None, analysis(0, 2.98), analysis(1, 0.5), analysis(1, None), ENDED]
     for record in [*records, analysis(0, 0.125)]:
-        shown.saw(record)
-        said.append(shown.note())
+        shown(record)
+        said.append(shown.note)
         clock(2.0)
     unknown = "time left not known yet"
     assert said == [
-        f"no analysis yet, 0 analyses, {unknown}",
+        unknown,
         f"start 0 at 2.98, 1 analysis, {unknown}",
         f"start 1 at 0.5, 2 analyses, {unknown}",
         f"start 1 at a failure, 3 analyses, {unknown}",
@@ -54,22 +54,22 @@ def test_the_start_under_way_is_told_from_its_first_analysis_on(clock):
 
 
 def test_elsewhere_than_on_a_terminal_a_plain_line_a_minute(clock, capsys):
-    shown = StudyProgress(4, quiet=False)
+    shown = LiveLine("starts", False, 4)
     for _ in range(59):
-        shown.saw(analysis(0, 0.5))
+        shown(analysis(0, 0.5))
         clock(1.0)
     assert capsys.readouterr().err == ""
     clock(1.0)
-    shown.saw(analysis(0, 0.25))
+    shown(analysis(0, 0.25))
     line = "0 of 4 starts, start 0 at 0.25, 60 analyses, time left not known yet\n"
     assert capsys.readouterr() == ("", line)
-    shown.saw(analysis(0, 0.125))
+    shown(analysis(0, 0.125))
     assert capsys.readouterr().err == ""
 
 
 def test_compilation_is_announced_until_kernels_are_kept(tmp_path, monkeypatch, capsys):
     def said(quiet):
-        with StudyProgress(1, quiet):
+        with LiveLine("starts", quiet, 1):
             return capsys.readouterr().err
 
     monkeypatch.setattr(files, "_kernel_folder", lambda: tmp_path)

@@ -9,6 +9,7 @@ from bubblefit.reports import html
 from bubblefit.reports.content import Table, read_page_data
 from bubblefit.reports.html import write_report
 from bubblefit.reports.run_pages import UNFINISHED, page_of_folder
+from bubblefit.runs.folder import Record
 
 from ..commands import in_process, one_line
 from ..reports.test_charts import drawn, full_report
@@ -51,23 +52,23 @@ def unfinished(folder):
     (folder / "run.json").write_text("{}")
     (folder / "starts.jsonl").write_text(json.dumps(START) + '\n{"number": 4, "se')
     (folder / "history.csv").write_text("start,analysis\n" + "3,1\n" * 11)
-    record = {
-        "project": {"file": "/lab/fabric.toml"},
-        "runs": [{"command_line": ["bubblefit", "fit", "fabric.toml"], "date": "2026-01-02"}],
-        "data": [{"name": "a.csv", "sha256": "0123456789abcdef"}],
-    }
-    (folder / "provenance.json").write_text(json.dumps(record))
+    runs = [{"command_line": ["bubblefit", "fit", "fabric.toml"], "date": "2026-01-02"}]
+    data = {"test": "one", "name": "a.csv", "sha256": "0123456789abcdef", "format": "csv"}
+    data |= {"columns": {}, "units": {}, "rows_used": 3, "rows_dropped": {}}
+    Record(Path("/lab/fabric.toml"), None, None, [data], {}, runs).write(folder)
     return folder
 
 
 def test_an_unfinished_fit(tmp_path):
     made = page_of_folder(unfinished(tmp_path / "fit"))
     assert made.title == "fabric.toml: unfinished" and made.summary == UNFINISHED
-    facts, starts, record = made.parts
+    facts, starts, record, files = made.parts
     assert facts.pairs == [("starts that ended", 1), ("analyses", 11)]
     assert starts.rows == [[3, "full", 0.25, 7, "converged"]]
     assert ["command", "bubblefit fit fabric.toml"] in record.rows
-    assert ["data: a.csv", "sha256 0123456789ab …"] in record.rows
+    assert files.rows[0][:3] == ["one", "a.csv", "0123456789ab"]
+    (tmp_path / "fit" / "provenance.json").write_text("{}")
+    assert len(list(page_of_folder(tmp_path / "fit").parts)) == 3
     report(tmp_path / "fit")
     assert "Unfinished: there is no result yet" in (tmp_path / "fit" / "report.html").read_text()
     # It leaves no data of a page behind, which would be taken for a result's.

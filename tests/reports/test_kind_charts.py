@@ -7,9 +7,9 @@ import pytest
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.reports import bubbles, cylinders, strips
 from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
-from bubblefit.reports.charts import axis_ends, scale_ends
+from bubblefit.reports.charts import Charts, axis_ends, scale_ends
 from bubblefit.reports.cylinders import BendLine, BendPanel, beam_charts, bending_charts
-from bubblefit.reports.strips import OrderErrors, StripCurves, load_charts, order_charts
+from bubblefit.reports.strips import StripCurves, load_charts, order_chart
 
 from ..drawings import check_charts, data, legend, lines, named, shown
 
@@ -95,14 +95,14 @@ def test_five_nodes_on_the_axis_are_its_profile(on, taken):
     x = np.linspace(0.0, 80.0, on)
     beside = np.column_stack([np.repeat([0.0, 80.0], 2), np.tile([-10.0, 10.0], 2)])
     points = np.vstack([np.column_stack([x, 0 * x]), beside])
-    cut = node_cut(points, still(points), 0)
-    assert len(cut.position) == taken
-    np.testing.assert_allclose(cut.position, np.linspace(0.0, 80.0, taken))
-    np.testing.assert_allclose(cut.height, cut.position)
+    position, height = node_cut(points, still(points), 0)
+    assert len(position) == taken
+    np.testing.assert_allclose(position, np.linspace(0.0, 80.0, taken))
+    np.testing.assert_allclose(height, position)
     turned = polar(np.linspace(0, 2 * np.pi, 73)[:-1] + np.pi / 72)
-    cut = node_cut(turned, cap(turned, 30.0), 0)
-    assert len(cut.position) > 70
-    assert np.interp(0.0, cut.position, cut.height) == pytest.approx(30.0, rel=0.01)
+    position, height = node_cut(turned, cap(turned, 30.0), 0)
+    assert len(position) > 70
+    assert np.interp(0.0, position, height) == pytest.approx(30.0, rel=0.01)
 
 
 WAY = np.linspace(0.0, 40.0, 9)
@@ -284,10 +284,10 @@ def test_deformed_strip():
 
 def test_orders():
     orders, rmse = [1, 2, 3, 4, 5], [70.0, 60.0, 30.0, 21.0, 20.0]
-    warp = OrderErrors("warp", orders, rmse, [72.0, 64.0, 33.0, 23.0, 800.0], 4)
-    charts = order_charts([warp, OrderErrors("fill", orders, rmse, rmse, 2)])
+    left = order_chart("warp", orders, rmse, [72.0, 64.0, 33.0, 23.0, 800.0], 4)
+    right = order_chart("fill", orders, rmse, rmse, 2)
+    charts = Charts("orders", [left, right], "")
     check_charts(charts)
-    left, right = charts.charts
     assert (left.log_y, right.log_y) == (True, False)
     assert (left.title, right.title) == ("warp: order 4", "fill: order 2")
     assert shown(left)[:2] == ("order of the polynomial", "error of the load, N")
@@ -296,12 +296,10 @@ def test_orders():
     assert lines(left, "chosen order")[0].tolist() == [[4, 4], [21.0, 23.0]]
     lost = [np.nan] * 5
     for left_out, first in ((lost, lost), ([*rmse[:4], np.inf], rmse)):
-        check_charts(order_charts([OrderErrors("warp", orders, first, left_out, 4)]))
+        check_charts(Charts("o", [order_chart("warp", orders, first, left_out, 4)], ""))
     load, strain = np.array([0.0, 5.0, 10.0]), np.array([[0.0, 0.0], [1.0, -0.2], [2.0, -0.5]])
-    panel = strips.BiaxialPanel("5:1", load, strain, [("m", load, 2 * strain)])
-    charts = strips.biaxial_charts("b", [panel])
-    check_charts(charts)
-    (chart,) = charts.charts
+    chart = strips.ratio_chart("5:1", load, strain, [("m", load, 2 * strain)])
+    check_charts(Charts("b", [chart], ""))
     assert shown(chart) == ("larger load, kN/m", "strain, %", "ratio 5:1")
     for k, yarn in enumerate(("warp", "fill")):
         for name, factor in (("measured", 1), ("m", 2)):

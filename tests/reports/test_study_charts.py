@@ -1,11 +1,13 @@
 """Charts of moduli and of studies: every value in its place, thresholds, bands, gaps."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bubblefit.reports import studies
 from bubblefit.reports.charts import axis_ends
 from bubblefit.reports.moduli import moduli_charts, pinned_charts
-from bubblefit.reports.studies import LawRow, ProfilePanel
+from bubblefit.runs.poisson import ratios
 
 from ..drawings import check_charts, data, legend, lines, named
 
@@ -29,11 +31,18 @@ def test_optima(values, said):
     assert (chart.x_label, chart.y_label) == ("start, from worst to best", "objective")
 
 
+def law(name, coefficients, fitted, validated=np.nan, folds=()):
+    return SimpleNamespace(
+        name=name, coefficients=coefficients, fitted=fitted, validated=validated,
+        left_out=lambda: folds,
+    )  # fmt: skip
+
+
 def test_laws():
     rows = [
-        LawRow("constant", 3, 210.0, 260.0, [200.0, 300.0]),
-        LawRow("cubic", 12, 48.0, 60.0, [50.0, np.nan]),
-        LawRow("trilinear", 9, float("nan")),
+        law("constant", 3, 210.0, 260.0, [200.0, 300.0]),
+        law("cubic", 12, 48.0, 60.0, [50.0, np.nan]),
+        law("trilinear", 9, float("nan")),
     ]
     charts = studies.law_charts(rows, 45.0, "RMS error, N", "c")
     check_charts(charts)
@@ -46,13 +55,14 @@ def test_laws():
     assert own["cross-validated error"].y == [260.0, 60.0, None]
     assert [s.y for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
     assert chart.level == 45.0 and not chart.log_y and chart.from_zero
-    assert studies.law_charts([LawRow("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
+    assert studies.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
 
 
 def test_profiles():
-    panel = ProfilePanel(
-        "E1 at 1 %", [90.0, 100.0, 120.0], [5.0, 0.0, 2.0], 100.0, 5.0, (92.5, None), (90.0, 110.0)
-    )
+    panel = SimpleNamespace(
+        name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0, sigma=5.0,
+        ends=(92.5, None),
+    )  # fmt: skip
     (chart,) = studies.profile_charts([panel], 3.84, "c").charts
     own = named(chart)
     assert (own["profile"].x, own["profile"].y) == ([90.0, 100.0, 120.0], [5.0, 0.0, 2.0])
@@ -67,23 +77,35 @@ def test_profiles():
 
 
 def test_nu12():
-    lines = {f"at {k}": ([0.1, 0.24], [1.0 + 0.1 * k, 1.0]) for k in range(8)}
-    models = {"a": lines, "b": {"one": ([0.1, 0.2], [np.nan, 1.0])}}
-    chart, few = studies.nu12_charts(models, 0.24, "apex", "c").charts
+    lines = {f"at {k}": ratios([0.1, 0.24], [1.0 + 0.1 * k, 1.0], 1.0) for k in range(8)}
+    few = {"one": ratios([0.1, 0.2], [np.nan, 1.0], 1.0)}
+    parts = {"a": SimpleNamespace(responses=lines), "b": SimpleNamespace(responses=few)}
+    study = SimpleNamespace(parts=parts, base=0.24, response="apex")
+    chart, few = studies.nu12_charts(study, "c").charts
     assert [series.rank for series in chart.series[:-1]] == pytest.approx(np.linspace(0, 1, 8))
     assert chart.series[3].y == pytest.approx([1.3, 1.0]) and chart.level == 1.0
     assert "1 to 1.7" in chart.alt
     assert few.series[0].y == [None, 1.0] and few.series[0].rank is None
-    moduli = {"E1": {0.0: [90.0, 100.0, 110.0], 0.05: [50.0, 60.0, 70.0]}, "G12": {0.0: [1, 2, 3]}}
-    sigma = {"E1": [0.1, 0.05], "G12": None}
-    relative = {"one": [0.01, 0.02, 0.03]}
-    errors, others = studies.weights_charts("strip", [0.5, 1.0, 2.0], relative, moduli, sigma)
+    runs = [
+        SimpleNamespace(
+            count=count, relative={"one": error},
+            moduli={"E1": [at_rest, later, 9.0], "E2": [8.0] * 3, "G12": [error] * 3},
+        )
+        for count, error, at_rest, later in (
+            (0.5, 0.01, 90.0, 50.0), (1.0, 0.02, 100.0, 60.0), (2.0, 0.03, 110.0, 70.0),
+        )
+    ]  # fmt: skip
+    study = SimpleNamespace(
+        counted="strip", ended=runs, strain=lambda name, place: place,
+        sigma=lambda name: [0.1, 0.05, 0.0] if name == "E1" else None,
+    )  # fmt: skip
+    errors, others = studies.weights_charts(study)
     assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
-    first, shear = others.charts
-    assert [s.y for s in first.series] == [[90, 100, 110], [100], [50, 60, 70], [60]]
-    bars = [(s.lower, s.upper) for s in first.series[1::2]]
+    first, _, shear = others.charts
+    assert [s.y for s in first.series] == [[90, 100, 110], [100], [50, 60, 70], [60], [9, 9, 9]]
+    bars = [(s.lower, s.upper) for s in first.series[1:4:2]]
     assert bars == [([90], [110]), ([57], [63])]
-    assert first.series[1].x == [1.0] and [s.y for s in shear.series] == [[1, 2, 3]]
+    assert first.series[1].x == [1.0] and [s.y for s in shear.series] == 3 * [[0.01, 0.02, 0.03]]
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
 
 

@@ -325,7 +325,7 @@ def test_the_card_of_the_fit_where_the_project_has_none(tmp_path, monkeypatch):
     bare, fitted = with_cards(tmp_path), Path("out/fabric/material.toml")
     assert card_sources(bare) == [fitted]
     said = complaint(chosen_cards, bare)
-    assert said.startswith(f"{bare.path}: card: ") and str(fitted) in said and "--card" in said
+    assert said.startswith(f"{bare.path}: --card: ") and str(fitted) in said and "--card" in said
     fitted.parent.mkdir(parents=True)
     filed(fitted.parent, "", "material.toml")
     assert list(chosen_cards(bare)) == ["material"]

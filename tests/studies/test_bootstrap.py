@@ -25,7 +25,7 @@ from bubblefit.runs import weights as study_of
 from bubblefit.runs.best import NOT_THE_CARD
 from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
 from bubblefit.runs.plan import plan
-from bubblefit.runs.poisson import by_response, ratios, vary_nu12
+from bubblefit.runs.poisson import ratios, vary_nu12
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
@@ -372,10 +372,6 @@ def test_ratios_leave_out_what_failed():
     assert found.to_mean == pytest.approx([2 / 3, NAN, 4 / 3], nan_ok=True)
     assert found.spread == pytest.approx((-0.2, 0.6))
     assert np.isnan(ratios([0.1], [NAN], 1.0).spread).all()
-    early = by_response([0.1, 0.2, 0.3], [{"a": 1.0}, {"a": 2.0, "b": 1.0}, None],
-                        {"a": 2.0, "b": 4.0})  # fmt: skip
-    assert early["a"].to_base == pytest.approx([0.5, 1.0, NAN], nan_ok=True)
-    assert early["b"].to_base == pytest.approx([NAN, 0.25, NAN], nan_ok=True)
     # Constant thickness: the width follows nu12, so the load falls with exp(-nu12 eps).
     model = straight_strip("warp", 20.0, 22.0, 0.8, increments=20)
 

@@ -46,8 +46,8 @@ def off_by(modulus, true):
 
 def test_a_fold_errs_by_what_the_specimens_differ_by(project):
     setup = prepare_fit(project, project.chosen("one", fitted=True))
-    found = [fold for fold in compare.validate(setup, 5, 1) if fold is not None]
-    assert sorted(fold.fold for fold in found) == [0, 1]
+    found = compare.errors_of_folds(setup, 5, 1)
+    assert [fold.fold for fold in found] == [0, 1]
     expected = {f"one: {name}": off_by(*both)[0] for name, both in MODULI["one"].items()}
     for fold in found:
         assert fold.rms == pytest.approx(expected, rel=1e-3)
@@ -292,7 +292,7 @@ def test_what_a_fit_to_the_other_test_foretells(project, tmp_path, monkeypatch):
     own = two.predicted.rms["two: warp"]
     assert f"constant, two: RMS errors in N: warp {own:.4g}" in found.lines()
     assert two.predicted.numbers["e_uniaxial_N"] == pytest.approx(rms, rel=1e-4)
-    assert found.lines()[-1] == f"constant: predicted {100 * mean:.3g} % on average"
+    assert f"constant: predicted {100 * mean:.3g} % on average" in found.lines()
 
 
 def test_a_card_is_judged_without_a_fit(project, tmp_path):

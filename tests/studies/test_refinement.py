@@ -4,6 +4,7 @@ import contextlib
 import functools
 import json
 import shutil
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,23 +14,20 @@ import pandas as pd
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError, Note, SolverFailure
-from bubblefit.experiments.kinds import BEYOND_CARD, THICKNESS
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import bias_strip, refined_quads, straight_strip, strip_mesh
 from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
-from bubblefit.runs import simulation as analyses
 from bubblefit.runs import simulation as module
-from bubblefit.runs.refinement import Level, LevelRun, convergence, observed_order, refine
+from bubblefit.runs.refinement import Level, convergence, observed_order, refine
 from bubblefit.runs.simulation import (
     card_of,
-    part_name,
     parts_of,
     studied_tests,
-    thickness_notes,
 )
+from bubblefit.solvers import run_cache
 from bubblefit.solvers.base import SNAP
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -80,7 +78,7 @@ def test_order_and_limit_of_a_known_error(bars):
     assert name == "a bar" and quantity["order"] == pytest.approx(2.0, abs=1e-6)
     assert quantity["limit"] == pytest.approx(EXACT, rel=1e-9)
     assert quantity["own_error"] == pytest.approx(0.01 / 4**2, rel=1e-6)
-    levels = [(run.level.elements, run.level.factor) for run in study.runs[name]]
+    levels = [(run.elements, run.factor) for run in study.runs[name]]
     assert levels == [(8, 0.5), (32, 1.0), (128, 2.0), (512, 4.0)]
     assert all(0.0 <= run.seconds < 60.0 for run in study.runs[name])
     assert (steps[0].part, steps[0].analysis, steps[0].analyses) == ("a bar", 1, 4)
@@ -88,7 +86,7 @@ def test_order_and_limit_of_a_known_error(bars):
     assert (study.result["solver"], study.result["card"]) == ("bars", "soft")
     assert study.warnings == ()
     study = refine(project_of(BarTest("a bar")), CARD, what="increments", levels=3)
-    levels = [(r.level.part.increments, r.level.size) for r in study.runs["a bar"]]
+    levels = [(r.part.increments, r.size) for r in study.runs["a bar"]]
     assert levels == [(4, 1 / 4), (8, 1 / 8), (16, 1 / 16)]
     remark = study.result["models"]["a bar"]["quantities"][END]["remark"]
     assert "accuracy of the solver" in remark  # the closed form knows no increments
@@ -155,13 +153,15 @@ def level(factor, quads):
 
 def run(factor, quads, load, late, rise):
     values = {LOAD: load} | ({} if late is None else {LATE: late})
-    return LevelRun(level(factor, quads), quads / 100, 7, values, (X, rise * X))
+    curve = X, rise * X
+    own = level(factor, quads)
+    return replace(own, seconds=quads / 100, iterations=7, values=values, curve=curve)
 
 
 #: 10 + 1, + 1/2, + 1/4 N at halved edges; the curves differ by 0.2 and 0.1 times (1, 2) N.
 RUNS = [
     run(0.5, 25, 11.0, None, 5.3), run(1.0, 100, 10.5, 21.0, 5.1), run(2.0, 400, 10.25, 20.5, 5.0),
-    LevelRun(level(4.0, 1600), 3.0, failure="no equilibrium", notes=()),
+    replace(level(4.0, 1600), seconds=3.0, failure="no equilibrium"),
 ]  # fmt: skip
 ROOT = np.sqrt((1 + 4) / 2)
 
@@ -209,7 +209,7 @@ def test_numbers():
         assert told(runs, noise)["rms_N"]["order"] == pytest.approx(1.0)
     said = told([RUNS[0], RUNS[3]])
     assert said["quantities"] == {} and "rms_N" not in said and len(said["levels"]) == 2
-    assert "rms_N" not in told([LevelRun(r.level, r.seconds, 1, r.values) for r in RUNS[:2]])
+    assert "rms_N" not in told([replace(r, curve=None) for r in RUNS[:2]])
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
@@ -289,7 +289,6 @@ def test_parts_are_called_by_what_tells_them_apart(bars, monkeypatch):
     assert len(parts["one"].model.mesh.quads) == 32
     finer = parts_of(project, [one], 0.5, factor=2.0)["one"]
     assert len(finer.model.mesh.quads) == 128 and finer.increments == 4
-    assert part_name(two, "warp", 2, 1) == "warp" and part_name(two, "warp", 1, 2) == "two"
     assert studied_tests(project) == studied_tests(project, []) == [one, two]
     assert studied_tests(project, ["two"]) == [two]
     monkeypatch.setattr(BarKind, "studied", None)
@@ -303,9 +302,6 @@ def test_the_card_that_is_given(bars, tmp_path):
     assert card_of(project, CARD) is CARD and card_of(project, "own") is CARD
     assert card_of(project, tmp_path / "c.toml").name == "filed"
     assert tuple(map(module.card_words, (CARD, "own", Path("c")))) == ("soft", "own", "c")
-    assert thickness_notes(project, CARD) == []
-    (note,) = thickness_notes(project, MaterialCard(CARD.law, 0.6))
-    assert note.kind is THICKNESS and "0.6 mm" in note and "0.5 mm" in note
     test = BarTest("one")
     said = complaint(parts_of, project_of(test), [test], 0.5, "elements", 0.05)
     assert said.startswith("bars.toml: refinement by 0.05") and said.endswith("got 0")
@@ -319,19 +315,15 @@ def test_the_card_that_is_given(bars, tmp_path):
 
 def test_analyses_are_told_one_after_the_other(bars):
     steps, test = [], BarTest("one", ("warp", "fill"))
-    series = module.Series(project_of(test), CARD, steps.append)
+    series = module.Analyses(project_of(test), steps.append)
     assert series.total == 0 and series.solver is bars
     series.total = 2
     for part in parts_of(project_of(test), [test], 0.5).values():
-        history = series.run_part(part, CARD.law)
+        series.run(part.name, part.model, CARD.law, part.increments)
     assert [(s.part, s.analysis, s.analyses, s.done, s.increments) for s in steps] == [
         ("warp", 1, 2, 0.0, 4), ("warp", 1, 2, 4.0, 4),
         ("fill", 2, 2, 0.0, 4), ("fill", 2, 2, 4.0, 4),
     ]  # fmt: skip
-    assert series.notes(history) == []
-    short = SimpleNamespace(law=SimpleNamespace(strain_range=[0.09, 1.0, 1.0]))
-    series.card = short
-    assert [note.kind for note in series.notes(history)] == [BEYOND_CARD]
 
 
 COMMANDS = {
@@ -357,7 +349,7 @@ def folder(tmp_path, monkeypatch):
 
 @contextlib.contextmanager
 def killed_after(count):
-    made, real = [0], analyses.RunCache.write
+    made, real = [0], run_cache.RunCache.write
 
     def write(self, *given):
         real(self, *given)
@@ -366,7 +358,7 @@ def killed_after(count):
             raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(analyses.RunCache, "write", write)
+        patch.setattr(run_cache.RunCache, "write", write)
         yield made
 
 
