@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverFailure
+from ..errors import InputError, SolverFailure
 from ..materials.law import HypoelasticLaw
-from ..meshes.cylinder_model import Collar, RigidSupports
+from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
+from ..meshes.mesh import enclosed_volume
 from ..meshes.strip_models import UniaxialModel
 from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver
@@ -148,6 +149,12 @@ def _onward(pulls: Array) -> Array:
     return np.append(pulls, BEYOND * pulls[-1])
 
 
+#: mm that the support begins inside the inflated cylinder, so that it touches, and that the collar
+#: begins above it, so that it does not.
+INTO, ABOVE = 0.02, 0.5
+#: Places that may touch: mm to either side of a support and beyond the collar's edge, and how low
+#: or high they lie, in radii.
+BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
 #: mm: length beyond a plane of symmetry, and thickness of a body.
 OVER, THICK = 20.0, 10.0
 
@@ -173,6 +180,42 @@ class RigidBody:
     def faces(self) -> Array:
         """Return (m, 4, 3) mm corners of the faces in contact, as seen from the cylinder."""
         return np.asarray(self.points[self.elements[:, 4:]], dtype=float)
+
+
+def bodies(
+    model: CylinderModel, inflated: Array, under: Numbers, program: str
+) -> tuple[RigidBody, RigidBody]:
+    """Return support and collar at points (n, 3) of a cylinder, `under` those that a support holds.
+
+    InputError : a whole cylinder, of which the program's deck bends a quarter.
+    """
+    if model.copies != 4:
+        raise InputError(None, "symmetry", f"{program} bends a quarter; mesh it as 'quarter'")
+    radius = float(np.abs(model.mesh.points[:, 1]).max())
+    support = support_body(model.supports, radius, float(inflated[under, 1].min()) + INTO)
+    return support, collar_body(model.collar, inflated, ABOVE)
+
+
+def without_cords(model: CylinderModel, program: str) -> None:
+    """Raise InputError for a cylinder with cords."""
+    if model.cords:
+        problem = f"cords are for the solver membrane: {program}'s deck has no tension-only members"
+        raise InputError(None, "cord", problem)
+
+
+def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which places (n, 3) of the tube at rest support and collar may touch."""
+    radius, z = float(np.abs(model.mesh.points[:, 1]).max()), np.abs(places[:, 2])
+    support = np.abs(z - 0.5 * model.supports.span) < BESIDE_SUPPORT
+    collar = z < 0.5 * model.collar.length + BESIDE_COLLAR
+    return support & (places[:, 1] < LOW * radius), collar & (places[:, 1] > HIGH * radius)
+
+
+def volumes(model: CylinderModel, displacements: Array) -> Array:
+    """Return (frames,) mm^3 inside the middle surface of the whole cylinder."""
+    mesh = model.mesh
+    inside = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
+    return model.copies * np.array(inside)
 
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:

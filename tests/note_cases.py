@@ -39,7 +39,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder as cylinder_analysis
 from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
-from bubblefit.solvers.marc.cylinder import may_touch
+from bubblefit.solvers.marc.cylinder import touching
 from bubblefit.solvers.marc.sheets import bubble_history
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane import bending
@@ -178,7 +178,7 @@ def notes_of_marc_bending(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[N
     patch.delenv("BUBBLEFIT_MARC", raising=False)
     model = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0, 60.0, 100.0])
     frames, _ = frames_of(model, model.mesh.points * [0.05, 0.05, 0.0], last=2)
-    frames[-1][1]["Contact Normal Force"][may_touch(model)["supports"]] = 0.0
+    frames[-1][1]["Contact Normal Force"][touching(model)["supports"]] = 0.0
     count = len(frames) - 1
     program = bending_marc(folder, model, frames, 3015, [*range(1, count), count - 1])
     return MarcSolver(marc=program, scratch=str(folder / "scratch")).run(model, LINEAR).remarks

@@ -21,16 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
-from ...files import __version__
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
-from ...meshes.mesh import enclosed_volume
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
-from ..decks import render
-from .deck import MESH_FILE, Converged, Run, Setup, mesh_text
+from ..prescribed import ABOVE, volumes
+from .deck import Converged, Run, Setup, deck_files
 from .frd import FrdFile
-from .library import MATERIAL, STATE_VARIABLES, constants
+from .library import constants
 from .sheets import NEAR, whole_times
 
 GAS = NoteKind("gas")
@@ -39,7 +37,6 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 log = logging.getLogger(__name__)
 
-DECK, MESH = "cylinder.inp.j2", "solids.inp.j2"
 #: Incompatible modes: flat solids lock without.
 ELEMENT = "C3D8I"
 #: Largest residual force and correction, of inflation and of bending: CalculiX' own, and more than
@@ -53,12 +50,6 @@ FIRST, LEAST = 0.1, 1e-5
 MOST_INCREMENTS = 1000
 #: Contact, MPa/mm, as the membrane solver's; what others give: docs/how-to/calculix.md, *Contact*.
 STIFFNESS = 5.0
-#: mm that the support begins inside the cylinder, so that it touches, and that the collar begins
-#: above the inflated cylinder, so that it does not.
-INTO, ABOVE = 0.02, 0.5
-#: Quads that may touch: mm to either side of a support and beyond the collar's edge, and how low
-#: or high they lie, in radii.
-BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
 #: Time that the collar stands still, and of the first increment, which must end before it moves.
 REST, FIRST_BENDING = 1.5, 1.0
 #: mm of the collar's way: longest increment (its effect: docs/how-to/calculix.md), and the one
@@ -142,11 +133,6 @@ def cylinder_decks(
     bending: Mapping[str, Any] | None = None, folder: Path | None = None,
 ) -> dict[str, str]:  # fmt: skip
     """Return the text of each file; bending : of `bending_context`; InputError: of a template."""
-    mesh: dict[str, Any] = {
-        "element": ELEMENT, "points": solids.points.tolist(),
-        "elements": (solids.elements + 1).tolist(), "element_sets": _named(solids.element_sets),
-        "node_sets": _named(solids.node_sets),
-    }  # fmt: skip
     # The plane of the caps is xy, where the warp runs along x or y.
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
     angle = float(np.degrees(np.arctan2(yarn[1], yarn[0])))
@@ -154,13 +140,6 @@ def cylinder_decks(
     tube = constants(law, normal_axis=1, whole_until=until)
     caps = constants(law, angle=angle, whole_until=until)
     context: dict[str, Any] = {
-        "version": __version__,
-        "title": f"Cylinder, {len(solids.elements)} solids {ELEMENT}",
-        "mesh_file": MESH_FILE,
-        "mesh": mesh,
-        "material": MATERIAL,
-        "state_variables": STATE_VARIABLES,
-        "element": ELEMENT,
         "sections": [
             {"set": "TUBE", "constants": tube, "around": True},
             {"set": "CAPS", "constants": caps, "around": False},
@@ -175,18 +154,9 @@ def cylinder_decks(
         "first": FIRST,
         "least": LEAST,
         "most_increments": MOST_INCREMENTS,
-        "force_tolerance": TOLERANCES[0],
-        "correction_tolerance": TOLERANCES[1],
         "time_incrementation": TIME_INCREMENTATION,
     }
-    return {
-        "job.inp": render("calculix", DECK, context, folder),
-        MESH_FILE: mesh_text(MESH, mesh, folder),
-    }
-
-
-def _named(sets: Any) -> dict[str, list[int]]:
-    return {name.upper(): (numbers + 1).tolist() for name, numbers in sets.items() if len(numbers)}
+    return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, TOLERANCES, context, folder)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,24 +195,21 @@ def bending_context(
     model: CylinderModel, solids: SolidMesh, inflated: Array, gas: GasCurve | None = None
 ) -> dict[str, Any]:
     """Return what the template is given for step 2; InputError: a whole cylinder."""
-    if model.copies != 4:
-        raise InputError(None, "symmetry", "CalculiX bends a quarter; mesh it as 'quarter'")
-    radius = float(np.abs(model.mesh.points[:, 1]).max())
-    at, under = solids.points + inflated, solids.node_sets["support_bottom"]
-    low = float(at[under, 1].min()) + INTO
-    bodies = {
-        "SUPPORT_BODY": prescribed.support_body(model.supports, radius, low),
-        "COLLAR_BODY": prescribed.collar_body(model.collar, at, ABOVE),
-    }
-    may_touch = _may_touch(model, radius)
+    under = solids.node_sets["support_bottom"]
+    bodies = prescribed.bodies(model, solids.points + inflated, under, "CalculiX")
+    mesh = model.mesh
+    tube = ~np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
+    # Contact is not looked for everywhere.
+    may_touch = prescribed.may_touch(model, mesh.points[mesh.quads].mean(axis=1))
     listed, node, element = [], len(solids.points), len(solids.elements)
-    for name, body in bodies.items():
+    names = ("SUPPORT_BODY", "COLLAR_BODY")
+    for name, body, own in zip(names, bodies, may_touch, strict=True):
         listed.append(
             {
                 "name": name, "points": body.points.tolist(),
                 "elements": (body.elements + 1 + node).tolist(), "first_node": node,
                 "first_element": element,
-                "fabric": (solids.element_sets["outside"][may_touch[name]] + 1).tolist(),
+                "fabric": (solids.element_sets["outside"][tube & own] + 1).tolist(),
             }
         )  # fmt: skip
         node, element = node + len(body.points), element + len(body.elements)
@@ -267,26 +234,6 @@ def body_nodes(solids: int) -> tuple[slice, slice]:
     around, across = prescribed.SUPPORT_COUNTS
     support = 2 * (around + 1) * (across + 1)
     return slice(solids, solids + support), slice(solids + support, None)
-
-
-def _may_touch(model: CylinderModel, radius: float) -> dict[str, NDArray[np.bool_]]:
-    """Return which quads may meet which body, so that contact is not looked for everywhere."""
-    mesh = model.mesh
-    middle = mesh.points[mesh.quads].mean(axis=1)
-    beside = np.abs(middle[:, 2] - 0.5 * model.supports.span) < BESIDE_SUPPORT
-    tube = ~np.isin(np.arange(len(middle)), mesh.element_sets["caps"])
-    under = middle[:, 2] < 0.5 * model.collar.length + BESIDE_COLLAR
-    return {
-        "SUPPORT_BODY": tube & beside & (middle[:, 1] < LOW * radius),
-        "COLLAR_BODY": tube & under & (middle[:, 1] > HIGH * radius),
-    }
-
-
-def volumes(model: CylinderModel, displacements: Array) -> Array:
-    """Return (frames,) mm^3 inside the middle surface of the whole cylinder."""
-    mesh = model.mesh
-    inside = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
-    return model.copies * np.array(inside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,9 +335,7 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     The history has the deck's pressure; a remark says how far that is from the gas'. A run that
     stops early is reported up to there. SolverFailure: not to the first deflection.
     """
-    if model.cords:
-        problem = "cords are for the solver membrane: CalculiX's deck has no tension-only members"
-        raise InputError(None, "cord", problem)
+    prescribed.without_cords(model, "CalculiX")
     solids, folder = solid_mesh(model), setup.templates
 
     def blown(frd: Path, iterations: int) -> tuple[Array, Array]:

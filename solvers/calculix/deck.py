@@ -58,44 +58,39 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
     return ShellMesh(np.concatenate([points, midsides]), elements, sets, len(points))
 
 
-MESH, MESH_FILE = "mesh.inp.j2", "mesh.inp"
+MESH_FILE = "mesh.inp"
 #: Iterations before CalculiX judges convergence (8, 12), gives up (24) and so on; cut to half
 #: after divergence, grow fourfold after two easy increments (*CONTROLS, TIME INCREMENTATION).
 TIME_INCREMENTATION = "8, 12, 9, 24, 20, 4, , 10\n0.5, 0.5, 0.75, 0.85, , , 4"
 
 
 def deck_files(
-    deck: str, name: str, shells: ShellMesh, element: str, tolerances: tuple[float, float],
+    deck: str, name: str, mesh: Any, element: str, tolerances: tuple[float, float],
     context: Mapping[str, Any], folder: Path | None = None,
 ) -> dict[str, str]:  # fmt: skip
     """Return the text of `job.inp` of template `deck`, and of the mesh; InputError: of these.
 
-    tolerances : largest residual force over the mean, and correction over the largest change.
+    mesh : shells, or solids, which have `element_sets`. tolerances : largest residual force over
+    the mean, and correction over the largest change.
     """
-    mesh = {
-        "element": element,
-        "points": shells.points.tolist(),
-        "elements": (shells.elements + 1).tolist(),
-        "node_sets": {
-            name.upper(): (nodes + 1).tolist() for name, nodes in shells.node_sets.items()
-        },
-    }
+    element_sets = getattr(mesh, "element_sets", {})
+    nodes, elements = mesh.points.tolist(), (mesh.elements + 1).tolist()
+    listed = {"element": element, "points": nodes, "elements": elements}
+    for key, sets in (("node_sets", mesh.node_sets), ("element_sets", element_sets)):
+        listed[key] = {n.upper(): (own + 1).tolist() for n, own in sets.items() if len(own)}
+    kind, own_mesh = ("solids", "solids.inp.j2") if element_sets else ("shells", "mesh.inp.j2")
     common = {
-        "version": __version__, "title": f"{name}, {len(shells.elements)} shells {element}",
-        "mesh_file": MESH_FILE, "mesh": mesh, "material": MATERIAL,
+        "version": __version__, "title": f"{name}, {len(elements)} {kind} {element}",
+        "mesh_file": MESH_FILE, "mesh": listed, "material": MATERIAL,
         "state_variables": STATE_VARIABLES, "element": element, "force_tolerance": tolerances[0],
         "correction_tolerance": tolerances[1], "time_incrementation": TIME_INCREMENTATION,
     }  # fmt: skip
+    # By our template where the user's decks do not have that of the mesh too.
+    own = folder if folder is not None and (folder / own_mesh).is_file() else None
     return {
         "job.inp": render("calculix", deck, {**common, **context}, folder),
-        MESH_FILE: mesh_text(MESH, mesh, folder),
+        MESH_FILE: render("calculix", own_mesh, listed, own),
     }
-
-
-def mesh_text(template: str, mesh: Mapping[str, Any], folder: Path | None) -> str:
-    """Return the mesh's file, by our template where the user's decks do not have it too."""
-    own = folder if folder is not None and (folder / template).is_file() else None
-    return render("calculix", template, mesh, own)
 
 
 def supports_of(supports: Mapping[str, Sequence[int]]) -> list[dict[str, Any]]:

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import CylinderModel
-from ...meshes.mesh import enclosed_volume
 from ..base import EARLY, History, extremes, log_strain
-from ..prescribed import collar_body, support_body
+from ..prescribed import ABOVE, bodies, may_touch, volumes, without_cords
 from .deck import Run, deck_text, fabric_context, fixed, node_sets, supports, time_table
 from .settings import MarcSettings
 from .sheets import NO_FORCES, REACTION, by_time, displacements, pressure_context, whole_times
@@ -24,27 +23,20 @@ UNBALANCED = NoteKind("unbalanced forces")
 
 Array = NDArray[np.float64]
 
-#: mm that the support reaches into the inflated cylinder, so that it touches; that the collar
-#: begins above it, so that it does not; and that the support waits below while it is inflated.
-INTO, ABOVE, BELOW = 0.02, 0.5, 50.0
+#: mm that the support waits below while the cylinder is inflated.
+BELOW = 50.0
 SUPPORT_PATH, COLLAR_PATH = 2, 3
 UP = [0.0, 1.0, 0.0]
 
 
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
     """Return support and collar, patches (n, 12) towards the cylinder; InputError: it is whole."""
-    if model.copies != 4:
-        problem = "Marc's deck bends a quarter; mesh it as 'quarter'"
-        raise InputError(None, "symmetry", problem)
     mesh = model.mesh
-    at, under = mesh.points + inflated, mesh.node_sets["support_bottom"]
-    radius = float(np.abs(mesh.points[:, 1]).max())
-    support = support_body(model.supports, radius, float(at[under, 1].min()) + INTO)
-    collar = collar_body(model.collar, at, ABOVE)
-    bodies = (("support", SUPPORT_PATH, support), ("collar", COLLAR_PATH, collar))
+    found = bodies(model, mesh.points + inflated, mesh.node_sets["support_bottom"], "Marc's deck")
+    named = zip(("support", "collar"), (SUPPORT_PATH, COLLAR_PATH), found, strict=True)
     return [
         {"name": n, "path": path, "direction": UP, "patches": body.faces.reshape(-1, 12).tolist()}
-        for n, path, body in bodies
+        for n, path, body in named
     ]
 
 
@@ -108,9 +100,6 @@ Numbers = NDArray[np.intp]
 
 #: Nodal vector of contact forces; its name is from memory.
 CONTACT = "Contact Normal Force"
-#: Nodes that may touch a body: mm to either side of a support and beyond the collar's edge, and
-#: how low or high they lie, in radii.
-BESIDE_SUPPORT, BESIDE_COLLAR, LOW, HIGH = 80.0, 60.0, -0.35, 0.1
 #: Part of the collar's force by which it may differ from the supports' before a remark says so.
 BALANCE = 0.02
 
@@ -151,9 +140,8 @@ def cylinder_history(
         early = f"the run stopped early; the last increment is at {last:g} mm of deflection"
         remarks.append(Note(EARLY, early))
     mesh = model.mesh
-    volume = model.copies * np.array([enclosed_volume(mesh.points + one, mesh.quads) for one in u])
-    full = float(volume[0])
-    gas = model.gas.closed_in(model.pressure, full)
+    volume = volumes(model, u)
+    gas = model.gas.closed_in(model.pressure, float(volume[0]))
     pressure = [gas.pressure(float(v)) for v in volume]
     return History(
         -forces["collar"][:, 1], u, *extremes(log_strain(mesh, u, mesh.warp)), forces,
@@ -162,17 +150,13 @@ def cylinder_history(
     )  # fmt: skip
 
 
-def may_touch(model: CylinderModel) -> dict[str, Numbers]:
-    """Return the nodes of the tube that collar and supports may touch."""
-    p, tube = model.mesh.points, np.ones(len(model.mesh.points), bool)
+def touching(model: CylinderModel) -> dict[str, Numbers]:
+    """Return the nodes of the tube that supports and collar may touch."""
+    sets, tube = model.mesh.node_sets, np.ones(len(model.mesh.points), bool)
     # The rim where caps and tube meet is the tube's.
-    caps = np.setdiff1d(model.mesh.node_sets["caps"], model.mesh.node_sets["ends"])
-    tube[caps] = False
-    radius, z = float(np.abs(p[:, 1]).max()), np.abs(p[:, 2])
-    collar = tube & (z < 0.5 * model.collar.length + BESIDE_COLLAR) & (p[:, 1] > HIGH * radius)
-    support = tube & (np.abs(z - 0.5 * model.supports.span) < BESIDE_SUPPORT)
-    support &= p[:, 1] < LOW * radius
-    return {"supports": np.flatnonzero(support), "collar": np.flatnonzero(collar)}
+    tube[np.setdiff1d(sets["caps"], sets["ends"])] = False
+    support, collar = may_touch(model, model.mesh.points)
+    return {"supports": np.flatnonzero(tube & support), "collar": np.flatnonzero(tube & collar)}
 
 
 def _forces(
@@ -183,7 +167,7 @@ def _forces(
     if any(name not in frame for frame in frames[1:]):
         raise SolverFailure(NO_FORCES, "marc")
     found = {body: np.zeros((len(frames), 3)) for body in ("supports", "collar")}
-    for body, nodes in may_touch(model).items():
+    for body, nodes in touching(model).items():
         # Along x and z the forces of a quarter cancel against those of the others. The inflated
         # cylinder has not touched the bodies yet.
         found[body][1:, 1] = [model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]]
@@ -203,9 +187,7 @@ def _forces(
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, run: Run) -> History:
     """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
-    if model.cords:
-        problem = "cords are for the solver membrane: Marc's deck has no tension-only members"
-        raise InputError(None, "cord", problem)
+    without_cords(model, "Marc")
     filling, bending = len(model.inflation), len(model.increments)
     deck = inflation_deck(model, law, settings)
     shape = run(deck, filling, lambda t19, _: inflated(t19, model))

@@ -21,7 +21,7 @@ from bubblefit.solvers.marc.cylinder import (
     bending_deck,
     contact_bodies,
     inflation_deck,
-    may_touch,
+    touching,
 )
 from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set, set_lines
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
@@ -316,7 +316,7 @@ def test_bodies_are_where_they_touch(model, grown):
     whole = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0], symmetry="full")
     with pytest.raises(InputError, match="quarter"):
         bending_deck(whole, LINEAR, MarcSettings(), np.zeros_like(whole.mesh.points))
-    touch = may_touch(model)
+    touch = touching(model)
     assert len(touch["collar"]) and len(touch["supports"])
     assert not np.intersect1d(touch["collar"], touch["supports"]).size
     assert (model.mesh.points[touch["collar"], 2] < 133).all()
@@ -340,7 +340,7 @@ def frames_of(model, grown, name="Contact Normal Force", last=3):
     for i in range(filled):
         frames.append((i + 1.0, {"Displacement": grown * (i + 1) / filled, name: zero}))
     frames.append((filled + 1.0, {"Displacement": grown, name: zero}))
-    touch, loads = may_touch(model), []
+    touch, loads = touching(model), []
     for i in range(last):
         forces = zero.copy()
         forces[touch["collar"][:3], 1] = -(i + 1.0)
