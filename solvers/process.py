@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import os
 import shutil
 import signal
@@ -162,6 +163,26 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
     except OSError:
         return ""
     return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
+
+
+def number_rows(path: Path) -> list[list[float]]:
+    """Read the whole lines of finite numbers in a file that a program may be writing."""
+    rows: list[list[float]] = []
+    with suppress(OSError):
+        text = path.read_text(encoding="latin-1")
+        for line in text[: text.rfind("\n") + 1].splitlines():
+            with suppress(ValueError):
+                rows.append([float(part) for part in line.split()])
+    return [row for row in rows if all(map(math.isfinite, row))]
+
+
+def program_at(path: Path, field: str, what: str) -> Path:
+    """Return the absolute path of a program, as runs are in a scratch folder; InputError: none."""
+    if not path.is_file():
+        raise InputError(path, field, f"there is no such file; name the {what} to run")
+    if not os.access(path, os.X_OK):
+        raise InputError(path, field, f"is not executable; chmod +x it, or name another {what}")
+    return path.absolute()
 
 
 def disk_full(folder: Path, lines: Iterable[str], outcome: Outcome) -> str:

@@ -14,10 +14,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...errors import InputError, SolverFailure
+from ...errors import SolverFailure
 from ...files import cache_folder
 from ...readers.sections import Positive
-from ..process import Outcome, disk_full, log_tail
+from ..process import Outcome, disk_full, log_tail, number_rows, program_at
 from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_CCX"
@@ -122,12 +122,7 @@ def _program(path: Path | str, field: str) -> Path:
     given = Path(os.path.expanduser(path))
     if os.sep not in str(path) and (found := shutil.which(given)):
         return Path(found)
-    if not given.is_file():
-        raise InputError(given, field, "there is no such file; name the ccx to run")
-    if not _runs(given):
-        raise InputError(given, field, "is not executable; chmod +x it, or name another ccx")
-    # Runs happen in a scratch folder.
-    return given.absolute()
+    return program_at(given, field, "ccx")
 
 
 def _runs(path: Path) -> bool:
@@ -155,19 +150,8 @@ class Increment:
 
 def increments(sta: Path) -> list[Increment]:
     """Read the increments that converged so far, without attempts given up or half a line."""
-    try:
-        text = sta.read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return []
-    found = []
-    for line in text[: text.rfind("\n") + 1].splitlines():
-        parts = line.split()
-        try:
-            step, increment, attempt, iterations = (int(part) for part in parts[:4])
-            found.append(Increment(step, increment, attempt, iterations, float(parts[4])))
-        except (ValueError, IndexError):
-            continue  # the two header lines
-    return found
+    rows = [row[:5] for row in number_rows(sta) if len(row) >= 5]
+    return [Increment(*map(int, counts), time) for *counts, time in rows]
 
 
 def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> str | None:

@@ -14,9 +14,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from ...errors import InputError, LicenceDenied, SolverFailure
+from ...errors import LicenceDenied, SolverFailure
 from ..base import Progress
-from ..process import WORDS, Outcome, Watch, disk_full, log_tail, run_process
+from ..process import (
+    WORDS,
+    Outcome,
+    Watch,
+    disk_full,
+    log_tail,
+    number_rows,
+    program_at,
+    run_process,
+)
 from ..scratch import run_folder, write_deck
 from .deck import JOB, Reader
 from .settings import VARIABLE, MarcSettings
@@ -63,13 +72,8 @@ def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
 
 def find_marc(settings: MarcSettings) -> Path | None:
     """Return run_marc, None: only modules know it; InputError: not there; SolverFailure: none."""
-    given = Path(os.path.expanduser(settings.executable))
     if os.sep in settings.executable:
-        if not given.is_file():
-            raise InputError(given, "marc", "there is no such file; name the run_marc to run")
-        if not os.access(given, os.X_OK):
-            raise InputError(given, "marc", "is not executable; chmod +x it, or name another")
-        return given.absolute()
+        return program_at(Path(os.path.expanduser(settings.executable)), "marc", "run_marc")
     if settings.modules:
         return _in_modules(settings)
     found = shutil.which(settings.executable)
@@ -111,18 +115,8 @@ class Increment:
 
 def increments(sts: Path) -> list[Increment]:
     """Read increments so far, repeated ones too; lines that are not of 13 numbers are none."""
-    text = _text(sts)
-    found = []
-    for line in text[: text.rfind("\n") + 1].splitlines():
-        parts = line.split()
-        if len(parts) != COLUMNS:
-            continue
-        try:
-            case, increment, cycles, *_ = (int(part) for part in parts[:5])
-            found.append(Increment(case, increment, cycles, float(parts[10])))
-        except ValueError:
-            continue
-    return found
+    rows = [row for row in number_rows(sts) if len(row) == COLUMNS]
+    return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
 
 
 def exit_number(*files: Path) -> int | None:
@@ -248,35 +242,28 @@ def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[st
     return errors, refusals, turned, full
 
 
-@dataclass(frozen=True)
-class Job:
-    """A job: the deck, total time at its end, source of a user subroutine or None."""
-
-    deck: str
-    time: int
-    subroutine: str | None
-
-
 def run_job(
-    job: Job, settings: MarcSettings, read: Reader[T], rescue: Reader[T] | None = None,
-    parent: Path | None = None, timeout: float | None = None, tell: Tell | None = None,
+    deck: str, time: int, source: str | None, settings: MarcSettings, read: Reader[T],
+    rescue: Reader[T] | None = None, parent: Path | None = None, timeout: float | None = None,
+    tell: Tell | None = None,
 ) -> tuple[T, Ending]:  # fmt: skip
-    """Run a job in a fresh scratch folder below `parent`; return what `read` makes of its results.
+    """Run a deck in a fresh scratch folder below `parent`; return what `read` makes of its results.
 
-    rescue : of those of a run that stopped early. SolverFailure: no good end; names the kept
-    folder. LicenceDenied: it never began. InputError: a Marc that is not there.
+    time : total, at the end. source : of a user subroutine, or None. rescue : reads the results of
+    a run that stopped early. SolverFailure: no good end; names the kept folder. LicenceDenied: it
+    never began. InputError: a Marc that is not there.
     """
     find_marc(settings)
     seconds = timeout or settings.timeout
-    subroutine = None if job.subroutine is None else SUBROUTINE
+    subroutine = None if source is None else SUBROUTINE
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
-        write_deck(folder, {f"{JOB}.dat": job.deck, SUBROUTINE: job.subroutine})
+        write_deck(folder, {f"{JOB}.dat": deck, SUBROUTINE: source})
         sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
         watch = None if tell is None else Watch(lambda: increments(sts), tell)
         command, screen = run_command(settings, JOB, subroutine), folder / SCREEN
         outcome = run_process(command, folder, screen, seconds, settings.environment, watch)
         set_earlier_aside(folder)
-        end = ending(folder, JOB, SCREEN, outcome, seconds, float(job.time))
+        end = ending(folder, JOB, SCREEN, outcome, seconds, float(time))
         if end.problem is None:
             try:
                 return read(results, end.iterations), end

@@ -22,7 +22,7 @@ from ..decks import file_mark, in_words, templates_mark
 from ..settings import KEYS
 from . import cylinder, sheets
 from .deck import Reader, Run
-from .job import Job, find_marc, run_job
+from .job import find_marc, run_job
 from .settings import VARIABLE, MarcSettings, marc_settings
 
 REPEATED = NoteKind("repeated increments")
@@ -106,8 +106,8 @@ class MarcSolver:
 
         def once(deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None) -> T:
             nonlocal repeats, early
-            job = Job(deck, units, source)
-            found, end = run_job(job, settings, read, rescue, parent, timeout, self.progress)
+            given = deck, units, source, settings, read, rescue
+            found, end = run_job(*given, parent, timeout, self.progress)
             repeats += end.repeated
             early = early or end.problem or ""
             return found
