@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,25 +29,12 @@ AROUND, LEFT = 72, 3e-4
 DRAWN = 0.15
 
 
-class TubeWall(Protocol):
-    """A tube's wall, inflated; moduli : N/mm along, around, in shear, and Poisson's ratio."""
-
-    @property
-    def shear(self) -> float: ...
-
-    @property
-    def moduli(self) -> tuple[float, float, float, float]: ...
-
-    def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
-        """Return the force along the tube per width (N/mm) and its derivative by the strain."""
-
-    def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
-        """Return the strain along the tube by inflation that `pull` and the cords begin with."""
-
-
 @dataclass(frozen=True)
 class PlainWall:
-    """Stiffness per width (N/mm): along, around, shear; wrinkles : it is slack in compression."""
+    """Stiffness per width (N/mm): along, around, shear; wrinkles : it is slack in compression.
+
+    moduli : N/mm along, around, in shear, and Poisson's ratio, as of a braid.
+    """
 
     axial: float
     hoop: float
@@ -67,6 +53,7 @@ class PlainWall:
         return self.axial, self.hoop, self.shear, self.poisson
 
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
+        """Return the force along the tube per width (N/mm) and its derivative by the strain."""
         by_hoop = self.poisson * self.hoop / self.axial * pressure * radius
         force, slope = by_hoop + self.axial * strain, np.full_like(strain, self.axial)
         if self.wrinkles:
@@ -75,7 +62,7 @@ class PlainWall:
         return force, slope
 
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
-        """Return the strain at which wall and cords together hold the thrust."""
+        """Return the strain along the inflated tube, at which wall and cords hold the thrust."""
         low, high = -1.0, 1.0
         for _ in range(60):
             strain = 0.5 * (low + high)
@@ -170,7 +157,7 @@ class TubeSection:
 
     radius: float
     pressure: float
-    wall: TubeWall
+    wall: PlainWall | BraidedWall
     cords: Sequence[Cord] = ()
 
     def __post_init__(self) -> None:

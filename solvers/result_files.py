@@ -7,13 +7,13 @@ readers when somebody imports it.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,17 +47,8 @@ class ResultFrame:
     fields: dict[str, Array] = field(default_factory=dict)
 
 
-class ResultFile(Protocol):
-    """A file whose `path` and `mesh` are known, and whose frames are read one by one."""
-
-    path: Path
-    mesh: ResultMesh
-
-    def frames(self) -> Iterator[ResultFrame]: ...
-
-
-def last_frame(file: ResultFile, types: Cells) -> meshio.Mesh:
-    """Return mesh and last increment for meshio; InputError: not whole, an unknown type or node."""
+def last_frame(file: Any, types: Cells) -> meshio.Mesh:
+    """Return mesh and last increment of a result file; InputError: an unknown type or node."""
     import meshio
 
     mesh, cells = file.mesh, list[tuple[str, list[Any]]]()

@@ -219,19 +219,35 @@ class SparseTangent(Tangent):
         return np.asarray(self.matrix @ columns)
 
 
-class BorderedTangent(Tangent):
-    """A sparse tangent plus c v v' (a gas: dp/du = -c dV/du), by Sherman and Morrison's formula."""
+class AroundTangent(Tangent):
+    """A tangent that is another one, `inner`, and more."""
 
     def __init__(self, inner: Tangent) -> None:
         self.inner, self.data, self.slot = inner, inner.data, inner.slot
+
+    def factor(self) -> None:
+        self.inner.factor()
+
+    def definite(self) -> bool:
+        return self.inner.definite()
+
+    def solve(self, rhs: Array) -> Array:
+        return self.inner.solve(rhs)
+
+    def times(self, columns: Array) -> Array:
+        return self.inner.times(columns)
+
+
+class BorderedTangent(AroundTangent):
+    """A sparse tangent plus c v v' (a gas: dp/du = -c dV/du), by Sherman and Morrison's formula."""
+
+    def __init__(self, inner: Tangent) -> None:
+        super().__init__(inner)
         self.stiffness, self.border = 0.0, np.empty(0)
 
     def factor(self) -> None:
         self.inner.factor()
         self.answer = self.inner.solve(self.border) if self.stiffness else self.border
-
-    def definite(self) -> bool:
-        return self.inner.definite()
 
     def solve(self, rhs: Array) -> Array:
         x = self.inner.solve(rhs)

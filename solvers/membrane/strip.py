@@ -13,7 +13,7 @@ from ...materials.responses import biaxial_response
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..base import History
 from .bubble import Wall
-from .factorisation import Tangent, tangent_for
+from .factorisation import AroundTangent, tangent_for
 from .kernel import reference_elements
 from .newton import (
     Asked,
@@ -42,20 +42,20 @@ GAUGE_TOLERANCE = 1e-10
 LOOK_BACK = 4
 
 
-class DrivenTangent(Tangent):
+class DrivenTangent(AroundTangent):
     """The tangent of the free unknowns and, in the same array, every entry of the driven ones."""
 
     def __init__(
         self, quads: NDArray[np.intp], size: int, free: NDArray[np.intp], driven: NDArray[np.intp]
     ) -> None:
-        self.inner: Tangent = tangent_for(quads, size, free)
+        super().__init__(tangent_for(quads, size, free))
         dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
         rows, columns = np.repeat(dofs, 12, axis=1), np.tile(dofs, (1, 12))
         beside = np.isin(rows, driven) | np.isin(columns, driven)
         inside = self.inner.data.size
         count = int(beside.sum())
         self.data = np.zeros(inside + count)
-        self.slot = self.inner.slot.copy()
+        self.slot = self.slot.copy()
         self.slot[beside] = inside + np.arange(count)
         self.inner.data = self.data[:inside]
         # By rows; entries of one place are not summed, which a product does not need.
@@ -64,73 +64,10 @@ class DrivenTangent(Tangent):
         at = np.zeros(count), columns[beside][self._by_row], starts
         self._tail, self._edge = self.data[inside:], sp.csr_matrix(at, shape=(size, size))
 
-    def factor(self) -> None:
-        self.inner.factor()
-
-    def definite(self) -> bool:
-        return self.inner.definite()
-
-    def solve(self, rhs: Array) -> Array:
-        return self.inner.solve(rhs)
-
-    def times(self, columns: Array) -> Array:
-        return self.inner.times(columns)
-
     def edge(self) -> sp.csr_matrix:
         """Return (size, size): the driven rows and columns of the tangent as last assembled."""
         self._edge.data[:] = self._tail[self._by_row]
         return self._edge
-
-
-class Pull:
-    """A set of unknowns that moves together by one amount, and the gauge (two nodes) that it opens.
-
-    direction : (3 n,) displacement for one mm of pull, zero at unknowns that are not driven.
-    """
-
-    def __init__(
-        self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
-    ) -> None:
-        self.membrane, self.tangent = membrane, tangent
-        self.direction, self.gauge = direction, gauge
-        lower, upper = membrane.reference[gauge]
-        self.gauge_length = float(np.linalg.norm(upper - lower))
-
-    def elongation(self, u: Array) -> tuple[float, Array]:
-        """Return the elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
-        lower, upper = (self.membrane.reference + u)[self.gauge]
-        length = float(np.linalg.norm(upper - lower))
-        slope = np.zeros(u.shape)
-        slope[self.gauge[1]] = (upper - lower) / length
-        slope[self.gauge[0]] = -slope[self.gauge[1]]
-        return length - self.gauge_length, slope.reshape(-1)
-
-    def response(self) -> Array:
-        """Return (3 n,) displacement per mm of pull, by the tangent as last factorised."""
-        free = self.membrane.free
-        w = self.direction.copy()
-        w[free] = -self.tangent.solve((self.tangent.edge() @ self.direction)[free])
-        return w
-
-    def equilibrium(self, u: Array, elongation: float) -> Array | None:
-        """Return the equilibrium (n, 3) with this elongation, by Newton on the pull; or None."""
-        m = self.membrane
-        for _ in range(MOST_CORRECTIONS):
-            found = m.equilibrium(u, 0.0)
-            if found is None:
-                return None
-            now, slope = self.elongation(found)
-            gap = elongation - now
-            if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
-                return found
-            m.factor()
-            w = self.response()
-            opens = float(slope @ w)
-            move = gap / opens if opens > 0 else np.inf
-            if abs(move) * np.abs(w).max() > m.step_limit:
-                return None
-            u = found + move * w.reshape(u.shape)
-        return None
 
 
 def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
@@ -161,14 +98,14 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     assert isinstance(tangent, DrivenTangent)
     direction = np.zeros(membrane.reference.size)
     direction[model.driven] = -1.0
-    pull = Pull(membrane, tangent, direction, model.mesh.node_sets["gauge"])
+    pull = Pulling(membrane, tangent, direction, model.mesh.node_sets["gauge"])
     levels, shape, free = np.array(model.elongations), membrane.reference.shape, membrane.free
     rates = np.zeros((len(levels), *shape, len(parameters)))
     load_slope = np.zeros((len(levels), len(parameters)))
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record, unstable = Record(membrane, len(levels)), []
     membrane.keep_tangent = True
-    for i, u in enumerate(march(Pulling(pull), levels, asked)):
+    for i, u in enumerate(march(pull, levels, asked)):
         if not tangent.definite():
             unstable.append(i)
         if derivatives is not None:
@@ -194,14 +131,57 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
 
 
 class Pulling(Loading):
-    def __init__(self, pull: Pull) -> None:
-        self.pull = pull
+    """A set of unknowns that moves together by one amount, and the gauge (two nodes) that it opens.
+
+    direction : (3 n,) displacement for one mm of pull, zero at unknowns that are not driven.
+    """
+
+    def __init__(
+        self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
+    ) -> None:
+        self.membrane, self.tangent = membrane, tangent
+        self.direction, self.gauge = direction, gauge
+        lower, upper = membrane.reference[gauge]
+        self.gauge_length = float(np.linalg.norm(upper - lower))
+
+    def elongation(self, u: Array) -> tuple[float, Array]:
+        """Return the elongation of the gauge (mm) at u (n, 3), and its derivative (3 n,)."""
+        lower, upper = (self.membrane.reference + u)[self.gauge]
+        length = float(np.linalg.norm(upper - lower))
+        slope = np.zeros(u.shape)
+        slope[self.gauge[1]] = (upper - lower) / length
+        slope[self.gauge[0]] = -slope[self.gauge[1]]
+        return length - self.gauge_length, slope.reshape(-1)
+
+    def response(self) -> Array:
+        """Return (3 n,) displacement per mm of pull, by the tangent as last factorised."""
+        free = self.membrane.free
+        w = self.direction.copy()
+        w[free] = -self.tangent.solve((self.tangent.edge() @ self.direction)[free])
+        return w
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        return self.pull.equilibrium(start, level)
+        """Return the equilibrium (n, 3) with this elongation, by Newton on the pull; or None."""
+        m, u = self.membrane, start
+        for _ in range(MOST_CORRECTIONS):
+            found = m.equilibrium(u, 0.0)
+            if found is None:
+                return None
+            now, slope = self.elongation(found)
+            gap = level - now
+            if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
+                return found
+            m.factor()
+            w = self.response()
+            opens = float(slope @ w)
+            move = gap / opens if opens > 0 else np.inf
+            if abs(move) * np.abs(w).max() > m.step_limit:
+                return None
+            u = found + move * w.reshape(u.shape)
+        return None
 
     def first(self, level: float) -> Array | None:
-        none = np.zeros_like(self.pull.membrane.reference)
+        none = np.zeros_like(self.membrane.reference)
         return self.reached(0.0, none, level, self._stretched(level), self.most_cuts)
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
@@ -221,17 +201,17 @@ class Pulling(Loading):
     def guessed(self, guess: Array) -> Array:
         """Return a guess with held unknowns at zero and driven ones at their common value."""
         flat = np.array(guess, dtype=float).reshape(-1)
-        driven = self.pull.direction != 0
-        free = self.pull.membrane.free
+        driven = self.direction != 0
+        free = self.membrane.free
         moved = np.zeros_like(flat)
         moved[free] = flat[free]
         moved[driven] = float(flat[driven].mean())
         return moved.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
-        reference = self.pull.membrane.reference
+        reference = self.membrane.reference
         u = np.zeros_like(reference)
-        share = elongation / self.pull.gauge_length
+        share = elongation / self.gauge_length
         u[:, 1] = share * (reference[:, 1] - reference[:, 1].max())
         return self.guessed(u)
 

@@ -22,7 +22,7 @@ from bubblefit.solvers.base import parameters_of
 from bubblefit.solvers.membrane import newton
 from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
-from bubblefit.solvers.membrane.strip import Pull
+from bubblefit.solvers.membrane.strip import Pulling
 
 from ...complaints import complaint
 from ...materials.forms.test_forms import integral
@@ -343,14 +343,14 @@ COARSE = bias(8, across=4, along=12)
 @pytest.mark.parametrize(
     ("owner", "model", "at", "refused"),
     [
-        (Pull, COARSE, 0, 1), (Pull, COARSE, 4, 1), (Pull, COARSE, 4, 3),
+        (Pulling, COARSE, 0, 1), (Pulling, COARSE, 4, 1), (Pulling, COARSE, 4, 3),
         (Membrane, BUBBLE, 3, 1), (Membrane, BUBBLE, 3, 6), (Membrane, BUBBLE, 0, 7),
     ],
 )  # fmt: skip
 def test_cut_back_does_not_change_the_result(monkeypatch, owner, model, at, refused):
     """One level is refused until the step to it has been halved often enough."""
     expected = MembraneSolver(TIGHT).run(model, LAW)
-    levels = model.elongations if owner is Pull else model.increments
+    levels = model.elongations if owner is Pulling else model.increments
     original, calls = owner.equilibrium, []
 
     def stubborn(self, u, level):
