@@ -150,8 +150,8 @@ class Increment:
 
 def increments(sta: Path) -> list[Increment]:
     """Read the increments that converged so far, without attempts given up or half a line."""
-    rows = [row[:5] for row in number_rows(sta) if len(row) >= 5]
-    return [Increment(*map(int, counts), time) for *counts, time in rows]
+    rows = [row for row in number_rows(sta) if len(row) >= 5]
+    return [Increment(int(a), int(b), int(c), int(d), time) for a, b, c, d, time, *_ in rows]
 
 
 def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> str | None:
