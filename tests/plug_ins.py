@@ -1,4 +1,18 @@
-"""What pip leaves of distributions that add something to bubblefit, written by hand."""
+"""Distributions that add something to bubblefit: by pip, or what it leaves, written by hand."""
+
+import shutil
+import subprocess
+import sys
+
+
+def by_pip(source, place):
+    shutil.copytree(source, place / "source", ignore=shutil.ignore_patterns("__pycache__"))
+    subprocess.run(
+        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
+         "--no-build-isolation", "--target", place / "site", place / "source"],
+        check=True,
+    )  # fmt: skip
+    return place / "site"
 
 
 def install(folder, name, text, distribution="acme-things", module=None, group="bubblefit.laws"):

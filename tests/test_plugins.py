@@ -23,7 +23,7 @@ from bubblefit.solvers.registry import solver_named
 
 from .complaints import complaint
 from .places import ROOT
-from .plug_ins import install
+from .plug_ins import by_pip, install
 
 GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers")
 
@@ -118,14 +118,7 @@ ENDS = (0.25, 0.25, 0.8)
 
 @pytest.fixture(scope="session")
 def plug_in(tmp_path_factory):
-    place = tmp_path_factory.mktemp("plug-in")
-    shutil.copytree(PLUG_IN, place / "source", ignore=shutil.ignore_patterns("__pycache__"))
-    subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
-         "--no-build-isolation", "--target", place / "site", place / "source"],
-        check=True,
-    )  # fmt: skip
-    return place / "site"
+    return by_pip(PLUG_IN, tmp_path_factory.mktemp("plug-in"))
 
 
 @pytest.fixture

@@ -257,11 +257,7 @@ def test_blocks_of_specimens_are_read_one_after_the_other(scratch):
         ("a,b\n1,x\n", {}, "no line with two numbers"),
         ("Load (N),Extension (mm)\n", {}, "line 1: no rows of numbers"),
         ("Load,Extension\n1,2\n", {}, "column 'Extension': say length_unit"),
-        (
-            "Load (stone),disp_mm\n1,2\n",
-            {},
-            "column 'Load (stone)': unit 'stone' is not one of",
-        ),
+        ("Load (stone),disp_mm\n1,2\n", {}, "column 'Load (stone)': unit 'stone' is not one of"),
         ("Load (kN),disp_mm\n1,2\n", {"load_unit": "N"}, "the file says 'kN', load_unit 'N'"),
         ("Load (N),disp_mm\nkN,mm\n1,2\n", {}, "line 2, column 'Load (N)': unit 'kN' here"),
         ("Load (N),disp_mm\n1,2\n\n3,x\n", {}, "line 4, column 'disp_mm': expected a number"),

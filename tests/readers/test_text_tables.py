@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.readers.frames import FrameOptions, columns_of, heading_of, read_frames
 from bubblefit.readers.tables import decimal_mark, is_number, read_table, write_table
-from bubblefit.readers.text_frames import (
-    find_layout,
-    quantity_columns,
-    read_numbers,
-)
+from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
 
 from ..complaints import complaint, complaint_with
 

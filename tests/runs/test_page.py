@@ -20,11 +20,7 @@ from bubblefit.reports import fit_page as page
 from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Download, Exhibit, Facts, Words
-from bubblefit.reports.fit_page import (
-    WORDS,
-    band_words,
-    sigma_words,
-)
+from bubblefit.reports.fit_page import WORDS, band_words, sigma_words
 from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
 from bubblefit.runs.fit import expected_of

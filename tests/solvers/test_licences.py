@@ -16,10 +16,7 @@ from pathlib import Path
 import pytest
 from bubblefit.errors import LicenceDenied, OutputError, SolverFailure
 from bubblefit.solvers import licences, process, registry, scratch
-from bubblefit.solvers.base import (
-    Announcement,
-    hearing,
-)
+from bubblefit.solvers.base import Announcement, hearing
 from bubblefit.solvers.licences import held, locked, patiently
 from bubblefit.solvers.registry import counted, solver_named, solver_settings
 from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep

@@ -36,7 +36,7 @@ from ..commands import in_process
 from ..complaints import complaint
 from ..fortran_build import BETA, GONE, LAWS
 from ..places import EXAMPLES, PUBLISHED, ROOT
-from ..plug_ins import install
+from ..plug_ins import by_pip, install
 from ..programs import program
 
 ADAPTER = EXAMPLES / "solver-adapter"
@@ -50,14 +50,7 @@ DIAGNOSE = "bubblefit.solvers.calculix.solver.diagnose"
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
-    place = tmp_path_factory.mktemp("adapter")
-    shutil.copytree(ADAPTER, place / "source")
-    subprocess.run(
-        [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
-         "--no-build-isolation", "--target", place / "site", place / "source"],
-        check=True,
-    )  # fmt: skip
-    return place / "site"
+    return by_pip(ADAPTER, tmp_path_factory.mktemp("adapter"))
 
 
 @pytest.fixture
@@ -285,37 +278,6 @@ def run_deck(ccx, folder, deck):
         env={**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)},
     )  # fmt: skip
     return done, (folder / "job.dat").read_text() if (folder / "job.dat").exists() else ""
-
-
-@pytest.mark.parametrize(
-    ("angle", "axis", "orientation"),
-    [
-        # The deck pulls along x; in each the fill lies along x by another way.
-        (0.0, 3, "*ORIENTATION, NAME=TURNED\n0., 1., 0., -1., 0., 0.\n"),
-        (90.0, 3, "*ORIENTATION, NAME=TURNED\n-1., 0., 0., 0., -1., 0.\n"),
-        # Far out on a cylinder about y, z is radial and x is the hoop direction.
-        (0.0, 1, "*ORIENTATION, NAME=TURNED, SYSTEM=CYLINDRICAL\n0.5,0.,-1e6, 0.5,1.,-1e6\n"),
-        (90.0, 1, "*ORIENTATION, NAME=TURNED, SYSTEM=CYLINDRICAL\n0.,0.,-1e6, 1.,0.,-1e6\n"),
-    ],
-)
-def test_ccx_hands_over_the_orientation_of_the_section(ccx, tmp_path, angle, axis, orientation):
-    bar = BARS[1]
-    assert bar.direction == "fill"
-    straight, turned = (
-        ",".join(f"{v:.12e}" for v in constants(bar_law(bar.model), angle=a, normal_axis=n)[4:7])
-        for a, n in ((-90.0, 3), (angle, axis))
-    )
-    deck = bar_deck()
-    head, tail = deck.split("*MATERIAL, NAME=" + MATERIAL + "@BAR1", 1)
-    spaced = straight.replace(",", ", ")
-    assert spaced in tail
-    tail = tail.replace(spaced, turned, 1)
-    section = f"MATERIAL={MATERIAL}@BAR1"
-    tail = tail.replace(section, section + ", ORIENTATION=TURNED", 1)
-    deck = f"{head}{orientation}*MATERIAL, NAME={MATERIAL}@BAR1{tail}"
-    done, printed = run_deck(ccx, tmp_path, deck)
-    assert done.returncode == 0, done.stdout[-2000:]
-    assert end_stresses(printed)[2] == pytest.approx(bar.stress, rel=1e-4)
 
 
 def test_a_modulus_that_runs_out_makes_ccx_cut_its_increments(ccx, tmp_path):

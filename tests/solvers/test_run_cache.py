@@ -17,12 +17,7 @@ from bubblefit.errors import Note, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.solvers import registry
-from bubblefit.solvers.base import (
-    SNAP,
-    History,
-    Solver,
-    SolverCheck,
-)
+from bubblefit.solvers.base import SNAP, History, Solver, SolverCheck
 from bubblefit.solvers.run_cache import (
     LIMIT,
     TITLE,

@@ -22,11 +22,7 @@ from bubblefit.reports import study_pages
 from bubblefit.runs import refinement
 from bubblefit.runs import simulation as module
 from bubblefit.runs.refinement import Level, convergence, observed_order, refine
-from bubblefit.runs.simulation import (
-    card_of,
-    parts_of,
-    studied_tests,
-)
+from bubblefit.runs.simulation import card_of, parts_of, studied_tests
 from bubblefit.solvers import run_cache
 from bubblefit.solvers.base import SNAP
 from hypothesis import HealthCheck, given, settings

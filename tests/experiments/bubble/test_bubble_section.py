@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bubblefit.experiments.bubble.objective import (
-    at_points,
-    at_rest,
-)
+from bubblefit.experiments.bubble.objective import at_points, at_rest
 from bubblefit.experiments.bubble.point_files import _frame_times
 from bubblefit.experiments.bubble.section import (
     LogSection,

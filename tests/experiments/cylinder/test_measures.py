@@ -396,23 +396,17 @@ def same(points, others) -> bool:
     return max(cKDTree(a).query(b)[0].max() for a, b in ((points, others), (others, points))) < 0.01
 
 
-def test_the_dashed_outline_is_the_inflated_tube_from_the_side(quarter, picture):
+def test_lines_of_the_picture_are_the_inflated_tube_and_the_ring_of_mid_span(quarter, picture):
     model, run = quarter
-    both = ("top_line", "bottom_line")
-    expected = np.vstack([places(model, run.inflated, name, [2, 1]) for name in both])
-    for chart in picture.charts[:2]:
-        (outline,) = lines(chart, "inflated")
-        assert same(outline.T, expected)
-        np.testing.assert_array_equal(outline[:, 0], outline[:, -1])
-
-
-def test_the_cut_is_the_ring_of_mid_span_inflated_and_at_the_end(quarter, picture):
-    model, run = quarter
-    ((before,), (now,)) = (lines(picture.charts[2], name) for name in ("inflated", "bent"))
-    for ring, moved in ((before, run.inflated), (now, run.bent)):
-        assert same(ring.T, places(model, moved, "mid_span", [0, 1]))
-        np.testing.assert_array_equal(ring[:, 0], ring[:, -1])
-    assert now[1].max() < before[1].max() - 200.0  # went down with the collar
+    side = [places(model, run.inflated, name, [2, 1]) for name in ("top_line", "bottom_line")]
+    rings = [places(model, moved, "mid_span", [0, 1]) for moved in (run.inflated, run.bent)]
+    every = [lines(chart, "inflated")[0] for chart in picture.charts] + lines(
+        picture.charts[2], "bent"
+    )
+    for found, wanted in zip(every, [np.vstack(side)] * 2 + rings, strict=True):
+        assert same(found.T, wanted)
+        np.testing.assert_array_equal(found[:, 0], found[:, -1])
+    assert every[3][1].max() < every[2][1].max() - 200.0  # went down with the collar
 
 
 def test_the_colours_are_strains_along_the_axis_at_the_end(quarter, picture):

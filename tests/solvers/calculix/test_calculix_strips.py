@@ -8,12 +8,7 @@ from bubblefit.errors import SolverFailure
 from bubblefit.files import TEMPLATES
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
-from bubblefit.meshes.strip_models import (
-    PatchModel,
-    bias_strip,
-    elongations,
-    straight_strip,
-)
+from bubblefit.meshes.strip_models import PatchModel, bias_strip, elongations, straight_strip
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import shell_mesh
 from bubblefit.solvers.calculix.solver import CalculixSolver

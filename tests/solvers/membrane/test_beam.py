@@ -4,13 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.beam_model import (
-    BeamModel,
-    BraidedWall,
-    PlainWall,
-    TubeSection,
-    axial_table,
-)
+from bubblefit.meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
 from bubblefit.meshes.cylinder_model import Cord
 from bubblefit.solvers.membrane.beam import Beam
 from bubblefit.solvers.membrane.solver import MembraneSolver
