@@ -85,7 +85,7 @@ def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> t
     others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
     why = "" if tables.distance_to_strip(chosen) else ", measured on the strip"
     return (
-        f"{found.table.path.name}: the {quantity} is column {chosen!r}{why}, not {others};"
+        f"the {quantity} is column {chosen!r}{why}, not {others};"
         f" columns = {{ {quantity} = ... }} names another",
     )
 

@@ -409,8 +409,12 @@ _PRESSURE = re.compile(rf"{_UNSIGNED}[ _]?({'|'.join(tables.PRESSURE_UNITS)})(?!
 FEW_NUMBERS = 5
 
 
-def picture_numbers(files: Sequence[Path], own: Sequence[float | None]) -> tuple[Array, list[str]]:
-    """Return numbers (frames,) of the pictures from 0, `own` or in the names; doubts of them."""
+def picture_numbers(
+    files: Sequence[Path], own: Sequence[float | None], by_trigger: bool = False
+) -> tuple[Array, list[str]]:
+    """Return numbers (frames,) of the pictures from 0, `own` or in the names; doubts of them.
+    by_trigger : whether the offset of the clocks is given, so that the first frame's time counts.
+    """
     rising = [np.array(own, dtype=float)] if None not in own else []
     if not rising and len(files) == len(own):
         bare = [_PRESSURE.sub("", str(file.with_suffix(""))) for file in files]
@@ -435,6 +439,8 @@ def picture_numbers(files: Sequence[Path], own: Sequence[float | None]) -> tuple
     if (steps <= 0).any():
         again = ", ".join(f"{n:.10g}" for n in np.unique(numbers[1:][steps <= 0])[:FEW_NUMBERS])
         said.append(f"{seen} come again ({again}): two frames of one time; {how}")
+    if by_trigger and numbers[0] not in (0, 1):
+        said.append(f"{seen} are times from the first: the given offset is the log's time of it")
     return numbers - numbers[0], said
 
 

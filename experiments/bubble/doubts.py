@@ -448,11 +448,21 @@ def off_centre(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def _motion(view: View) -> Array | None:
     """Return (3,) mm, the mean motion well within the rim; None without points there."""
-    last, first = view.last, view.fields[0]
-    if not (inner := view.inner(last)).any():
+    if not view.inner(view.last).any():
         return None
-    start = first.displacement[view.inner(first)].mean(axis=0) * (len(view.fields) > 1)
-    return np.asarray(last.displacement[inner].mean(axis=0) - start)
+    return _mean_motion(view, view.last) - _mean_motion(view, view.fields[0]) * (
+        len(view.fields) > 1
+    )
+
+
+def _mean_motion(view: View, field: DisplacementField) -> Array:
+    """Return (3,) mm over points with others across the centre: a side that is lost is no tilt."""
+    from scipy.spatial import cKDTree  # heavy: where it is used
+
+    inner = view.inner(field)
+    points, tree = field.points[inner], cKDTree(field.points[inner])
+    apart = 2.0 * np.median(tree.query(points, 2)[0][:, 1])
+    return np.asarray(field.displacement[inner][tree.query(-points)[0] < apart].mean(axis=0))
 
 
 def tilted(view: View, expected: Expected) -> Iterator[Doubt]:

@@ -85,7 +85,7 @@ def _frame_times(
         assert section.rate is not None
         if section.time_in_name is not None:
             return np.arange(count) / section.rate, []
-        picture, said = pressure_log.picture_numbers(files, own)
+        picture, said = pressure_log.picture_numbers(files, own, section.offset is not None)
         return picture / section.rate, said
     if len(files) != count:
         problem = "a file holds several frames; give 'rate' or 'times'"

@@ -282,7 +282,9 @@ def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Do
     strain = any(unit in STRAIN_UNITS for unit in units)
     share, modulus = strip.gauge_length / distance, ALONG.get(direction, "G12")
     what = f"{modulus} comes out too low by the slip in the grips and the machine's own give"
+    or_else = ""
     if share < 0.95 and not strain:
+        or_else = ", or say the grips' distance as the gauge_length"
         what = (
             f"over a gauge of {strip.gauge_length:.4g} mm between grips {distance:.4g} mm apart "
             f"{modulus} comes out at about {share:.0%} of what it is, and lower still by the slip"
@@ -290,7 +292,7 @@ def _between_grips(direction: str, strip: Strip, distance: float) -> Iterator[Do
     text = (
         f"{direction}: the elongation, column {' and '.join(map(repr, columns))}, is by its name"
         f" the machine's travel from grip to grip: {what}; name one that was measured on the strip "
-        "(columns = { elongation = ... }), or say the grips' distance as the gauge_length"
+        f"(columns = {{ elongation = ... }}){or_else}"
     )
     yield Doubt("grip-travel", False, text)
 

@@ -210,8 +210,8 @@ def read(section: StripsSection, place: Place, name: str) -> StripsTest:
     weights = section.weights.model_dump()
     if not sum(weights[d] for d in strips) > 0:
         raise place.error("weights", "expected one above 0: nothing would be matched")
-    if "bias" in strips and not strips["bias"].gauge_length < grips:
-        problem = f"expected less than the distance of the grips, {grips:g} mm"
+    if "bias" in strips and strips["bias"].gauge_length > grips:
+        problem = f"expected at most the distance of the grips, {grips:g} mm"
         raise place.error("bias.gauge_length", problem)
     if section.match == "points":
         if place.need_data and not all(s.curves for s in strips.values()):

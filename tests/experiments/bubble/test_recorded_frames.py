@@ -175,6 +175,8 @@ def test_numbers_of_pictures(names, numbers, words):
     assert all(word in text for word, text in zip(words, said, strict=True))
     own, said = picture_numbers(files[:1], [2.0, 3.0, 7.0, 8.0])
     assert own.tolist() == [0, 1, 5, 6] and "leave out 3 (4, 5, 6)" in said[0]
+    assert "times from the first" in picture_numbers([], [2.0, 3.0], True)[1][0]
+    assert not picture_numbers([], [1.0, 2.0], True)[1]
 
 
 def test_one_table_of_all_frames(folder, tmp_path):

@@ -309,7 +309,7 @@ def test_loads_per_width_are_multiplied_by_the_strips_own(small, tmp_path):
     per_width = (tmp_path / "w1.csv").read_text().replace("mm,kN,sec", "mm,kN/m,sec")
     (tmp_path / "w1.csv").write_text(per_width)
     for width, said in ((25.0, ""), (50.0, "width = 50.0\n")):
-        first, _ = small(("[warp]", f"{said}[warp]")).strips["warp"].curves
+        first, _ = small(("[warp]", f"{said}grip_distance = 19.0\n[warp]")).strips["warp"].curves
         np.testing.assert_allclose(first.load, 0.2 * first.elongation * width, rtol=1e-9, atol=1e-9)
 
 
@@ -320,7 +320,7 @@ ADDED = {
     "[warp]\n": [
         ("thikness = 0.81", ".thikness", "unknown key"),
         ("bias_angle = 90", ".bias_angle", "90"),
-        ("grip_distance = 19.0", ".bias.gauge_length", "19 mm"),
+        ("grip_distance = 18.0", ".bias.gauge_length", "18 mm"),
     ],
     "gauge_length = 22.0": [
         ("final_length = 22.0", ".fill.final_length", "more than the gauge length 22 mm"),
