@@ -491,7 +491,7 @@ def notes_beyond(
     """Note strains (3,) beyond their ends; words : with places for name, strain and end in %."""
     return [
         Note(kind, words.format(name, *apart(100 * strain, 100 * end)))
-        for name, strain, end in zip(STRAINS, reached.tolist(), ends.tolist(), strict=True)
+        for name, strain, end in zip(STRAINS, reached, ends, strict=True)
         if strain > end * BEYOND
     ]
 
