@@ -106,6 +106,15 @@ def _fits(value: Any, kind: Any) -> bool:
     return isinstance(value, whole) if isinstance(whole, type) else True
 
 
+def check_one_of(
+    value: object, known: Iterable[object], field: str, path: Path | str | None = None
+) -> None:
+    """Raise InputError, with all that is known, for a value that is not; None is none."""
+    if value is not None and value not in (names := list(known)):
+        problem = f"expected one of {', '.join(map(str, names))}, got {value!r}"
+        raise InputError(path, field, problem)
+
+
 class OutputError(BubblefitError):
     """An output folder that cannot be written (read-only, full, in use)."""
 

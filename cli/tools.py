@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, SolverFailure, rows
+from ..errors import InputError, SolverFailure, check_one_of, rows
 from ..materials.card import read_card
 from ..materials.exports.base import Option, options_of, write_export
 from ..reports.content import beside
@@ -127,8 +127,7 @@ def doctor_command(solver: str | None, as_json: bool, **programs: str | None) ->
     or Marc that merely lies on the PATH, or a plug-in that is installed, is reported, but does not
     count.
     """
-    if solver is not None and solver not in (names := solver_names()):
-        raise InputError(None, "--solver", f"{solver!r} is not one of: {', '.join(names)}")
+    check_one_of(solver, solver_names(), "--solver")
     found = diagnose(**programs)
     good = all(one.usable for one in found if one.expected)
     if solver is not None:

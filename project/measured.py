@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, check_one_of
 from ..experiments.biaxial.data import read_biaxial_table
 from ..experiments.bubble.findings import registration_line, registration_numbers
 from ..experiments.bubble.prepared import read_measured
@@ -34,8 +34,7 @@ def read(files: Files, of: str | None = None, **how: Any) -> pd.DataFrame:
     decimal, length_unit, direction, width. InputError in the files.
     """
     paths = [Path(name) for name in file_names(files)]
-    if of is not None and of not in READERS:
-        raise InputError(None, "of", f"expected one of {', '.join(READERS)}, got {of!r}")
+    check_one_of(of, READERS, "of")
     said = []
     for kind, reader in READERS.items():
         if of in (None, kind):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, check_one_of
 from ..experiments.registry import kind_named, kinds
 from ..files import TEMPLATES, __version__, render, write_text
 from ..inference.methods import method_names
@@ -54,8 +54,7 @@ def project_text(
     if not asked:
         known = ", ".join(f"--{kind}" for kind in writable_kinds())
         raise InputError(None, "--own", f"name at least one test: {known}")
-    if form not in form_names():
-        raise InputError(None, "--form", f"{form!r} is not one of: {', '.join(form_names())}")
+    check_one_of(form, form_names(), "--form")
     fitted = [kind for kind in asked if kind_named(kind).fitted]
     parts = [
         render(f"project/{kind}.toml.j2", number=n, count=tests[kind], name=f"{kind}{n}", **values)

@@ -296,9 +296,13 @@ class Strips(Definition):
         of the strip. gauge : mm, the length over which elongation is measured; by direction where
         they differ. keys : of [[strips]] and of [strips.data]. InputError names the argument.
         """
-        rows = _curve_rows(curves, DIRECTIONS, "elongation", "load")
+        rows = _curve_rows(curves)
+        if not rows:
+            raise InputError(None, "curves", "expected one curve at least, got none")
         names = ("direction", "specimen", "elongation (mm)", "load (N)")
-        files = {"curves.csv": Held("curves", _columns(names, rows))}
+        files = {
+            "curves.csv": Held("curves", dict(zip(names, zip(*rows, strict=True), strict=True)))
+        }
         tables = _gauges(gauge, keys, {row[0] for row in rows})
         said = {"width": width, "name": name, "files": list(files), **tables}
         super().__init__("strips", _sorted("strips", {**keys, **said}), files)
@@ -462,19 +466,22 @@ def check_pressure(argument: str, largest: float) -> None:
         raise InputError(None, argument, problem + "Divide by 1000")
 
 
-def _curve_rows(curves: Any, groups: Sequence[str], *names: str) -> list[tuple[Any, ...]]:
-    """Return rows (group, specimen, a value of each name) of curves by group, or of a table."""
+def _curve_rows(curves: Any) -> list[tuple[Any, ...]]:
+    """Return rows (direction, specimen, elongation, load) of curves by direction, or a table."""
+    names = ("elongation", "load")
     if hasattr(curves, "columns"):
         _check_columns("curves", curves, ("direction", *names))
         which = "specimen" if "specimen" in curves.columns else "direction"
         return [tuple(row) for row in curves[["direction", which, *names]].to_numpy().tolist()]
     if not isinstance(curves, Mapping):
-        problem = f"expected curves by {', '.join(groups)}, or a table, got {type(curves).__name__}"
+        problem = (
+            f"expected curves by {', '.join(DIRECTIONS)}, or a table, got {type(curves).__name__}"
+        )
         raise InputError(None, "curves", problem)
-    _check_names(curves, groups, "curves.")
+    _check_names(curves, DIRECTIONS, "curves.")
     rows: list[tuple[Any, ...]] = []
     for group, given in curves.items():
-        for k, curve in enumerate(_specimens(given, len(names))):
+        for k, curve in enumerate(_specimens(given)):
             at = f"curves.{group}[{k}]"
             found = _values(at, curve, names).T.tolist()
             rows += [(group, f"{group} {k + 1}", *values) for values in found]
@@ -500,19 +507,10 @@ def _check_columns(at: str, table: Table, names: Iterable[str]) -> None:
         raise InputError(None, at, f"expected a column {lost[0]}; the table has: {there}")
 
 
-def _specimens(given: Any, width: int) -> list[Any]:
+def _specimens(given: Any) -> list[Any]:
     """Return the curves of one direction: a list of them, or the one."""
-    if hasattr(given, "columns") or isinstance(given, tuple):
-        return [given]
-    if isinstance(given, np.ndarray) and given.ndim == 2:
-        return [given]
-    return list(given)
-
-
-def _columns(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> dict[str, list[Any]]:
-    if not rows:
-        raise InputError(None, "curves", "expected one curve at least, got none")
-    return {name: list(own) for name, own in zip(names, zip(*rows, strict=True), strict=True)}
+    one = hasattr(given, "columns") or isinstance(given, tuple) or getattr(given, "ndim", 0) == 2
+    return [given] if one else list(given)
 
 
 def _gauges(

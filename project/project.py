@@ -12,7 +12,7 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from ..errors import InputError, checked
+from ..errors import InputError, check_one_of, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kinds
@@ -202,9 +202,7 @@ class Project:
 
     def __post_init__(self) -> None:
         name = self.fit.method
-        if name not in method_names():
-            problem = f"expected one of {', '.join(method_names())}, got {name!r}"
-            raise InputError(self.path, "fit.method", problem)
+        check_one_of(name, method_names(), "fit.method", self.path)
         if self.fit.constraints == "boolean":
             if not method_named(name).boolean:
                 others = [other for other in method_names() if method_named(other).boolean]

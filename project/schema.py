@@ -305,7 +305,6 @@ def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
 
 
 def schema_text(with_plug_ins: bool = True) -> str:
-    """Return the schema as a file."""
     return json.dumps(project_schema(with_plug_ins), indent=1, sort_keys=True) + "\n"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..errors import NOTES, NOTES_ARE, InputError
+from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
 from ..experiments.kinds import Findings, FittedTest, Output, by_strain
 from ..experiments.registry import report_of
 from ..files import __version__, write_notes
@@ -58,21 +58,6 @@ def _beside(fit: Fit) -> list[Table]:
 def sigma_words(value: float) -> str:
     """Return a relative uncertainty as percent, or "unknown"."""
     return percent(value) if value < UNKNOWN else "unknown"
-
-
-def _pinned_table(pins: dict[str, dict[str, Array]]) -> list[Table]:
-    rows: list[list[object]] = [
-        [source, name, sigma_words(float(np.median(s))), sigma_words(float(s.max()))]
-        for source, sigmas in pins.items()
-        for name, s in sigmas.items()
-    ]
-    note = (
-        "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
-        "as one counted as one; before the "
-        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
-    )
-    header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
-    return [Table("What each test pins down", header, rows, note)] if rows else []
 
 
 def _determined(fit: Fit) -> Sequence[Table]:
@@ -410,7 +395,7 @@ def _page(fit: Fit, folder: Path) -> Report:
                 for part in exhibit.all_parts(name if len(exhibits) > 1 else "")
             ]),
             Section(TITLE, [
-                *_determined(fit), *_beside(fit), *_pinned(fit, folder), *_pinned_table(fit.pinned),
+                *_determined(fit), *_beside(fit), *_pinned(fit, folder),
             ]),
             Section("How it was found", [
                 Facts(found_by(fit)), _saved(optima(fit), folder / OPTIMA), starts_table(fit),
@@ -485,9 +470,7 @@ def of_kind(fit: Fit, what: str, test: str | None) -> Charts:
 def residuals(fit: Fit, test: str | None) -> Charts:
     """Return modelled less measured values over the measured ones, a chart a quantity."""
     table = fit.residuals()
-    if test is not None and test not in fit.tests:
-        problem = f"expected one of {', '.join(fit.tests)}, got {test!r}"
-        raise InputError(fit.project.path, "test", problem)
+    check_one_of(test, fit.tests, "test", fit.project.path)
     table, charts = table[table["test"].isin([test] if test else [*fit.tests])], []
     for (quantity, unit), rows in table.groupby(["quantity", "unit"], sort=False):
         series = [
@@ -510,16 +493,29 @@ def modulus_curves(law: HypoelasticLaw, strains: Array) -> Array:
     return np.array([law.modulus(n, x) for n, x in zip(COMPONENTS, strains, strict=True)])
 
 
-def _pinned(fit: Fit, folder: Path) -> list[Charts]:
+def _pinned(fit: Fit, folder: Path) -> list[Part]:
+    """Return chart and table of what each test determines; nothing where it is not known."""
     if not (pins := fit.pinned):
         return []
+    rows: list[list[object]] = [
+        [source, name, sigma_words(float(np.median(s))), sigma_words(float(s.max()))]
+        for source, sigmas in pins.items()
+        for name, s in sigmas.items()
+    ]
+    note = (
+        "noise of every test, its misfit or its scatter, whichever is larger, neighbours that err "
+        "as one counted as one; before the "
+        f"tests every modulus is taken to be known to {100 * PRIOR:.0f} %"
+    )
+    header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
     sigma = {
         source: 100 * np.array([sigmas[name] for name in COMPONENTS])
         for source, sigmas in pins.items()
     }
     count = next(iter(sigma.values())).shape[1]
     caption = "What each test pins down: one standard deviation of the moduli"
-    return [_saved(pinned_charts(_strains(fit, count), sigma, caption), folder / PINNED)]
+    charts = pinned_charts(_strains(fit, count), sigma, caption)
+    return [_saved(charts, folder / PINNED), Table("What each test pins down", header, rows, note)]
 
 
 FAILED = "This failed, and there is no result."

@@ -271,6 +271,8 @@ def page_of_folder(folder: Path) -> Report:
             rows.append([path.name, "finished"])
         elif (path / RUN).exists():
             rows.append([path.name, "unfinished"])
+    kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
+    ran = [Facts([("runs that ended", len(kept))])] if kept else []
     within = [Table("Fits within", ["folder", "how far"], rows, text=(1,))] if rows else []
     if not (folder / RUN).exists() and not within:
         raise InputError(folder, "", f"is no output folder: neither {PAGE_DATA} nor {RUN} is there")
@@ -282,7 +284,7 @@ def page_of_folder(folder: Path) -> Report:
         title=f"{folder.resolve().name if record is None else record.project.name}: unfinished",
         summary=UNFINISHED,
         sections=[
-            Section("So far", [*_starts(folder), *_runs(folder), *within]),
+            Section("So far", [*_starts(folder), *ran, *within]),
             Section("The record", shown),
         ],
     )

@@ -174,7 +174,6 @@ class Bootstrap(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Notes of the fit, and where percentiles are unreliable."""
         notes = list(self.found.notes)
         for group in self.groups:
             count = len(group.units)

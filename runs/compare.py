@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, NoFeasibleStart, Note, NoteKind, checked, rows
+from ..errors import InputError, NoFeasibleStart, Note, NoteKind, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import Masks
 from ..files import known
@@ -58,9 +58,7 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
     for asked in names or _carried(project):
         form, _, knots = asked.partition(":")
         settings: dict[str, Any] = {}
-        if form not in form_names():
-            problem = f"there is no form {form!r}; there are: {', '.join(form_names())}"
-            raise InputError(None, "--form", problem)
+        check_one_of(form, form_names(), "--form")
         if knots and (not knots.isdecimal() or "knots" not in form_settings(form)):
             problem = f"expected a form, or one with its number of knots (spline:8), got {asked!r}"
             raise InputError(None, "--form", problem)
@@ -227,7 +225,6 @@ class LawComparison(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Notes of every form's fit, and of its folds."""
         notes = []
         for form in self.forms:
             lost = [fold.fold + 1 for fold in form.folds if fold.value is None]

@@ -6,13 +6,13 @@ import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
-from ..experiments.kinds import PreparedTest, Weighting, strains_of
+from ..experiments.kinds import Weighting, strains_of
 from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
 from ..inference.comparison import Comparison
@@ -86,7 +86,6 @@ class Estimate:
 
     @property
     def law(self) -> HypoelasticLaw:
-        """Return the estimated law, within the bounds of the fit."""
         return self.best.law
 
     @property
@@ -128,7 +127,9 @@ def estimate_of(setup: FitSetup) -> Estimate:
     with one_blas_thread():
         for test in setup.tests:
             try:
-                comparisons += _comparisons(setup, test)
+                own = getattr(test, "virtual_work", None)
+                make = setup.make_leading
+                comparisons += own(make) if own else test.comparisons(make, Weighting())
             except InputError as error:
                 notes.append(Note(NOT_ESTIMATED, f"{error.field} {error.problem}", test.test.name))
         if not comparisons:
@@ -161,14 +162,6 @@ def with_start(setup: FitSetup) -> FitSetup:
         log.warning("all starts are drawn at random: %s", str(error).splitlines()[0])
         return setup
     return replace(setup, starts=EstimatedStarts(found.best.point.coefficients))
-
-
-def _comparisons(setup: FitSetup, test: PreparedTest) -> Sequence[Comparison]:
-    """Return a test's comparisons for an estimate, else those of a fit."""
-    own = getattr(test, "virtual_work", None)
-    if own is None:
-        return test.comparisons(setup.make_leading, Weighting())
-    return cast(Sequence[Comparison], own(setup.make_leading))
 
 
 def _fitted(

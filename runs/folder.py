@@ -425,7 +425,6 @@ class Record:
         return None
 
     def to_json(self) -> dict[str, Any]:
-        """Return plain values, as provenance.json holds them."""
         text = self.text
         return {
             "project": {

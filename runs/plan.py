@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, SolverFailure, checked, percent, rows
+from ..errors import InputError, Note, SolverFailure, check_one_of, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     BEYOND_LAW,
@@ -250,9 +250,7 @@ def plan(
     SolverFailure: the present tests cannot be run with the card."""
     check_unused(out, False, overwrite)
     tell = listener(progress)
-    if rank not in (WORST, *COMPONENTS):
-        expected = f"{WORST}, {', '.join(COMPONENTS)}"
-        raise InputError(None, "--rank", f"expected one of {expected}, got {rank!r}")
+    check_one_of(rank, (WORST, *COMPONENTS), "--rank")
     known = {name: kind for name, kind in kinds().items() if isinstance(kind, Plannable)}
     for name, value in (noise or {}).items():
         if name not in known or not value > 0:
@@ -290,11 +288,13 @@ def plan(
     if not found:
         raise InputError(project.path, "", "no test could be made that a plan can compute")
     found.sort(key=lambda pair: pair[0].value(rank))
+    first = before + found[0][1]
+    after = [replace(test, sigma=asked.sigma(first + more)) for test, more in found]
     made = Plan(
         project, card_words(card),
         [test.name for test in chosen], asked.ends, rank,
         Prospect(NOW, "", 1, "", asked.sigma(before)), [test for test, _ in found],
-        _following(asked, before, found, rank), notes,
+        min(after, key=lambda test: test.value(rank)), notes,
     )  # fmt: skip
     return finished(made, out)
 
@@ -331,12 +331,3 @@ def _added(
         own += unstable_words(history.unstable) if comparison.must_be_stable else []
         notes += [note.about(candidate.name) for note in own]
     return whole, f"{'; '.join(said)} ({candidate.noise_is})", notes
-
-
-def _following(
-    asked: LawQuery, before: Array, found: Sequence[tuple[Prospect, Array]], rank: str,
-) -> Prospect | None:  # fmt: skip
-    """Return the best test after the first, which may be the same again."""
-    first = before + found[0][1]
-    every = [replace(test, sigma=asked.sigma(first + more)) for test, more in found]
-    return min(every, key=lambda test: test.value(rank), default=None)

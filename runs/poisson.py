@@ -132,7 +132,6 @@ class Nu12Study(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Notes of every run, then those of the whole study."""
         of_parts = [n.about(name) for name, part in self.parts.items() for n in part.notes]
         return [*of_parts, *self.warnings]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, apart, checked, rows
+from ..errors import InputError, Note, NoteKind, apart, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..files import pandas as pd
 from ..inference.likelihood import (
@@ -212,9 +212,7 @@ def profile(
     check_unused(out, False, overwrite)
     asked = {name: list(strains) for name, strains in (moduli or {}).items()}
     for name, strains in asked.items():
-        if name not in COMPONENTS:
-            problem = f"expected one of {', '.join(COMPONENTS)}, got {name!r}"
-            raise InputError(None, "--modulus", problem)
+        check_one_of(name, COMPONENTS, "--modulus")
         for strain in strains:
             if not 0.0 <= strain < np.inf:
                 problem = f"expected strains of 0 or more, got {strain:g}"

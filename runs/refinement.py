@@ -233,7 +233,6 @@ class Refinement(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Notes of every level's run, then those of the whole study."""
         notes = []
         for name, runs in self.runs.items():
             for run in runs:

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, NoteKind, as_note, rows
+from ..errors import InputError, Note, NoteKind, as_note, check_one_of, rows
 from ..experiments.kinds import (
     BEYOND_LAW,
     WIDER,
@@ -316,8 +316,7 @@ class Fit:
 
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
         """Write one of `TABLES`, as `folder.write_table`; InputError : another table."""
-        if table not in TABLES:
-            raise InputError(None, "table", f"{table!r} is not one of: {', '.join(TABLES)}")
+        check_one_of(table, TABLES, "table")
         return write_table(getattr(self, table)(), path)
 
     def starts(self) -> pd.DataFrame:

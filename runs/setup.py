@@ -59,8 +59,6 @@ THIRDS = (1 / 3, 2 / 3)
 
 def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     """Return the law of a fit with coefficients of zero; reaches : of the data of each test.
-    Raises
-    ------
     InputError : no such form, an unknown setting, no strain range that follows from the tests."""
     section, path = project.law, project.path
     ends = _strain_range(project, reaches)
@@ -132,8 +130,6 @@ def _strain_range(project: Project, reaches: Sequence[Reach]) -> tuple[float, fl
 
 def bounds_of(project: Project, form: Form) -> LawBounds:
     """Return the bounds of the moduli or of their coefficients, MPa.
-    Raises
-    ------
     InputError : no bounds, crossed ones, too few or too many, or some of both kinds."""
     path, section, margin = project.path, project.law.bounds, project.law.margin
     unit = project.scales.modulus
@@ -207,8 +203,6 @@ PRODUCT = "a membrane under load knows moduli times thickness only"
 
 def shared_unknowns(project: Project) -> tuple[Nuisance, ...]:
     """Return the unknowns of [fit.unknowns]; a fit starts from the values of [law] and [fabric].
-    Raises
-    ------
     InputError : bounds out of order, impossible, or not around the value to start from; a thickness
         without a prior, which no data could tell from the moduli."""
     asked, shared = project.fit.unknowns, []
@@ -431,8 +425,6 @@ Saw = Callable[[str], object]
 
 def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words: None) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
-    Raises
-    ------
     InputError : in the project or its data. SolverFailure : the solver is not there, or a known
         solution cannot be run."""
     with project.naming_arguments():

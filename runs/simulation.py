@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
+from ..errors import InputError, Note, NoteKind, SolverFailure, check_one_of, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     CardRun,
@@ -101,8 +101,7 @@ class Histories(dict[str, History]):
         component : 0 along the warp, 1 along the fill, 2 in shear. frame : from 0; -1 the last.
         InputError : no analysis of that name, or no such component or frame."""
         chosen = next(iter(self)) if name is None else name
-        if chosen not in self:
-            raise InputError(None, "name", f"expected one of {', '.join(self)}, got {chosen!r}")
+        check_one_of(chosen, self, "name")
         return draw("maps", "history", chosen, self[chosen], quantity, component, frame)
 
 
@@ -225,16 +224,11 @@ def parts_of(
             field = f"refinement by {factor:g} (--levels, --coarser, --factor), {error.field}"
             raise InputError(project.path, field, error.problem) from None
         for part, model in models.items():
-            name = part_name(test, part, len(models), len(tests))
+            # Of its test where it is the only one, with it among several.
+            name = part if len(tests) == 1 else f"{test.name}: {part}"
+            name = test.name if len(models) == 1 else name
             parts[name] = Part(name, model, studied)
     return parts
-
-
-def part_name(test: Test, part: str, parts: int, tests: int) -> str:
-    """Return a part's name: of its test where it is the only one, with it among several."""
-    if parts == 1:
-        return test.name
-    return part if tests == 1 else f"{test.name}: {part}"
 
 
 def card_of(project: Project, card: GivenCard | None) -> MaterialCard:

@@ -13,7 +13,7 @@ from ..errors import InputError, Note, checked, rows
 from ..errors import lines as note_lines
 from ..files import __version__
 from ..files import pandas as pd
-from ..inference.problem import FitProblem
+from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import fit_from
 from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
@@ -193,7 +193,7 @@ def _runs(
 ) -> Iterator[WeightedFit]:  # fmt: skip
     """Yield the fit at the project's weights, then upwards from there, then downwards."""
     own = found.best.point
-    yield _weighted(found.setup, found, 1.0, found.problem, own.residual, own.unknowns, 0)
+    yield _weighted(found.setup, found, 1.0, found.problem, own, 0)
     for way in ([c for c in counts if c > 1], [c for c in reversed(counts) if c < 1]):
         y = np.array(own.unknowns)
         for count in way:
@@ -214,22 +214,20 @@ def refit(found: Fit, names: Sequence[str], count: float, y: np.ndarray) -> Weig
     optimum = fit_from(problem, y, setup.options, near=True)
     if optimum is None:
         return WeightedFit(count, {}, {}, {}, (), problem.analyses, problem.failure or "no fit")
-    best = optimum.best
-    return _weighted(setup, found, count, problem, best.residual, best.unknowns, optimum.analyses)
+    return _weighted(setup, found, count, problem, optimum.best, optimum.analyses)
 
 
 def _weighted(
-    setup: FitSetup, found: Fit, count: float, problem: FitProblem, residual: np.ndarray,
-    unknowns: np.ndarray, analyses: int,
+    setup: FitSetup, found: Fit, count: float, problem: FitProblem, best: Evaluation, analyses: int
 ) -> WeightedFit:  # fmt: skip
-    law = problem.unknowns.law(found.law, unknowns)
+    law = problem.unknowns.law(found.law, best.unknowns)
     moduli = {
         name: law.modulus(name, np.array(PLACES) * found.best.valid[component]).tolist()
         for name, component in COMPONENTS.items()
     }
-    relative, norms = {}, problem.norms(residual)
+    relative, norms = {}, problem.norms(best.residual)
     for test, weighting in zip(setup.tests, setup.weightings, strict=True):
         own = np.concatenate([norms[c.name] for c in setup.own(test)])
         relative[test.test.name] = float(own.sum() / weighting.weight)
-    rms = errors(problem, residual)
-    return WeightedFit(count, relative, rms, moduli, unknowns.tolist(), analyses)
+    rms = errors(problem, best.residual)
+    return WeightedFit(count, relative, rms, moduli, best.unknowns.tolist(), analyses)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...errors import InputError, checked
+from ...errors import check_one_of, checked
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import disk_mesh
@@ -247,7 +247,6 @@ class Verification:
 
     @property
     def missed(self) -> list[Number]:
-        """Numbers that are further off than is allowed."""
         return [one for several in self.subjects.values() for one in several if not one.met]
 
     @property
@@ -274,9 +273,7 @@ def verify(
     each subject as it ends. InputError : no such subject."""
     chosen = list(SUBJECTS if subjects is None else subjects)
     for subject in chosen:
-        if subject not in SUBJECTS:
-            problem = f"{subject!r} is not one of: {', '.join(SUBJECTS)}"
-            raise InputError(None, "--subject", problem)
+        check_one_of(subject, SUBJECTS, "--subject")
     every: dict[str, Callable[[], Iterable[Number]]] = {name: SUBJECTS[name] for name in chosen}
     if data is not None:
         every["measured strips"] = functools.partial(measured_strips, Path(data))
