@@ -210,15 +210,13 @@ class ProjectFile(CommonSections):
 @functools.cache
 def project_file() -> type[ProjectFile]:
     """Return the model with the sections of all kinds that are there."""
-    tests: dict[str, Any] = {name: (Annotated[_list_of(kind.section), Field(max_length=MANY)], [])
-                             for name, kind in kinds().items()}  # fmt: skip
+    several, tests = Field(max_length=MANY), dict[str, Any]()
+    for name, kind in kinds().items():
+        section: Any = kind.section
+        tests[name] = Annotated[list[section], several], []
     tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in kinds()}
     defaults = create_model("Defaults", **tables)
     return create_model("Project", __base__=ProjectFile, defaults=(defaults, defaults()), **tests)
-
-
-def _list_of(section: type[BaseModel]) -> Any:
-    return list[section]  # type: ignore[valid-type]
 
 
 def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:

@@ -529,11 +529,6 @@ def write_failure(folder: Path, title: str, said: str, more: Sequence[str]) -> P
 COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"
 
 
-def two_digits(correlation: float) -> str:
-    """Return a correlation with two digits, without a negative zero."""
-    return f"{round(correlation, 2) + 0.0:.2f}"
-
-
 def coefficients_table(fit: Fit) -> list[Table]:
     """Return the unknowns with their correlations; nothing where these are not known."""
     if fit.best.certainty is None or fit.best.certainty.posterior is None:
@@ -549,12 +544,11 @@ def coefficients_table(fit: Fit) -> list[Table]:
 def correlation_table(
     title: str, found: pd.DataFrame, own: Mapping[str, str], note: str, text: Sequence[int] = ()
 ) -> Table:
-    """Return unknowns with their correlations; own : a column of theirs with its heading."""
+    """Return unknowns with their correlations, none of them a negative zero; own : a column of
+    theirs with its heading."""
     names, columns = found["unknown"].tolist(), ["unknown", "value", "sigma", *own]
-    rows: list[list[object]] = [
-        [*(row[column] for column in columns), *(two_digits(row[name]) for name in names)]
-        for _, row in found.iterrows()
-    ]
+    cells = pd.DataFrame({name: [f"{r + 0.0:.2f}" for r in found[name].round(2)] for name in names})
+    rows = pd.concat([found[columns], cells], axis=1).to_numpy(object).tolist()
     header = ["unknown", "value", "1 sigma", *own.values(), *names]
     return Table(title, header, rows, note, text, closed=True)
 

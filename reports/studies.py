@@ -118,12 +118,8 @@ def nu12_charts(study: Nu12Study, caption: str) -> Charts:
     return Charts("nu12", charts, caption)
 
 
-def profile_charts(profiles: Sequence[Profile], threshold: float, caption: str) -> Charts:
-    """Return charts of profile likelihoods: -2 log L over a modulus, its threshold and ends."""
-    return Charts("profiles", [_profile(one, threshold) for one in profiles], caption)
-
-
-def _profile(one: Profile, threshold: float) -> Chart:
+def profile_chart(one: Profile, threshold: float) -> Chart:
+    """Return the profile likelihood of a modulus: -2 log L over it, the threshold and the ends."""
     values, ratios = one.curve
     x = np.linspace(min(values), max(values), POINTS)
     parabola = ((x - one.best) / one.sigma) ** 2

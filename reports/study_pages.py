@@ -160,7 +160,8 @@ def _bootstrap(study: bootstrap.Bootstrap) -> Content:
 
 
 def _profiles(study: profile.Profiles) -> Content:
-    charts = studies.profile_charts(study.each, THRESHOLD, LIKELIHOODS)
+    each = [studies.profile_chart(one, THRESHOLD) for one in study.each]
+    charts = Charts("profiles", each, LIKELIHOODS)
     title = f"{study.project.title}: profile likelihood"
     return plain(study, title, "profile", [charts], charts, 9, profile.METHOD)
 

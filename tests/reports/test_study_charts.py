@@ -63,7 +63,7 @@ def test_profiles():
         name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0, sigma=5.0,
         ends=(92.5, None),
     )  # fmt: skip
-    (chart,) = studies.profile_charts([panel], 3.84, "c").charts
+    chart = studies.profile_chart(panel, 3.84)
     own = named(chart)
     assert (own["profile"].x, own["profile"].y) == ([90.0, 100.0, 120.0], [5.0, 0.0, 2.0])
     assert (own["ends"].x, own["ends"].y) == ([92.5, 92.5], [0.0, 3.84])
