@@ -19,7 +19,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports import fit_page as page
 from bubblefit.reports import run_pages
 from bubblefit.reports.charts import Charts
-from bubblefit.reports.content import Download, Exhibit, Facts, Words
+from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import WORDS, band_words, sigma_words
 from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
@@ -298,7 +298,8 @@ def test_one_test_alone(alone, told, tmp_path, monkeypatch):
     found = reported(alone, tmp_path, monkeypatch)
     assert alone.objective == pytest.approx(rms(alone, "two", "warp"), rel=2e-3)
     assert ("objective: sum of the strips' RMS errors, N", alone.objective) in facts(found)
-    assert [name for name, _ in found.figures] == ["failure.png", "orders.png"]
+    files = [part.file for part in found.parts if isinstance(part, Picture)]
+    assert files == ["failure.png", "orders.png"]
     assert list(captions(found)) == ["moduli", "two loads", "optima"]
     assert f"objective {alone.objective:.4g}, RMS errors in N" in alone.card.source
     assert alone.result["directions"] == alone.result["tests"]["two"]["directions"]
