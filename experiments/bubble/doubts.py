@@ -462,7 +462,8 @@ def _mean_motion(view: View, field: DisplacementField) -> Array:
     inner = view.inner(field)
     points, tree = field.points[inner], cKDTree(field.points[inner])
     apart = 2.0 * np.median(tree.query(points, 2)[0][:, 1])
-    return np.asarray(field.displacement[inner][tree.query(-points)[0] < apart].mean(axis=0))
+    paired = tree.query(-points)[0] < apart
+    return np.asarray(field.displacement[inner][paired if paired.any() else ...].mean(axis=0))
 
 
 def tilted(view: View, expected: Expected) -> Iterator[Doubt]:

@@ -396,6 +396,8 @@ def test_a_rise_that_is_not_along_z(tilt, doubt):
     for frames in (fields, (field(0.2, moved),), (field(0.2, -moved),)):
         words = f"{tilt:.2g} degrees from z"
         finds(doubts.tilted, bool(doubt), "tilted", doubt == 2, words, fields=frames)
+    one_side = (field(0.2, moved, np.abs(POINTS) + 20.0),)
+    finds(doubts.tilted, bool(doubt), "tilted", doubt == 2, words, fields=one_side)
     for unknown in (field(0.2, [9.0, 0, 0]), field(0.2, [9.0, 0, 1], POINTS[:1] + 95.0)):
         assert said(doubts.tilted, fields=(unknown,)) == []
 
