@@ -194,9 +194,8 @@ def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluatio
 
 
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
-    others = [other for other in every_option(paths) if other != options]
-    found = [evaluate_or_none(paths, other) for other in others]
-    return [one for one in found if one is not None]
+    others = (evaluate_or_none(paths, o) for o in every_option(paths) if o != options)
+    return [one for one in others if one is not None]
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:

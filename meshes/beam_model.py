@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,6 +243,7 @@ class BeamModel:
     increments: Sequence[float] = ()
     reading: CurveReading = None  # type: ignore[assignment]
     mesh: Mesh = field(init=False, repr=False)
+    copies: ClassVar[int] = 4
 
     def __post_init__(self) -> None:
         steps = np.array(self.increments if len(self.increments) else self.deflections, float)
@@ -276,10 +278,6 @@ class BeamModel:
     @property
     def inflation(self) -> tuple[float, ...]:
         return (self.pressure,)
-
-    @property
-    def copies(self) -> int:
-        return 4
 
     @property
     def cords(self) -> Sequence[Cord]:

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, SolverFailure
+from ..errors import InputError, Note, SolverFailure
 from ..materials.law import HypoelasticLaw
+from ..meshes.bubble_model import BubbleModel
 from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
 from ..meshes.mesh import enclosed_volume
 from ..meshes.strip_models import UniaxialModel
@@ -143,6 +144,26 @@ def strip_history(
     sums = {name: at_levels(forces[:, sets[name]].sum(axis=1)) for name in held}
     load = -model.load_factor * sums[model.pulled][:, 1]
     return History(load, corners, low, high, sums, iterations=iterations, path=corners)
+
+
+def inflated_history(
+    model: BubbleModel, u: Array, forces: Array | None, sets: Mapping[str, Numbers],
+    iterations: int, remarks: tuple[Note, ...] = (),
+) -> History:  # fmt: skip
+    """Return displacements, support forces and strains in the reported frames of a bubble.
+
+    u : (increments, nodes, 3) mm from the sheet without stress. forces : (frames, nodes, 3) N of
+    the supports, by the node sets of the solver's own mesh; None where they are not known.
+    """
+    sums: dict[str, Array] = {}
+    if forces is not None:
+        held = [name for name in model.supports if name in sets]
+        sums = {name: forces[:, sets[name]].sum(axis=1) for name in held}
+    low, high = extremes(log_strain(replace(model.mesh, points=model.stress_free), u))
+    path, keep = u + (model.stress_free - model.mesh.points), model.reported
+    levels = np.array(model.increments)[keep]
+    return History(levels, path[keep], low, high, sums, iterations=iterations, path=path,
+                   remarks=remarks)  # fmt: skip
 
 
 def _onward(pulls: Array) -> Array:

@@ -156,12 +156,6 @@ def band_table(card: MaterialCard) -> str:
     return "\n".join(rows) + "\n"
 
 
-def density_remarks(density: float | None) -> tuple[str, ...]:
-    if density is not None:
-        return ()
-    return (f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)",)
-
-
 def range_remarks(card: MaterialCard, reach: float) -> tuple[str, ...]:
     if (card.law.strain_range < UNLIMITED).all():
         return ()
@@ -205,6 +199,11 @@ class TableOptions:
 @dataclass(frozen=True)
 class CurveOptions(TableOptions):
     density: float | None = option(None, "t/mm3, where the target needs one.", above=0)
+
+    def remarks(self, card: MaterialCard) -> tuple[str, ...]:
+        """Return what a curve loses of the card's density and range."""
+        words = f"the density: the card has none, {DENSITY:g} t/mm3 stands in (--density)"
+        return (*([words] if self.density is None else []), *range_remarks(card, self.reach))
 
 
 @dataclass(frozen=True)

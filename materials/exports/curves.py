@@ -117,8 +117,7 @@ def law58(card: MaterialCard, options: Law58Options) -> base.Export:
             *([stiff] if straight and not unload else ()),
             f"compression: a yarn is pushed with {FLEX:g} of its modulus (FLEX)",
             base.FROM_TOP if unload else base.TOTAL,
-            *base.density_remarks(options.density),
-            *base.range_remarks(card, options.reach),
+            *options.remarks(card),
         ),
         confirm=(
             "the measure of strain of LAW58 (the change of length over the length is taken), with "
@@ -211,8 +210,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
             f"{curves.yarns:.3g} MPa in the card)",
             "membrane elements only (ELFORM 5 or 9): no bending stiffness",
             base.FROM_TOP if unload else base.TOTAL,
-            *base.density_remarks(options.density),
-            *base.range_remarks(card, options.reach),
+            *options.remarks(card),
         ),
         confirm=(
             "the measure of the curves: public sources disagree (the manual names "
@@ -271,8 +269,7 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
             "Abaqus/Explicit only; Abaqus/Standard needs --format abaqus-umat",
             f"stress along the yarns in shear alone (up to {curves.yarns:.3g} MPa in the card)",
             base.FROM_TOP if unload else base.TOTAL,
-            *base.density_remarks(options.density),
-            *base.range_remarks(card, options.reach),
+            *options.remarks(card),
         ),
         confirm=(
             "the order stress, strain of the data lines, and the sign and measure of the shear "

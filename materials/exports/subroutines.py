@@ -113,7 +113,7 @@ def nlelast(card: MaterialCard, options: base.TableOptions) -> base.Export:
         "marc/nlelast_card.dat.j2",
         head=base.heading(card, "MSC Marc NLELAST, extended format", says, "$"),
         tables=[
-            {"name": name.lower(), "number": NUMBERS[name], "rows": _rows(tables[name])}
+            {"name": name.lower(), "number": NUMBERS[name], "rows": guarded(tables[name])}
             for name in NUMBERS
         ],
         nu12=card.law.nu12,
@@ -123,11 +123,12 @@ def nlelast(card: MaterialCard, options: base.TableOptions) -> base.Export:
     return base.Export({".dat": text}, says)
 
 
-def _rows(table: ModulusTable) -> list[tuple[float, float]]:
-    strain, modulus = table.strain.tolist(), table.modulus.tolist()
-    before = (strain[0] - GUARD, modulus[0])
-    after = (strain[-1] + GUARD, modulus[-1])
-    return [before, *zip(strain, modulus, strict=True), after]
+def guarded(table: ModulusTable) -> list[list[float]]:
+    """Return strain and modulus of a table, and one point more beyond each end."""
+    rows = np.pad(np.column_stack([table.strain, table.modulus]), ((1, 1), (0, 0)), "edge")
+    rows[[0, -1], 0] += [-GUARD, GUARD]
+    found: list[list[float]] = rows.tolist()
+    return found
 
 
 def _name(card: MaterialCard) -> str:

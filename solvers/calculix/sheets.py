@@ -21,8 +21,8 @@ from ...meshes.strip_models import (
     UniaxialModel,
     elongations,
 )
-from ..base import History, extremes, log_strain
-from ..prescribed import gauge_opened, grip_pulls, held_dofs, strip_history
+from ..base import History
+from ..prescribed import gauge_opened, grip_pulls, held_dofs, inflated_history, strip_history
 from .deck import (
     FIRST_OF_STEP,
     Run,
@@ -124,22 +124,13 @@ def bubble_decks(
 def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations: int) -> History:
     """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
     u, nodal = whole_times(path, len(model.increments), len(shells.points))
-    keep, levels = model.reported, np.array(model.increments)
-    reactions: dict[str, Array] = {
-        name: np.zeros((len(keep), 3)) for name in model.supports if name in shells.node_sets
-    }
-    for frame, i in enumerate(keep):
-        # CalculiX reports internal forces: what the support gives and the pressure next to it.
-        support = nodal[i] - pressure_forces(shells.points + u[i], shells.elements, levels[i])
-        for name, sums in reactions.items():
-            sums[frame] = support[shells.node_sets[name]].sum(axis=0)
-    corners = np.ascontiguousarray(u[:, : shells.corners])
-    strain = log_strain(replace(model.mesh, points=model.stress_free), corners)
-    corners += model.stress_free - model.mesh.points
-    low, high = extremes(strain)
-    return History(
-        levels[keep], corners[keep], low, high, reactions, iterations=iterations, path=corners
-    )
+    # CalculiX reports internal forces: what the support gives and the pressure next to it.
+    pushed = [
+        pressure_forces(shells.points + u[i], shells.elements, model.increments[i])
+        for i in model.reported
+    ]
+    forces, corners = nodal[model.reported] - np.array(pushed), u[:, : shells.corners]
+    return inflated_history(model, corners, forces, shells.node_sets, iterations)
 
 
 def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:

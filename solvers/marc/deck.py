@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import __version__
-from ...materials.exports.subroutines import STATE_VARIABLES
+from ...materials.exports.subroutines import NUMBERS, STATE_VARIABLES, guarded
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import modulus_tables
 from ...meshes.mesh import Mesh
@@ -24,10 +24,6 @@ from .settings import MarcSettings
 JOB = "job"
 #: Residual force and displacement, relative (thesis, section 2.2).
 TOLERANCE = 1e-3
-#: Name and number of the table of each modulus.
-TABLES = (("E1", "e1", 11), ("E2", "e2", 12), ("G12", "g12", 13))
-#: Strain beyond the ends of a table in which its modulus is held.
-GUARD = 1.0
 MEMBRANE, THICK = 18, 75
 
 
@@ -40,13 +36,11 @@ def law_context(law: HypoelasticLaw, settings: MarcSettings) -> dict[str, Any]:
         problem = "'incompressible' is nothing that NLELAST knows; use 'constant', or "
         problem += "[solver.marc] law = 'hypela2'"
         raise InputError(None, "material.thickness_change", problem)
-    tables, moduli = modulus_tables(law), []
-    for modulus, name, number in TABLES:
-        # One point more beyond each end: held whether or not Marc extrapolates.
-        columns = np.column_stack([tables[modulus].strain, tables[modulus].modulus])
-        points = np.pad(columns, ((1, 1), (0, 0)), "edge")
-        points[[0, -1], 0] += [-GUARD, GUARD]
-        moduli.append({"name": name, "number": number, "points": points.tolist()})
+    tables = modulus_tables(law)
+    moduli = [
+        {"name": name.lower(), "number": number, "points": guarded(tables[name])}
+        for name, number in NUMBERS.items()
+    ]
     return {"law": "nlelast", "state_variables": 0, "moduli": moduli, "nu12": law.nu12}
 
 

@@ -13,8 +13,8 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Mesh
 from ...meshes.strip_models import UniaxialModel
-from ..base import History, extremes, log_strain
-from ..prescribed import gauge_opened, grip_pulls, strip_history
+from ..base import History
+from ..prescribed import gauge_opened, grip_pulls, inflated_history, strip_history
 from .deck import (
     MEMBRANE,
     Run,
@@ -160,16 +160,7 @@ def reactions(frames: Sequence[Mapping[str, Array]]) -> Array | None:
 def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
     """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
     frames = whole_times(path, model.mesh, len(model.increments))
-    u, forces, keep = displacements(frames), reactions(frames), model.reported
-    sums: dict[str, Array] = {}
-    if forces is not None:
-        sums = {
-            name: forces[keep][:, model.mesh.node_sets[name]].sum(axis=1)
-            for name in model.supports
-            if name in model.mesh.node_sets
-        }
-    return History(
-        np.array(model.increments)[keep], u[keep],
-        *extremes(log_strain(model.mesh, u, model.mesh.warp)), sums, iterations=iterations, path=u,
-        remarks=() if forces is not None else (Note(NO_REACTIONS, NO_FORCES),),
-    )  # fmt: skip
+    forces, sets = reactions(frames), model.mesh.node_sets
+    remarks = () if forces is not None else (Note(NO_REACTIONS, NO_FORCES),)
+    given = None if forces is None else forces[model.reported]
+    return inflated_history(model, displacements(frames), given, sets, iterations, remarks)
