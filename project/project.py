@@ -257,7 +257,7 @@ class Project:
         if (written := self.written) is None:
             return {}
         return {name: written.made.get(name) or _definition(self.tests[name], said, self.scales)
-                for name, said in written.tests.items()}  # fmt: skip
+                for name, said in written.tests.items() if name in self.tests}  # fmt: skip
 
     @property
     def objects(self) -> dict[str, Any]:

@@ -437,7 +437,7 @@ def test_the_error_is_taken_out(off):
     best, plain = again.best, replace(fitted.best, certainty=None)
     told, sure = fitted.best.certainty, best.certainty
     assert sure.taken_out and not told.taken_out
-    assert best.point is plain.point and best.objective == fitted.objective
+    assert best.point is plain.point and best.point.value == fitted.objective
     a, c = fitted.problem.unknowns.inequalities
     assert (a @ sure.fine.best >= c - 1e-9).all()
     for name, strain in sure.strain.items():
