@@ -278,7 +278,7 @@ class PreparedTest(Protocol):
     comparison, of each point that can be left out of a fit. One with measured files also has
     `data_files()`, for the record of a run, as a test that is predicted does. A kind that looks at
     its data before a fit has `doubts(expected)`, and then lists the names of its doubts,
-    `Kind.doubts`."""
+    `Kind.doubts`. `seen` : further lines of `check`."""
 
     @property
     def test(self) -> Test: ...

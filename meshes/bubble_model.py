@@ -79,8 +79,8 @@ class BubbleModel:
         for name, values in (("pressures", wanted), ("increments", steps)):
             if not are_levels(values, self.unloaded):
                 raise InputError(None, name, f"expected positive, increasing, got {values} MPa")
-        near = np.abs(steps[:, None] - wanted).min(axis=0) if len(steps) else wanted
-        if (near > 1e-9 * wanted).any() or (self.unloaded and len(steps) != len(wanted)):
+        near = np.abs(steps[self._places(steps, wanted)] - wanted) if len(steps) else wanted
+        if (near > 1e-9 * wanted).any():
             raise InputError(None, "increments", "must contain every reported pressure")
         if not self.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
@@ -88,6 +88,17 @@ class BubbleModel:
         object.__setattr__(self, "increments", tuple(steps.tolist()))
         if not min(self.slack) > -1:
             raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
+
+    def _places(self, steps: Array, wanted: Array) -> NDArray[np.intp]:
+        """Return the step of each wanted level: the nearest, or of a history the last in turn."""
+        if not self.unloaded:
+            return places_of(wanted.tolist(), steps.tolist())
+        found, end = list[int](), len(steps)
+        for level in wanted[::-1]:
+            same = np.flatnonzero(np.isclose(steps[:end], level, rtol=1e-9, atol=0.0))
+            end = int(same[-1]) if len(same) else 0
+            found.append(end)
+        return np.array(found[::-1])
 
     def until(self, frame: int) -> Self:
         """Return the model as far as a frame, by its number."""
@@ -161,9 +172,7 @@ class BubbleModel:
 
     @property
     def reported(self) -> NDArray[np.intp]:
-        if self.unloaded:
-            return np.arange(len(self.increments))
-        return places_of(self.pressures, self.increments)
+        return self._places(np.array(self.increments), np.array(self.pressures))
 
     @property
     def fixed(self) -> NDArray[np.intp]:
@@ -187,13 +196,12 @@ class MeasuredShape(BubbleModel):
         return cls(
             model.mesh, model.thickness, model.pressures, (), model.supports, model.modes,
             model.slack, moved[:, model.mesh.node_sets["rim"]], moved, fields,
+            unloaded=model.unloaded,
         )  # fmt: skip
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
     """Return the pressures with small first steps, which help Newton from a flat sheet."""
-    first = pressures[0]
-    steps = [first * 6.0 / 22.0, *pressures]
-    if len(pressures) > 1 and pressures[1] > 1.5 * first:
-        steps.append(first + (pressures[1] - first) * 18.0 / 37.0)
-    return tuple(sorted(steps))
+    first, *rest = pressures
+    between = [first + (p - first) * 18.0 / 37.0 for p in rest[:1] if p > 1.5 * first]
+    return (first * 6.0 / 22.0, first, *between, *rest)

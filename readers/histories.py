@@ -125,7 +125,7 @@ class Cycle:
 
 def find_cycles(load: Array) -> list[Cycle]:
     """Return the cycles of loads (n,); those whose unloading has fewer than 5 rows have none."""
-    rows, least = _turns(load), len(load) - 1
+    rows, least = turns(load), len(load) - 1
     cycles = []
     for k in range(0, len(rows) - 1, 2):
         end = rows[k + 2] if k + 2 < len(rows) else least
@@ -133,7 +133,7 @@ def find_cycles(load: Array) -> list[Cycle]:
     return [c if c.end - c.peak >= 5 else replace(c, unloaded=False) for c in cycles]
 
 
-def _turns(load: Array) -> list[int]:
+def turns(load: Array, back: float = BACK, again: float = AGAIN) -> list[int]:
     """Return rows of a valley, the peak after it, the next valley and so on."""
     floor = FLOOR * float(np.ptp(load)) if len(load) else 0.0
     if not floor > 0:
@@ -145,7 +145,7 @@ def _turns(load: Array) -> list[int]:
             far = i
             continue
         before = abs(load[far] - load[found[-1]]) if found else 0.0
-        if sign * (load[far] - value) > max(floor, (BACK if sign > 0 else AGAIN) * before):
+        if sign * (load[far] - value) > max(floor, (back if sign > 0 else again) * before):
             found.append(far)
             far, sign = i, -sign
     return [*found, far]

@@ -22,6 +22,7 @@ from ..errors import InputError
 from ..files import ends
 from . import tables
 from .frames import Frame, heading_of
+from .inflations import Which, branches_of
 from .machine_tables import (
     AS_FOUND,
     Channel,
@@ -273,6 +274,7 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
 #: Why frames are not looked at.
 BEYOND, AT_REST_FRAME_CHOICE = "without a pressure: beyond the log", "at no pressure"
 RELEASED, REPEATED = "after the largest pressure", "at a pressure that another frame has"
+OTHER = "of another inflation"
 #: Pressures that differ by less than this share of the largest are one; how far from an asked
 #: pressure a frame may be, as a share of the largest asked one.
 SAME, TOLERANCE = 1e-6, 0.02
@@ -288,11 +290,12 @@ class FrameChoice:
 
 def choose_frames(
     pressures: Array, asked: Sequence[float] | None = None, count: int | None = None,
-    tolerance: float | None = None, in_time: bool = False,
+    tolerance: float | None = None, inflation: Which | None = None,
 ) -> FrameChoice:  # fmt: skip
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
-    asked, tolerance (2 % of the largest asked unless given) : MPa. in_time : without the release.
+    asked, tolerance (2 % of the largest asked unless given) : MPa. inflation : of frames in order
+    of time, without releases; "all": every inflation and release, `count` of each.
     """
     known, left_out = np.isfinite(pressures), {}
     able = known & (np.nan_to_num(pressures) > 0)
@@ -300,19 +303,28 @@ def choose_frames(
     left_out[AT_REST_FRAME_CHOICE] = int((known & ~able).sum())
     if not able.any():
         raise InputError(None, "", f"none of the {len(pressures)} frames is under pressure")
-    top = int(np.argmax(np.where(able, pressures, -np.inf)))
-    if in_time:
-        later = able & (np.arange(len(pressures)) > top)
-        left_out[RELEASED] = int(later.sum())
-        able &= ~later
-    order = np.flatnonzero(able)
-    order = order[np.argsort(pressures[order], kind="stable")]
-    apart = np.diff(pressures[order], prepend=-np.inf) > SAME * pressures[top]
-    if asked is not None:
-        frames = _nearest(pressures, order, asked, tolerance)
-    else:
-        left_out[REPEATED], order = int((~apart).sum()), order[apart]
-        frames = order.tolist() if count is None else _spread(pressures, order, count)
+    found = [np.arange(len(pressures))] if inflation is None else branches_of(pressures)
+    branches = [branch[able[branch]] for branch in found]
+    if isinstance(inflation, int):
+        if 2 * inflation > len(branches) + 1:
+            problem = f"{(len(branches) + 1) // 2} are in the frames, number {inflation} is not"
+            raise InputError(None, "inflation", problem)
+        release = branches[2 * inflation - 1 : 2 * inflation]
+        branches = branches[2 * inflation - 2 : 2 * inflation - 1]
+        left_out[RELEASED] = sum(map(len, release))
+        left_out[OTHER] = int(able.sum()) - len(branches[0]) - left_out[RELEASED]
+    frames, left_out[REPEATED] = list[int](), 0
+    for k, branch in enumerate(branches):
+        order = branch[np.argsort(pressures[branch], kind="stable")]
+        if asked is not None:
+            frames += _nearest(pressures, order, asked, tolerance)
+            continue
+        last = pressures[frames[-1]] if frames else -np.inf
+        apart = np.diff(pressures[order], prepend=-np.inf) > SAME * np.nanmax(pressures)
+        apart &= np.abs(pressures[order] - last) > SAME * np.nanmax(pressures)
+        left_out[REPEATED], order = left_out[REPEATED] + int((~apart).sum()), order[apart]
+        own = order.tolist() if count is None else _spread(pressures, order, count)
+        frames += own[::-1] if k % 2 else own
     return FrameChoice(tuple(frames), {why: n for why, n in left_out.items() if n})
 
 

@@ -149,6 +149,17 @@ def rise_charts(pressures: ArrayLike, rises: ArrayLike) -> Charts:
     return Charts("rises", [chart], "")
 
 
+def inflation_charts(curves: Sequence[tuple[Array, Array]]) -> Charts:
+    """Return apex heights (mm) over pressures (MPa) of inflations and releases in turn."""
+    series = [
+        line(f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}", 1e3 * p, height, marks=True,
+             colour=k // 2, dashes=k % 2)
+        for k, (p, height) in enumerate(curves)
+    ]  # fmt: skip
+    chart = Chart("", "pressure, kPa", "height of the apex, mm", series, from_zero=True)
+    return Charts("inflations", [chart], "")
+
+
 def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:
     """Return pressure (MPa, NaN beyond the log) and apex (mm) over time, and over each other."""
     kilos, known = 1e3 * pressures, np.isfinite(pressures)

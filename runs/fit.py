@@ -459,7 +459,7 @@ class Check:
             gone = ", ".join(f"{count} {why}" for why, count in dropped.items() if count)
             said = list(dict.fromkeys(note for file in files for note in file.source.notes))
             left_out = [f"rows of the files left out: {gone}"] if gone else []
-            choices[one.test.name] = [*said, *left_out]
+            choices[one.test.name] = [*said, *left_out, *getattr(one, "seen", ())]
         return choices
 
     @property

@@ -156,6 +156,7 @@ def recorded_lines(taken: RecordedFrames) -> list[str]:
         found, asked = apart(1e3 * taken.pressure[worst], 1e3 * taken.asked[worst], 4)
         if found != asked:
             lines[0] += f"; farthest from the pressure asked for: {found} in place of {asked} kPa"
+    lines += [] if taken.inflations is None else [taken.inflations.line]
     return lines if taken.clock is None else [*lines, clock_words(taken.clock)]
 
 

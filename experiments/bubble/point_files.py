@@ -13,6 +13,7 @@ from ...files import is_file
 from ...readers import pressure_log
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
+from ...readers.inflations import Inflations, Which, has_several
 from ...readers.machine_tables import Channel, read_times
 from ...readers.pressure_log import check_pattern, number_in_name, values_in_file
 from ...readers.sections import LENGTH_UNITS
@@ -21,8 +22,8 @@ from ..kinds import Array, Place, named_format
 from .registration import RegistrationOptions
 from .section import BubbleSection, LogSection, PointsSection, PressureSection, registration_options
 
-#: Key of the section that says the pressures, below that of the test.
-AT = "data.points.pressure"
+#: Key of the section that says the pressures, below that of the test; source without one.
+AT, LISTED = "data.points.pressure", "the list 'pressures'"
 
 
 def pressures_by_log(
@@ -113,7 +114,7 @@ class RecordedFrames:
     frames of the files, None where each file holds one. pressure, asked : (n,) MPa. source : of the
     pressures, in words. count : of all frames. left_out : number of frames not used, by why. doubt
     : (n,) MPa, by the uncertain offset of the clocks. logs : a log, a table of times. numbers :
-    doubts about the frames' numbers, of which their times are."""
+    doubts about the frames' numbers, of which their times are. inflations : all, where several."""
 
     files: tuple[Path, ...]
     frames: tuple[int, ...] | None
@@ -127,17 +128,23 @@ class RecordedFrames:
     clock: pressure_log.ClockOffset | None = None
     logs: tuple[Path, ...] = ()
     numbers: tuple[str, ...] = ()
+    inflations: Inflations | None = None
 
 
 def recorded_frames(
-    section: PressureSection, asked: Sequence[float] | None, files: Sequence[Path],
-    options: FrameOptions, format: str | None, place: Place, folder: Path,
+    section: PressureSection | None, asked: Sequence[float] | None, files: Sequence[Path],
+    options: FrameOptions, format: str | None, place: Place, folder: Path, inflation: Which,
 ) -> RecordedFrames:  # fmt: skip
     """Choose the frames of a test by the pressures that were recorded; raises InputError.
-    asked : MPa, the test's `pressures`; None takes all frames, or `frames` of them."""
-    _check(section, asked, place)
+    section : None where `asked` are the pressures of the files. asked : MPa, the test's
+    `pressures`; None takes all frames, or `frames` of them."""
     clock, names, said = None, [file.name for file in files], list[str]()
-    if section.log is not None:
+    if section is not None:
+        _check(section, asked, place, inflation)
+    if section is None:
+        section, pressures, source = PressureSection(), np.array(asked), LISTED
+        asked, names = None, names or [f"frame {i + 1}" for i in range(len(pressures))]
+    elif section.log is not None:
         clock, names, said = pressures_by_log(section.log, files, options, format, place, folder)
         pressures, source = clock.pressure, f"the log {section.log.file}"
     elif section.column is not None:
@@ -156,16 +163,23 @@ def recorded_frames(
         own = [number_in_name(f, PRESSURE_UNITS, pattern, unit, "from_name") for f in files]
         pressures, source = np.array(own), "the files' names"
     limit = None if section.tolerance is None else section.tolerance * place.scales.pressure
+    several, inflations = has_several(pressures), None
+    timed = several or inflation != 1 or clock is not None or source == LISTED
     try:
-        how = section.frames, limit, clock is not None
+        how = section.frames, limit, inflation if timed else None
         chosen = pressure_log.choose_frames(pressures, asked, *how)
     except InputError as error:
-        field = error.field if error.field.startswith("pressures") else f"{AT}.{error.field}"
+        of_test = error.field.startswith(("pressures", "inflation"))
+        field = error.field if of_test else f"{AT}.{error.field}"
         raise place.error(field.rstrip("."), error.problem) from None
     taken, logs = list(chosen.frames), []
     if section.log is not None:
         named = {"file": section.log.file, "times": section.log.times}
         logs = [_beside(f, place, folder, f"{AT}.log.{k}") for k, f in named.items() if f]
+    if several and all(map(is_file, files)):
+        read = [] if clock else [read_frames([one], options, format) for one in files]
+        risen = np.array([pressure_log.apex_height(frame) for one in read for frame in one])
+        inflations = Inflations(pressures, clock.heights if clock else risen, inflation)
     single = len(names) == len(files)
     return RecordedFrames(
         files=tuple(files[i] for i in taken) if single else tuple(files),
@@ -173,11 +187,15 @@ def recorded_frames(
         pressure=pressures[taken], asked=None if asked is None else np.array(asked), source=source,
         count=len(names), left_out=chosen.left_out,
         doubt=None if clock is None else clock.doubt[taken], clock=clock, logs=tuple(logs),
-        numbers=tuple(said),
+        numbers=tuple(said), inflations=inflations,
     )  # fmt: skip
 
 
-def _check(section: PressureSection, asked: Sequence[float] | None, place: Place) -> None:
+def _check(
+    section: PressureSection, asked: Sequence[float] | None, place: Place, inflation: Which
+) -> None:
+    if asked is not None and inflation == "all":
+        raise place.error("pressures", "means nothing where inflation = 'all' takes all frames")
     given = [bool(section.from_name), section.column is not None, section.log is not None]
     if sum(given) != 1:
         raise place.error(AT, "expected exactly one of 'from_name', 'column' and 'log'")
@@ -238,10 +256,16 @@ def measured_files(
     registration = registration_options(points.registration, place, scale)
     correlation = points.correlation.model_dump(exclude_none=True)
     measured = PointFiles(files, options, kind, registration, correlation=correlation)
-    if points.pressure is None or (pressures is not None and not place.need_data):
+    listed = list(pressures or ()) if points.pressure is None else []
+    several = bool(listed) and (section.inflation != 1 or listed != sorted(listed))
+    if several and len(files) != len(listed) and (files or place.need_data):
+        problem = f"in order of time expected one for each of the {len(files)} files"
+        raise place.error("pressures", f"{problem}, got {len(listed)}")
+    forward = pressures is not None and not place.need_data
+    if not several and (points.pressure is None or forward):
         return measured
-    how = measured.files, measured.options, measured.format
-    recorded = recorded_frames(points.pressure, pressures, *how, place, _folder(points, place))
+    how = measured.files, measured.options, measured.format, place, _folder(points, place)
+    recorded = recorded_frames(points.pressure, pressures, *how, section.inflation)
     return replace(measured, files=recorded.files, recorded=recorded)
 
 

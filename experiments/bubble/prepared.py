@@ -4,6 +4,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import dropwhile
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,7 @@ from ...meshes.disk import Outline
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import FrameSource
+from ...readers.inflations import Inflations
 from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precision, Weighting
 from . import objective as matching
@@ -202,7 +204,8 @@ class PreparedBubble:
         steps = test.models(what="increments", factor=max(1, round(factor)))[PART].increments
         if factor > 1 and test.sheet.known:
             # Of a sheet that may be slack the fit knows no equilibrium below its first increment.
-            steps = [p for p in steps if p >= own.model.increments[0] * (1 - 1e-12)]
+            first = own.model.increments[0] * (1 - 1e-12)
+            steps = list(dropwhile(lambda p: p < first, steps))
         model = with_sheet(replace(finer, increments=steps), test.sheet, test.outline, self.sheet)
         assert isinstance(own.objective, FieldObjective)
         moved = copy.copy(own.objective)
@@ -245,8 +248,19 @@ class PreparedBubble:
         test = self.test
         registered, flat = self.registration is not None, not test.sheet.known
         numbers = () if self.recorded is None else self.recorded.numbers
-        thick = test.place.fabric.thickness
-        return View(self.fields, test.outline, thick, registered, flat, numbers)
+        thick, fields = test.place.fabric.thickness, self.fields[: test.rising]
+        return View(fields, test.outline, thick, registered, flat, numbers)
+
+    @property
+    def inflations(self) -> Inflations | None:
+        """Return the inflations of the frames; None of one."""
+        return None if self.recorded is None else self.recorded.inflations
+
+    @property
+    def seen(self) -> Sequence[str]:
+        """Return what `check` says of several inflations."""
+        found = self.inflations
+        return () if found is None else (found.line, *found.lines)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)
@@ -301,12 +315,15 @@ def _prolonged(own: BubbleModel, finer: BubbleModel, path: Array) -> Array:
     Displacements are straight in the cube root of the pressure, also below the first one: a slack
     sheet has moved far there, and has folds that a finer mesh does not find from above."""
     sample = _sample(SmoothReading.of(own.mesh), finer.mesh.points[:, :2])
-    order = np.argsort(own.increments)
-    known, moved = np.cbrt(np.array(own.increments)[order]), path[order]
+    known, levels = (np.cbrt(np.array(model.increments)) for model in (own, finer))
+    if own.unloaded:  # along the way of the roots, up and down
+        known, levels = (np.cumsum(np.abs(np.diff(x, prepend=0.0))) for x in (known, levels))
+    order = np.argsort(known)
+    known, moved = known[order], path[order]
     if len(known) == 1:
         known, moved = np.append(0.0, known), np.concatenate([0.0 * moved, moved])
     starts = np.empty((len(finer.increments), *finer.mesh.points.shape))
-    for start, level in zip(starts, np.cbrt(np.array(finer.increments)), strict=True):
+    for start, level in zip(starts, levels, strict=True):
         after = min(max(int(np.searchsorted(known, level)), 1), len(known) - 1)
         share = (level - known[after - 1]) / (known[after] - known[after - 1])
         start[:] = sample @ ((1.0 - share) * moved[after - 1] + share * moved[after])
@@ -347,6 +364,9 @@ def kept_targets(
 
 def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedBubble:
     """Read or compute the data of a test; raises InputError, SolverFailure."""
+    if test.rising < len(test.pressures) and law.memory is None:
+        problem = "'all' needs a law with a memory: say [law.memory] warp = 'fitted' and fill"
+        raise test.place.error("inflation", problem)
     if isinstance(test.data, KnownSolution):
         fields, known, own = _computed(test, test.data, law, make_solver)
         surfaces = _surfaces(test, fields, computed=True)
@@ -427,8 +447,10 @@ def read_measured(
         fields = (replace(fields[0], source=source), *fields[1:])
     if data.registration is None:
         return fields, None
+    order = np.argsort([field.pressure for field in fields], kind="stable")
     with test.place.naming("data.points.registration"):
-        return register_fields(fields, test.outline, data.registration)
+        found, how = register_fields([fields[k] for k in order], test.outline, data.registration)
+        return tuple(found[k] for k in np.argsort(order)), how
 
 
 #: Of the highest pressure of the project's own test: frames of one to more pressure.
@@ -454,7 +476,10 @@ def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
         sight = Precision(matching.CORRELATION, 1.0, PLACES)
     if planning.noise is not None:
         sight, noise_is = replace(sight, noise=planning.noise), "given"
-    # As it would be made: matched at points, in millimetres, its rim at rest.
+    # As it would be made: inflated once, matched at points, in millimetres, its rim at rest.
+    if first.rising < len(first.pressures):
+        pressures = first.pressures[: first.rising]
+        first = replace(first, pressures=pressures, increments=default_increments(pressures))
     sheet = replace(first.sheet, measured=False, moving_rim=False)
     first = replace(first, match_by="points", objective="mm", sheet=sheet)
     tests = {"the same bubble again" if own else "bubble": first}

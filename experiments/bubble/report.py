@@ -73,6 +73,12 @@ ASKED = {
     "matching": "shape function, matching criterion, interpolant",
     "prefilter": "prefilter and data filter",
 }  # fmt: skip
+#: Columns of inflations.csv, and how the page calls them.
+INFLATIONS = {
+    "inflation": "inflation", "pressure_kPa": "pressure, kPa", "first_mm": "apex in the first, mm",
+    "release_mm": "in the release before, mm", "apex_mm": "in this inflation, mm",
+    "higher_mm": "higher by, mm", "higher_percent": "%",
+}  # fmt: skip
 NOT_MATCHED = "for the record: the fit matched the points themselves"
 #: Points that are drawn of one pressure.
 POINTS = 120
@@ -336,7 +342,8 @@ def bubble_solid(
 def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     """Write the maps and the rise by pressure; return the page of the data before a fit."""
     rows: list[list[object]] = []
-    for field, rise in zip(prepared.fields, prepared.view.rises, strict=True):
+    all_rises = replace(prepared.view, fields=prepared.fields).rises
+    for field, rise in zip(prepared.fields, all_rises, strict=True):
         dropped = ", ".join(f"{count} {why}" for why, count in field.dropped.items()) or "none"
         name = "computed" if field.path is None else field.path.name
         rows.append([1e3 * field.pressure, name, len(field.points), dropped, float(rise)])
@@ -353,9 +360,17 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     if view.apexes:
         tables.append(_equilibrium(view))
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
-    rises = bubbles.rise_charts([field.pressure for field in prepared.fields], view.rises)
-    figure = saved(out, "rises.png", rises, "rise about the centre against pressure")
-    return Exhibit(facts=facts, figures=[maps, figure], tables=tables)
+    rises = bubbles.rise_charts([field.pressure for field in prepared.fields], all_rises)
+    figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
+    if (found := prepared.inflations) is None:
+        return Exhibit(facts=facts, figures=figures, tables=tables)
+    table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
+    file = out.write("inflations.csv", table, "apex of each inflation beside the first")
+    tables.append(Table("Inflations", list(INFLATIONS.values()), table.to_numpy().tolist(),
+                        found.line))  # fmt: skip
+    apexes = bubbles.inflation_charts(found.curves)
+    figures.append(saved(out, "inflations.png", apexes, "apex in each inflation and release"))
+    return Exhibit(facts=facts, figures=figures, tables=tables, files=[file])
 
 
 def _equilibrium(view: View) -> Table:
@@ -475,7 +490,7 @@ def registration_picture(
     fields: Sequence[DisplacementField], outline: Outline, out: Output
 ) -> Shown:
     """Draw maps of the reference height, where it was measured, and of the highest rise."""
-    last = fields[-1]
+    last = max(fields, key=lambda field: field.pressure)
     maps = [(f"rise at {1e3 * last.pressure:.4g} kPa, mm", last.displacement[:, 2])]
     if last.z is not None:
         maps.insert(0, ("reference height z, mm", last.z))

@@ -388,6 +388,7 @@ class BubbleSection(sections.Section):
     radius: sections.Length | Literal["clamp"] | None = None
     ellipse: EllipseSection | None = None
     pressures: Annotated[list[sections.Pressure], Field(min_length=1)] | None = None
+    inflation: Literal["all"] | Annotated[int, Field(ge=1)] = 1
     increments: list[sections.Pressure] | None = None
     elements: Elements = 800
     symmetry: Symmetry = "full"

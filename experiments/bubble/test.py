@@ -15,6 +15,7 @@ from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, pace_of
+from ...readers.inflations import Which
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, Studied
 from .point_files import PointFiles, measured_files
@@ -117,9 +118,19 @@ class BubbleTest:
     facet: Facet | None = None
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
     registration: Mapping[str, float] = field(default_factory=dict)
+    inflation: Which = 1
     kind: str = "bubble"
-    state: ClassVar[State] = "first loading"
     reach: ClassVar[Reach] = Reach()  # known only when its law is
+
+    @property
+    def state(self) -> State:
+        """Return "conditioned" where only a later inflation is taken."""
+        return "first loading" if self.inflation in (1, "all") else "conditioned"
+
+    @property
+    def rising(self) -> int:
+        """Return the number of pressures before the first one that falls."""
+        return int(np.argmax([*(np.diff(self.pressures) < 0), True])) + 1
 
     @property
     def pace(self) -> Pace:
@@ -146,7 +157,8 @@ class BubbleTest:
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
         thick = self.place.fabric.thickness if thickness is None else thickness
-        return BubbleModel(mesh, thick, self.pressures, increments or self.increments)
+        steps, unloaded = increments or self.increments, self.rising < len(self.pressures)
+        return BubbleModel(mesh, thick, self.pressures, steps, unloaded=unloaded)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
@@ -174,6 +186,8 @@ class BubbleTest:
         )  # fmt: skip
         said: dict[str, object] = {name: getattr(self, name) for name in names}
         said["outline"] = asdict(self.outline)
+        if self.inflation != 1:
+            said["inflation"] = self.inflation
         if self.facet is not None:
             said["filter"] = asdict(self.facet)
         if self.registration:
@@ -191,8 +205,10 @@ class BubbleTest:
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     """Return the test of a section; raises InputError naming the file and the dotted key."""
     length, scale, given = place.scales.length, place.scales.pressure, section.pressures
+    points = section.data.points
+    may_fall = points is not None and points.pressure is None
     for i, (before, after) in enumerate(pairwise(given or ()), start=1):
-        if after <= before:
+        if after == before or (after < before and not may_fall):
             problem = f"pressures must increase, got {after:g} after {before:g}"
             raise place.error(f"pressures[{i}]", problem)
     asked = None if given is None else tuple(p * scale for p in given)
@@ -203,6 +219,13 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         problem = "this key is missing; add it, or say in [bubble.data.points.pressure] where each"
         raise place.error("pressures", f"{problem} frame's own stands")
     increments = default_increments(pressures)
+    of_one = {"increments": section.increments is not None,
+              "sheet.rim": section.sheet.rim == "measured"}  # fmt: skip
+    for key, said in of_one.items():
+        if said and list(pressures) != sorted(pressures):
+            raise place.error(key, "is of one inflation, and inflation = 'all' takes several")
+    if measured is None and section.inflation != 1:
+        raise place.error("inflation", "expected 1: a known solution is inflated once")
     if section.increments is not None:
         increments = merge_increments(place, "increments", section.increments, pressures)
     clamp = None
@@ -227,6 +250,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         noise=None if section.noise is None else section.noise * length,
         facet=facet_of(camera, place, length, section.symmetry, section.match.by), sheet=sheet,
         of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
+        inflation=section.inflation,
     )  # fmt: skip
 
 

@@ -166,7 +166,7 @@ SEEN = np.array([np.nan, 0.0, -0.001, 0.010, 0.020, 0.031, 0.031, 0.052, 0.040, 
 
 
 def test_frames_of_the_rise():
-    chosen = choose_frames(SEEN, [0.012, 0.0305, 0.05], tolerance=0.003, in_time=True)
+    chosen = choose_frames(SEEN, [0.012, 0.0305, 0.05], tolerance=0.003, inflation=1)
     assert chosen.frames == (3, 5, 7)
     assert chosen.left_out == {BEYOND: 2, AT_REST: 2, RELEASED: 2}
     # Not in the order of time, the release cannot be told from the rise.
@@ -174,7 +174,7 @@ def test_frames_of_the_rise():
     chosen = choose_frames(SEEN)
     assert chosen.frames == (3, 9, 4, 5, 8, 7)
     assert chosen.left_out == {BEYOND: 2, AT_REST: 2, REPEATED: 1}
-    assert choose_frames(SEEN, in_time=True).frames == (3, 4, 5, 7)
+    assert choose_frames(SEEN, inflation=1).frames == (3, 4, 5, 7)
     # 2 % of the largest asked for is 1.04 kPa.
     for asked, words in (
         ([0.0305, 0.0420, 0.052], ["pressures[1]", "within 1.04 kPa of 42 kPa", "at 40 kPa"]),
