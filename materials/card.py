@@ -243,26 +243,18 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
         card.closed_path.words,
     ]  # fmt: skip
     header = "".join(f"# {line}\n" for line in words)
-    text = header + tomli_w.dumps(content) + _bands_text(sure, scale) + _pieces_text(pieces)
-    write_text(path, text)
+    bands = {
+        name: [[float(f"{v:.7g}") for v in own] for own in (strain, *(end / scale for end in ends))]
+        for name, (strain, *ends) in (sure.bands if sure is not None else {}).items()
+    }
+    tables = _table_text("certainty.band", bands) + _table_text("pieces", pieces)
+    write_text(path, header + tomli_w.dumps(content) + tables)
 
 
-def _pieces_text(table: Mapping[str, Any]) -> str:
-    """Return the table of a form that has no name, a line a key."""
+def _table_text(name: str, table: Mapping[str, Any]) -> str:
+    """Return a table of the card, if it holds anything: a line a key, not a line a number."""
     lines = [f"{key} = {json.dumps(own, ensure_ascii=False)}" for key, own in table.items()]
-    return "\n".join(["", "[pieces]", *lines, ""]) if table else ""
-
-
-def _bands_text(sure: CardCertainty | None, scale: float) -> str:
-    """Return `[certainty.band]`, a line a modulus, which is shorter than a line a number."""
-    if sure is None or not sure.bands:
-        return ""
-    lines = ["", "[certainty.band]"]
-    for name, (strain, *ends) in sure.bands.items():
-        columns = [strain, *(end / scale for end in ends)]
-        rows = [[float(f"{v:.7g}") for v in column] for column in columns]
-        lines.append(f"{name} = {json.dumps(rows)}")
-    return "\n".join(lines) + "\n"
+    return "\n".join(["", f"[{name}]", *lines, ""]) if table else ""
 
 
 def _from_zero(ends: list[float]) -> list[float]:

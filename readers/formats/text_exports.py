@@ -1,4 +1,4 @@
-"""Text exports that are read by their headings alone: ARAMIS, DaVis, MatchID.
+"""Text exports: ARAMIS, DaVis and MatchID, read by their headings alone, and DICe.
 
 GOM ARAMIS, GOM Correlate, ZEISS Correlate (lines of title, semicolons):
 
@@ -31,15 +31,29 @@ other sign), and a reader of these headings for MultiDIC. Which places the coord
 the motion), and what a point without correlation looks like, could not be confirmed: "NaN", also as
 German .NET writes it ("n. def."), is taken for one. Where the axes of the export were set by hand,
 `camera_axes = false` leaves them as they are.
+
+Solution files of DICe: lines of `***`, a row of names, SIGMA and STATUS_FLAG.
+
+    *** Digital Image Correlation Engine (DICe), Copyright 2014 Sandia Corporation
+SUBSET_ID,COORDINATE_X,...,SIGMA,STATUS_FLAG,MODEL_COORDINATES_X,...,MODEL_DISPLACEMENT_X,...
+
+Source: DICe's own (DICe_Schema.cpp; DICe.h numbers the states, of which those that failed are left
+out; sigma is -1 where correlation failed) and public scripts that add MODEL_DISPLACEMENT to
+MODEL_COORDINATES. COORDINATE_X is in pixels; y points down; that z points away from the camera
+could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the calibration's unit.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
+from ...errors import InputError
+from ..frames import Frame, FrameOptions, frame_of
 from ..registry import Format, register_format
-from ..text_frames import text_reader
+from ..tables import read_lines
+from ..text_frames import read_text_rows, text_reader
 
 _ARAMIS = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
 _DAVIS = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
@@ -61,9 +75,36 @@ def recognises_matchid(path: Path, head: bytes) -> bool:
     return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
 
 
+#: The states of DICe.h in which a subset was found; all others are failures of some step.
+SUCCESSFUL = (0, 1, 2, 3, 4, 6, 15, 18)
+NAMES = {
+    **{axis: f"MODEL_COORDINATES_{axis.upper()}" for axis in "xyz"},
+    **{f"d{axis}": f"MODEL_DISPLACEMENT_{axis.upper()}" for axis in "xyz"},
+}
+
+
+def recognises_dice(path: Path, head: bytes) -> bool:
+    """Return whether the header is DICe's, or the row of names without one."""
+    return (head.startswith(b"***") and b"DICe" in head) or head.startswith(b"SUBSET_ID")
+
+
+def read_dice(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read the one frame of a file; without a stereo model it is refused."""
+    top = "\n".join(text for _, text in read_lines(path, "***", any_encoding=True)[:3])
+    if NAMES["x"] not in top and not options.columns:
+        problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
+        raise InputError(path, "", problem)
+    good = "STATUS_FLAG", SUCCESSFUL
+    # Without a stereo model, of columns that the user names, the model's are not asked for.
+    names = {key: name for key, name in NAMES.items() if name in top}
+    every = read_text_rows(path, options, comment="***", names=names, status=good, camera_axes=True)
+    return [frame_of(rows, options, path, "dice") for rows in every]
+
+
 for name, title, recognises, settings in (
     ("aramis", "text of ARAMIS or ZEISS Correlate", recognises_aramis, {}),
     ("davis", "CSV of LaVision DaVis", recognises_davis, {}),
     ("matchid", "CSV of MatchID Stereo, 2023 or 2024", recognises_matchid, {"camera_axes": True}),
 ):
     register_format(Format(name, "frame", title, text_reader(name, **settings), recognises))
+register_format(Format("dice", "frame", "solution files of DICe", read_dice, recognises_dice))

@@ -8,7 +8,7 @@ from bubblefit.readers import tables
 from bubblefit.readers.bending import read_bending_curves
 from bubblefit.readers.curves import LoadCurve, split_at_restarts
 from bubblefit.readers.fields import DisplacementField, fit_surface, read_surfaces
-from bubblefit.readers.formats import dice
+from bubblefit.readers.formats import text_exports
 from bubblefit.readers.frames import Frame, FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, in_unit
 from bubblefit.readers.pressure_log import (
@@ -121,7 +121,7 @@ def test_states_of_dice_that_are_failures(tmp_path):
     for above in ("", "*** DICe\n"):
         path.write_text(above + text)
         (frame,) = read_frames([path])
-        assert {int(x) - 1 for x in frame.points[:, 0]} == good == {*dice.SUCCESSFUL}
+        assert {int(x) - 1 for x in frame.points[:, 0]} == good == {*text_exports.SUCCESSFUL}
         assert frame.dropped == {"flagged as doubtful": 25 - len(good)}
     path.write_text(
         "SUBSET_ID,COORDINATE_X,COORDINATE_Y,DISPLACEMENT_X,DISPLACEMENT_Y\n0,9,9,1,1\n"
