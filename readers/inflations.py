@@ -89,10 +89,8 @@ class Inflations:
         if self.taken == "all":
             return f"all frames of {count} inflations are taken, in their order"
         state = "the first loading" if self.taken == 1 else "conditioned"
-        return (
-            f"inflation {self.taken} of {count}, {state}, is taken; inflation = N or 'all' takes "
-            "others"
-        )
+        said = f"inflation {self.taken} of {count}, {state}, is taken"
+        return f"{said}; inflation = N or 'all' takes others"
 
     @property
     def lines(self) -> Sequence[str]:
@@ -100,8 +98,7 @@ class Inflations:
         said = []
         for number in dict.fromkeys(row[0] for row in self.rows):
             own = [row for row in self.rows if row[0] == number]
-            for k in np.unique(np.linspace(0, len(own) - 1, min(len(own), FEW)).round()):
-                _, kilo, first, _, now, more, percent = own[int(k)]
+            for _, kilo, first, _, now, more, percent in own[:: -(-len(own) // FEW)]:
                 said.append(
                     f"inflation {number} at {kilo:.4g} kPa: apex {now:.4g} mm, {first:.4g} mm in "
                     f"the first: {more:+.2g} mm, {percent:+.2g} %"

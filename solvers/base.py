@@ -290,7 +290,8 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
         )
         raise InputError(None, "form", problem)
     if law.memory is not None and not getattr(solver, "remembers", False):
-        problem = f"a law with a memory is for the solver membrane; {solver.name} does not take it"
+        lost = f"with {solver.name} unloading, permanent set and hysteresis are lost"
+        problem = f"a law with a memory is for the solver membrane; {lost}: use the card without it"
         raise InputError(None, "memory", problem)
 
 

@@ -21,7 +21,6 @@ from ...meshes.disk import Outline
 from ...meshes.mesh import FacetReading, Mesh, SmoothReading
 from ...readers.fields import DisplacementField, DisplacementSurface, fit_surface
 from ...readers.frames import FrameSource
-from ...readers.inflations import Inflations
 from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precision, Weighting
 from . import objective as matching
@@ -252,15 +251,10 @@ class PreparedBubble:
         return View(fields, test.outline, thick, registered, flat, numbers)
 
     @property
-    def inflations(self) -> Inflations | None:
-        """Return the inflations of the frames; None of one."""
-        return None if self.recorded is None else self.recorded.inflations
-
-    @property
     def seen(self) -> Sequence[str]:
         """Return what `check` says of several inflations."""
-        found = self.inflations
-        return () if found is None else (found.line, *found.lines)
+        found = self.recorded and self.recorded.inflations
+        return (found.line, *found.lines) if found else ()
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         return () if self.known is not None else doubts_of(self.view, expected)

@@ -362,7 +362,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
     rises = bubbles.rise_charts([field.pressure for field in prepared.fields], all_rises)
     figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
-    if (found := prepared.inflations) is None:
+    if not (found := prepared.recorded and prepared.recorded.inflations):
         return Exhibit(facts=facts, figures=figures, tables=tables)
     table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
     file = out.write("inflations.csv", table, "apex of each inflation beside the first")

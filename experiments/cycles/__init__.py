@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -298,24 +297,24 @@ class PreparedCycles:
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the readings that are matched."""
-        kept = {}
-        for name, one in self.test.specimens.items():
-            mask = masks.get(self.part(name), np.ones(len(one.load), dtype=bool))
-            if mask.any():
-                kept[name] = replace(one, strain=one.strain[mask])
+        kept = {name: replace(one, strain=one.strain[mask]) for name, one, mask in self._of(masks)}
         return replace(self.test, specimens=kept).reach
+
+    def _of(self, masks: Masks) -> list[tuple[str, Specimen, NDArray[np.bool_]]]:
+        """Return the specimens that have readings, each with those that count."""
+        every = [
+            (name, one, masks.get(self.part(name), np.ones(len(one.load), dtype=bool)))
+            for name, one in self.test.specimens.items()
+        ]
+        return [row for row in every if row[2].any()]
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,
         models: Mapping[str, UniaxialModel] | None = None,
     ) -> tuple[Comparison, ...]:  # fmt: skip
         """Return a comparison a specimen that has readings."""
-        test, chosen, known = self.test, [], masks or {}
+        test, chosen = self.test, self._of(masks or {})
         models = test.models() if models is None else models
-        for name, one in test.specimens.items():
-            mask = known.get(self.part(name), np.ones(len(one.load), dtype=bool))
-            if mask.any():
-                chosen.append((name, one, mask))
         weight = weighting.weight / max(len(chosen), 1) if weighting.relative else 1.0
         return tuple(
             Comparison(
@@ -335,12 +334,11 @@ class PreparedCycles:
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files."""
-        files = []
-        for one in self.test.specimens.values():
-            h = one.evaluated.history
-            source = FrameSource("machine table", notes=tuple(h.notes))
-            files.append(kinds.DataFile(Path(h.path), source, len(h.load)))
-        return files
+        every = [one.evaluated.history for one in self.test.specimens.values()]
+        return [
+            kinds.DataFile(h.path, FrameSource("machine table", notes=h.notes), len(h.load))
+            for h in every
+        ]
 
 
 class CyclesKind(MeasuredKind):

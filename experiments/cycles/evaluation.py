@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -168,13 +168,12 @@ def _rate(history: LoadHistory, rows: slice) -> float:
 def _stable(values: Sequence[CycleValues]) -> int:
     """Return the number of the first cycle that repeats the one before to the same peak, or 0."""
     for old, new in pairwise(values):
-        changes = {
-            "EA_loading": abs(new.EA_loading / old.EA_loading - 1),
-            "permanent": abs(new.permanent - old.permanent) / new.top if new.top > 0 else math.inf,
-            "loss": abs(new.loss - old.loss) / new.work,
-        }
-        alike = abs(new.peak / old.peak - 1) < SAME
-        if alike and all(changes[name] <= most for name, most in CHANGES.items()):
+        most = {"EA_loading": old.EA_loading, "permanent": new.top, "loss": new.work}
+        changes = [
+            abs(getattr(new, name) - getattr(old, name)) <= CHANGES[name] * of
+            for name, of in most.items()
+        ]
+        if all(changes) and abs(new.peak / old.peak - 1) < SAME:
             return new.cycle.number
     return 0
 
@@ -413,10 +412,11 @@ class Cycles:
     histories: tuple[EvaluatedHistory, ...]
     width: float | None = None
     knots: int = KNOTS
-    notes: list[Note] = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "notes", [note for one in self.histories for note in one.notes])
+    @property
+    def notes(self) -> list[Note]:
+        """Return the doubts of all histories."""
+        return [note for one in self.histories for note in one.notes]
 
     @property
     def table(self) -> pd.DataFrame:

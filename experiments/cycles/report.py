@@ -15,7 +15,7 @@ from ...reports.content import Exhibit, Table
 from ...reports.vega import save
 from ...solvers.base import History
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
-from . import CyclesTest, PreparedCycles, Specimen
+from . import CyclesTest, PreparedCycles
 
 FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
 
@@ -38,16 +38,13 @@ def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _errors(one: Specimen, history: History) -> dict[str, float]:
-    off = history.load - one.load
-    return {
-        f"cycle {k}": float(np.sqrt(np.mean(off[one.cycle == k] ** 2)))
-        for k in np.unique(one.cycle)
-    }
-
-
 def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, dict[str, float]]:
-    return {name: _errors(test.specimens[name], history) for name, history in histories.items()}
+    every = [(name, test.specimens[name], history.load) for name, history in histories.items()]
+    return {
+        name: {f"cycle {k}": float(np.sqrt(np.mean((load - one.load)[one.cycle == k] ** 2)))
+               for k in np.unique(one.cycle)}
+        for name, one, load in every
+    }  # fmt: skip
 
 
 def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:

@@ -177,7 +177,8 @@ def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
 def forgets(law: HypoelasticLaw, what: str) -> None:
     """Raise SolverFailure for a law with a memory, which `what` does not take."""
     if law.memory is not None:
-        raise SolverFailure(f"{what} takes no law with a memory: use the card without it")
+        lost = "unloading, permanent set and hysteresis are lost"
+        raise SolverFailure(f"{what} takes no law with a memory ({lost}): use the card without it")
 
 
 def initial_stiffness(law: HypoelasticLaw) -> Array:

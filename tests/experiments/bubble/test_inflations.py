@@ -1,6 +1,5 @@
 """A sheet that is inflated, released and inflated again: its frames, its check and its fit."""
 
-import json
 from dataclasses import replace
 
 import bubblefit as bf
@@ -135,8 +134,7 @@ def test_check_shows_how_far_the_sheet_is_conditioned(folder, history, tmp_path)
     assert higher[0] > 1.0 and abs(higher[2]) < 0.01
     assert f"{table['apex_mm'][0]:.4g} mm" in lines[0]
     assert (tmp_path / "inflations.png").is_file()
-    said = json.dumps(found.result["choices"])
-    assert "inflation 1 of 2" in said
+    assert any("inflation 1 of 2" in line for line in found.lines())
 
 
 def test_a_law_that_remembers_is_found_back_from_all_frames(folder):
