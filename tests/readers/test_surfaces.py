@@ -128,6 +128,8 @@ def test_surface_files_come_back(tmp_path, surfaces):
         ("0.022,y", "0.023,y", "line 3, column 'pressure_MPa': expected the same number"),
         ("C24", "C25", "column 'C24': this column is missing"),
         ("C0,C1", "C0,C0", "column 'C0': this column appears twice"),
+        ("0.022,x", "nan,x", "line 2, column 'pressure_MPa':"), ("0.022,x", "-1,x", "pressure"),
+        (",4,", ",,", "line 2, column 'degree':"), (",4,", ",2.5,", "degree"),
     ],
 )  # fmt: skip
 def test_a_damaged_surface_file_is_refused(tmp_path, surfaces, old, new, words):
@@ -138,22 +140,6 @@ def test_a_damaged_surface_file_is_refused(tmp_path, surfaces, old, new, words):
     path.write_text(text.replace(old, new, 1))
     message = complaint(read_surfaces, path)
     assert "surfaces.csv" in message and words in message
-
-
-@settings(deadline=None)
-@given(column=st.integers(0, 29), cell=st.sampled_from(["", "nan", "w", "-1", "1e30", "2.5"]))
-def test_any_bad_cell_in_a_surface_file_is_refused_or_a_number(tmp_path_factory, column, cell):
-    path = tmp_path_factory.getbasetemp() / "bad-surfaces.csv"
-    points = on_a_disk(60, 2)
-    write_surfaces([fit_surface(DisplacementField(0.1, points, np.ones((60, 3))), 4)], path)
-    lines = [line.split(",") for line in path.read_text().splitlines()]
-    lines[2][column] = cell
-    path.write_text("\n".join(map(",".join, lines)))
-    # R^2 and the coefficients may be any number; what the three rows share may not change.
-    if cell not in ("", "nan", "w") and column not in (0, 1, 3, 4):
-        read_surfaces(path)
-    else:
-        assert "bad-surfaces.csv" in complaint(read_surfaces, path)
 
 
 CENTRE = np.array([12.0, -7.0, 610.0])
