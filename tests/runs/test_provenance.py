@@ -117,6 +117,7 @@ def refused(first, setup):
     [
         ("nu12 = 0.24", "nu12 = 0.25", "law.nu12 = 0.24, now 0.25"),
         ("thickness = 0.8", "thickness = 0.9", "fabric.thickness = 0.8, now 0.9"),
+        ('modulus = "MPa"', 'modulus = "GPa"', 'units.modulus = "MPa", now "GPa"'),
         ("fill = [0.03, 0.06]", "fill = [0.03, 0.07]", "law.breaks.fill[1] = 0.06, now 0.07"),
         ("elements = 48", "elements = 108", "first.elements = 48, now 108"),
         ("radius = 100", "symmetry = 'quarter'\nradius = 100",
