@@ -215,7 +215,7 @@ def test_what_counts_as_the_same_objective(together, off, fails):
         with pytest.raises(SolverFailure, match="start 0 ended with an objective of"):
             best_fit(problem, [replace(other, number=0)], 0.0)
     else:
-        assert best_fit(problem, [other], 0.0).objective == first.objective
+        assert best_fit(problem, [other], 0.0).ranked[0].objective == first.objective
 
 
 def test_noise_is_what_a_perfect_law_leaves(together):
