@@ -121,7 +121,7 @@ CASES = (
     (UNMATCHED, made.notes_of_fit, "two: no fill strip of two is matched: E2 rests"),
     (LEFT_OUT, made.notes_of_fit, "one, warp: 2 points beyond the final length"),
     (DOUBTFUL, made.notes_of_fit, r"one: warp, a: the load is 60 N \(7% of the largest\)"),
-    (READING, made.notes_of_fit, r"one\.csv: the elongation is column 'elongation \(mm\)', not"),
+    (READING, made.notes_of_fit, r"the elongation is column 'elongation \(mm\)', not"),
     (LOST, made.notes_of_gauge, r"correlation lost in 1 of 12 frames \(2\)"),
     (ORDER, made.notes_of_gauge, r"frames in the order given: f10\.csv before f2\.csv"),
     (NO_LOAD, made.notes_of_gauge, r"have a length and no load; they are left out: f8\.csv"),

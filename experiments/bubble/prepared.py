@@ -1,5 +1,7 @@
 """A bubble test with its data, measured or computed, and the comparisons of a fit with it."""
 
+from __future__ import annotations
+
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -259,6 +259,8 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
         by_direction[None] = data.files
     else:
         by_direction |= {d: getattr(data.files, d) or [] for d in DIRECTIONS}
+    for direction, names in by_direction.items():
+        by_direction[direction] = [file for name in names for file in _matches(folder, name)]
     listed: list[ListedFile] = []
     for direction, names in by_direction.items():
         key = "data.files" if direction is None else f"data.files.{direction}"
@@ -271,6 +273,13 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
         raise place.error("data.files", problem)
     return listed
+
+
+def _matches(folder: Path, name: str) -> list[str]:
+    """Return the files that a pattern such as "warp*.csv" matches; else the name itself."""
+    if not name or Path(name).is_absolute() or is_file(folder / name):
+        return [name]
+    return sorted(str(path.relative_to(folder)) for path in folder.glob(name)) or [name]
 
 
 def measured_curves(

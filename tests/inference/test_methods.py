@@ -323,7 +323,10 @@ def test_sigma_is_the_scatter_of_refits_of_a_wrong_law(wrong):
     second = second_of(fit, best, noise)
     assert second.directions == second.analyses == 3
     assert definite(Linear.of(fit, best, noise), second)
-    first, whole = (posteriors_of(fit, best, noise, None, s)[0].sigma for s in (None, second))
+    first, whole = (
+        np.sqrt(np.diag(posteriors_of(fit, best, noise, None, s)[0].covariance))
+        for s in (None, second)
+    )
     found = []
     for number in range(REFITS):
         own = noisy(number)

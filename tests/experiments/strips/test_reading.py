@@ -123,6 +123,13 @@ def test_the_published_polynomials_in_mm(example):
     assert p.reach.strain == pytest.approx((0.153, 0.232, 0.883), abs=5e-4)
 
 
+def test_a_pattern_is_the_files_that_it_matches(small):
+    listed, matched = small(), small(('"w1.csv", "w2.csv"', '"w*.csv"'))
+    for one, other in zip(listed.strips["warp"].curves, matched.strips["warp"].curves, strict=True):
+        assert one.path == other.path and (one.load == other.load).all()
+    complaint_with(["strips[0].data.files.warp[0]", "no file"], small, ('"w1.csv", ', '"v*.csv", '))
+
+
 def test_units_of_the_file_do_not_matter(example):
     metres = example(
         ("width = 25.0", "width = 25.0e-3"),
