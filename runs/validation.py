@@ -381,15 +381,8 @@ def validate(
             others = [name for name in names if name != test.test.name]
             words, place = f"{form}: without {test.test.name}", f"{plain(form)}-without-{k + 1}"
             found = fitted(own, others, words, place)
-            judged.append(
-                Judged(
-                    form,
-                    *(
-                        held_out(test, one.card.law, one.setup.make_solver)
-                        for one in (found, together)
-                    ),
-                )
-            )
+            both = [held_out(test, f.card.law, f.setup.make_solver) for f in (found, together)]
+            judged.append(Judged(form, *both))
     return finished(Validation(project, tuple(judged), leave), out)
 
 

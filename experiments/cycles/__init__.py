@@ -182,14 +182,13 @@ class CyclesTest:
         """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
         thick = self.place.fabric.thickness if thickness is None else thickness
         quads = refined_quads("bias", COARSER * (factor if what == "elements" else 1.0))
+        lengths = self.gauge, 2 * self.gauge, thick, self.width
         models = {}
         for name, one in self.specimens.items():
             if one.direction == "bias":
-                lengths = self.gauge, 2 * self.gauge, thick, self.width
                 model = bias_strip(*lengths, self.grip_distance, increments=1, **quads)
             else:
                 yarn: Literal["warp", "fill"] = "warp" if one.direction == "warp" else "fill"
-                lengths = self.gauge, 2 * self.gauge, thick, self.width
                 model = straight_strip(yarn, *lengths, increments=1, across=1, along=1)
             path = (self.gauge * one.strain).tolist()
             models[name] = replace(model, elongations=path, unloaded=True)
@@ -309,12 +308,10 @@ class PreparedCycles:
         return [row for row in every if row[2].any()]
 
     def comparisons(
-        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,
-        models: Mapping[str, UniaxialModel] | None = None,
-    ) -> tuple[Comparison, ...]:  # fmt: skip
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+    ) -> tuple[Comparison, ...]:
         """Return a comparison a specimen that has readings."""
-        test, chosen = self.test, self._of(masks or {})
-        models = test.models() if models is None else models
+        test, models, chosen = self.test, self.test.models(), self._of(masks or {})
         weight = weighting.weight / max(len(chosen), 1) if weighting.relative else 1.0
         return tuple(
             Comparison(
@@ -330,7 +327,8 @@ class PreparedCycles:
     ) -> tuple[Comparison, ...]:
         """Return the comparisons on other quads of the bias strips."""
         models = self.test.models(what="elements", factor=factor)
-        return self.comparisons(make_solver, weighting, models=models)
+        own = zip(self.comparisons(make_solver, weighting), models.values(), strict=True)
+        return tuple(replace(comparison, model=model) for comparison, model in own)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files."""

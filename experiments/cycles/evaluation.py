@@ -9,7 +9,7 @@ between 40 and 90 % of the cycle's peak.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -178,19 +178,18 @@ def _stable(values: Sequence[CycleValues]) -> int:
     return 0
 
 
-def _doubts(history: LoadHistory, values: Sequence[CycleValues], stable: int) -> list[Note]:
-    name, found = history.path.name, [Note(READING, words) for words in history.notes]
+def _doubts(
+    history: LoadHistory, values: Sequence[CycleValues], stable: int
+) -> Iterator[tuple[NoteKind, str]]:
     for v in values:
         k = f"cycle {v.cycle.number}"
         if v.loss < 0:
-            words = f"{k} is a negative loop ({v.loss:.3g} J/m): the extensometer slipped"
-            found.append(Note(SLIP, words, name))
+            yield SLIP, f"{k} is a negative loop ({v.loss:.3g} J/m): the extensometer slipped"
         elif v.crossing < -0.5 * LOST:
-            words = (
+            yield SLIP, (
                 f"the branches of {k} cross: {-v.crossing:.2g} less strain on unloading than on "
                 "loading at the same load; the extensometer slipped"
             )
-            found.append(Note(SLIP, words, name))
     for old, new in pairwise(values):
         lost = old.top - new.top
         if abs(new.peak / old.peak - 1) < SAME and lost > LOST:
@@ -198,34 +197,28 @@ def _doubts(history: LoadHistory, values: Sequence[CycleValues], stable: int) ->
             if history.travel is not None:
                 way = float(history.travel[new.cycle.peak] - history.travel[old.cycle.peak])
                 moved = f", the machine's travel {way:+.2g} mm more"
-            words = (
+            yield SLIP, (
                 f"at the peak of cycle {new.cycle.number} {lost:.2g} less strain than in cycle "
                 f"{old.cycle.number} at the same load{moved}: slip of the extensometer is suspected"
             )
-            found.append(Note(SLIP, words, name))
-    moved = np.abs(history.load - history.load[0]) > STILL[0] * np.ptp(history.load)
+    still = np.abs(history.load - history.load[0]) <= STILL[0] * np.ptp(history.load)
     if history.travel is not None:
-        moved |= np.abs(history.travel - history.travel[0]) > STILL[1] * np.ptp(history.travel)
-    first = int(np.argmax(moved))
+        still &= np.abs(history.travel - history.travel[0]) <= STILL[1] * np.ptp(history.travel)
+    first = int(np.argmin(still))
     if history.time is not None and first > 5 and history.time[first] > history.time[0]:
         # Before the first loading the load stands still, and so should the strain.
-        rest = slice(0, first)
-        slope = np.polyfit(history.time[rest], history.strain[rest], 1)[0]
+        slope = np.polyfit(history.time[:first], history.strain[:first], 1)[0]
         whole = abs(float(slope) * np.ptp(history.time))
         kept = np.nanmax([abs(v.permanent) for v in values])
         if whole > MOST_DRIFT * kept:
-            words = (
+            yield DRIFT, (
                 f"the strain moves by {slope:.2g} a second before the load does, {whole:.2g} over "
                 f"the test beside a permanent strain of {kept:.2g}: the extensometer drifts"
             )
-            found.append(Note(DRIFT, words, name))
     if history.measured == "grips":
-        words = "strains are travel of the machine: permanent strain holds the slip in the grips"
-        found.append(Note(GRIPS, words, name))
+        yield GRIPS, "strains are travel of the machine: permanent strain holds the slip in the grips"
     if not stable and len(values) > 1:
-        words = "no cycle repeats the one before to the same peak: the state is not conditioned"
-        found.append(Note(CHANGING, words, name))
-    return found
+        yield CHANGING, "no cycle repeats the one before to the same peak: the state is not conditioned"
 
 
 def evaluate_history(history: LoadHistory, reference: float | None = None) -> EvaluatedHistory:
@@ -238,8 +231,11 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
     zero = passage(history.load[up], history.strain[up], level)[1]
     values = [evaluate_cycle(history, c, level, zero) for c in found]
     stable = _stable(values)
-    holds, doubts = tuple(find_holds(history, found)), tuple(_doubts(history, values, stable))
-    return EvaluatedHistory(history, level, zero, tuple(values), holds, stable, doubts)
+    notes = [Note(READING, words) for words in history.notes]
+    doubts = _doubts(history, values, stable)
+    notes += [Note(kind, words, history.path.name) for kind, words in doubts]
+    holds = tuple(find_holds(history, found))
+    return EvaluatedHistory(history, level, zero, tuple(values), holds, stable, tuple(notes))
 
 
 #: Knots of the tangent of a loading curve; its bounds, of the mean stiffness; largest U and R; of

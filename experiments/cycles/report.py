@@ -12,7 +12,7 @@ from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
-from ...reports.vega import save
+from ...reports.vega import saved
 from ...solvers.base import History
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from . import CyclesTest, PreparedCycles
@@ -21,9 +21,7 @@ FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled
 
 
 def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, History]:
-    pairs = zip(fitted.comparisons, fitted.histories, strict=True)
-    known = {comparison.name: history for comparison, history in pairs}
-    return {name: known[prepared.part(name)] for name in prepared.test.specimens}
+    return dict(zip(prepared.test.specimens, fitted.histories, strict=True))
 
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
@@ -70,14 +68,14 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write cycles.csv and the figure."""
-    charts = _drawn(prepared.test, {"model": _by_specimen(prepared, fitted)}, out)
+    charts = _drawn(prepared.test, {"model": _by_specimen(prepared, fitted)})
     rows: list[list[object]] = [
         [name, cycle, error] for name, own in found.numbers["rms_N"].items()
         for cycle, error in own.items()
     ]  # fmt: skip
     table = Table("Misfit of the load cycles", ["specimen", "", "RMS error, N"], rows, text=(1,))
     loads = out.write(TABLE, residuals(prepared, fitted), "loads, measured and modelled")
-    files = [loads, (out.name(FIGURE), CAPTION)]
+    files = [loads, saved(out, FIGURE, charts, CAPTION)]
     return Exhibit(tables=[table], files=files, parts=[charts])
 
 
@@ -91,20 +89,19 @@ def simulate(
     good: dict[str, dict[str, History]] = {}
     for card in cards:
         ended = {name: runs[card, name].outcome for name in test.specimens}
-        own = {name: one for name, one in ended.items() if isinstance(one, History)}
-        good[card] = own
-        numbers[card] = {"rms_N": _numbers(test, own)}
+        good[card] = {name: one for name, one in ended.items() if isinstance(one, History)}
+        numbers[card] = {"rms_N": _numbers(test, good[card])}
         lines += [f"{card}: {words}" for words in _lines(numbers[card]["rms_N"])]
         for name, one in ended.items():
             if isinstance(one, SolverFailure):
                 numbers[card].setdefault("failed", {})[name] = one.reason
                 lines.append(f"{card}: {name}: failed: {one.reason}")
-    _drawn(test, good, out)
-    return Simulation({"cards": numbers}, lines, [(out.name(FIGURE), CAPTION)])
+    figure = saved(out, FIGURE, _drawn(test, good), CAPTION)
+    return Simulation({"cards": numbers}, lines, [figure])
 
 
-def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]], out: Output) -> Charts:
-    """Draw load over strain, a chart a specimen."""
+def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:
+    """Return load over strain, a chart a specimen."""
     charts = []
     for name, one in test.specimens.items():
         series = [dots("measured", 100 * one.strain, one.load, colour=7)]
@@ -113,6 +110,4 @@ def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]], out: O
                 series.append(line(label, 100 * one.strain, own[name].load, colour=1 + rank))
         what = "strain from the reference load, %"
         charts.append(Chart(name, what, "load from the reference load, N", series, name))
-    drawn = Charts(f"{test.name} cycles", charts, CAPTION, columns=1)
-    save(out.path(FIGURE), drawn)
-    return drawn
+    return Charts(f"{test.name} cycles", charts, CAPTION, columns=1)

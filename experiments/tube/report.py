@@ -10,7 +10,7 @@ from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
-from ...reports.vega import save
+from ...reports.vega import saved
 from ...solvers.base import History
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
 from . import PART, PERCENT, PreparedTube, TubeObjective, TubeTest
@@ -41,13 +41,11 @@ def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedTube, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write strains.csv and the figure."""
-    charts = _drawn(prepared.test, {"model": fitted.histories[0]}, out)
+    charts = _drawn(prepared.test, {"model": fitted.histories[0]})
     rows: list[list[object]] = [[*row] for row in found.numbers["rms_percent"].items()]
-    what = "strains, measured and modelled"
-    files = [
-        out.write("strains.csv", residuals(prepared, fitted), what),
-        (out.name(FIGURE), CAPTION),
-    ]
+    strains = residuals(prepared, fitted)
+    table = out.write("strains.csv", strains, "strains, measured and modelled")
+    files = [table, saved(out, FIGURE, charts, CAPTION)]
     tables = [Table("Misfit of the tube", ["strain", "RMS error, %"], rows)]
     return Exhibit(tables=tables, files=files, parts=[charts])
 
@@ -65,9 +63,8 @@ def simulate(
         if isinstance(failure, SolverFailure):
             numbers[name] = {"failed": failure.reason}
             lines.append(f"{name}: failed: {failure.reason}")
-    if good:
-        _drawn(test, good, out)
-    return Simulation({"cards": numbers}, lines, [(out.name(FIGURE), CAPTION)] if good else [])
+    figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
+    return Simulation({"cards": numbers}, lines, figures)
 
 
 def _errors(test: TubeTest, history: History) -> dict[str, float]:
@@ -79,8 +76,8 @@ def _words(errors: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {error:.3g}" for name, error in errors.items())
 
 
-def _drawn(test: TubeTest, curves: Mapping[str, History], out: Output) -> Charts:
-    """Draw measured and modelled strains row by row, a chart a strain."""
+def _drawn(test: TubeTest, curves: Mapping[str, History]) -> Charts:
+    """Return measured and modelled strains row by row, a chart a strain."""
     charts, rows, own = [], np.arange(1, 1 + len(test.loads)), TubeObjective(test, 1.0)
     for k, column in enumerate(own.read):
         series = [dots("measured", rows, PERCENT * own.measured[:, k], colour=7)]
@@ -88,6 +85,4 @@ def _drawn(test: TubeTest, curves: Mapping[str, History], out: Output) -> Charts
             series.append(line(name, rows, PERCENT * own.modelled(history)[:, k], colour=1 + rank))
         what = f"strain {NAMES[column]}, %"
         charts.append(Chart(NAMES[column], "row of the file", what, series, f"{test.name}: {what}"))
-    drawn = Charts(f"{test.name} strains", charts, CAPTION, columns=1)
-    save(out.path(FIGURE), drawn)
-    return drawn
+    return Charts(f"{test.name} strains", charts, CAPTION, columns=1)

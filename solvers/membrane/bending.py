@@ -231,7 +231,8 @@ def analyse_inflated(
         raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
     levels = np.array(model.pressures)
     volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
-    sides, filling = outside_caps(model), Filling(membrane)
+    sides, filling = np.ones(len(model.mesh.quads), dtype=bool), Filling(membrane)
+    sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     record = Record(membrane, len(levels))
     membrane.keep_tangent = False
     for i, u in enumerate(march(filling, levels, asked)):
@@ -266,12 +267,6 @@ def analyse_inflated(
             wrinkled=wrinkled, remarks=remarks, relaxed=membrane.wrinkle_stiffness is not None,
         )  # fmt: skip
     return history, np.zeros((*history.displacement.shape, 0))
-
-
-def outside_caps(model: InflatedModel) -> NDArray[np.bool_]:
-    sides = np.ones(len(model.mesh.quads), dtype=bool)
-    sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
-    return sides
 
 
 class Filling(Loading):

@@ -435,9 +435,14 @@ class Derivatives:
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
         self.point = np.empty((len(membrane.quads), 4, POINT + more))
         self.rate = np.empty((membrane.reference.size, len(names)))
-        self.sheet: Sheet | None = None
+        self.columns: list[int] = []
         if sheet and stress_free is not None:
-            self.sheet = Sheet(membrane, stress_free, sheet, [names.index(n) for n in sheet], yarn)
+            self.columns = [names.index(name) for name in sheet]
+            surface, ways, turns = (np.stack(own) for own in zip(*sheet.values(), strict=True))
+            self.surface = np.ascontiguousarray(np.moveaxis(surface, 0, -1))
+            self.slopes, self.area = element_slopes(stress_free, membrane.quads, ways, yarn, turns)
+            self.green = np.empty((*shape[:3], len(sheet)))
+            self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
@@ -447,8 +452,13 @@ class Derivatives:
             law.coupling, law.area_power, m.strain_old, m.stress_old, self.rows, self.by_coupling,
             self.push, self.strain, self.stress, self.fresh, self.point, self.rate,
         )  # fmt: skip
-        if self.sheet is not None:
-            self.rate[:, self.sheet.columns] += self.sheet.at_fixed_displacement(u, pressure)
+        if self.columns:
+            by_sheet(
+                m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure,
+                law.pieces, law.coupling, law.area_power, m.strain_old, m.stress_old, self.surface,
+                self.slopes, self.area, self.green, self.sheet_rate,
+            )  # fmt: skip
+            self.rate[:, self.columns] += self.sheet_rate
         return self.rate
 
     def advance(self, du: Array) -> None:
@@ -456,13 +466,17 @@ class Derivatives:
         m = self.membrane
         self.stress, self.fresh = self.fresh, self.stress
         advance(m.quads, m.elements.slopes, self.point, du, self.strain, self.stress)
-        if self.sheet is not None:
-            strain, stress = self.sheet.at_points(self.point)
-            self.strain[..., :3, self.sheet.columns] += strain
+        if self.columns:
+            to_strain, to_stress = (
+                self.point[..., first : first + 9].reshape(*self.point.shape[:2], 3, 3)
+                for first in (6, 15)
+            )
+            strain = to_strain @ self.green
+            self.strain[..., :3, self.columns] += strain
             for first in range(3, self.strain.shape[2], 3):
                 own = self.point[..., POINT + first - 3 : POINT + first, None]
-                self.strain[..., first : first + 3, self.sheet.columns] += own * strain
-            self.stress[..., self.sheet.columns] += stress
+                self.strain[..., first : first + 3, self.columns] += own * strain
+            self.stress[..., self.columns] += to_stress @ strain
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:
         """Return d u / d parameters (3 n, np) at the equilibrium u, before it is accepted."""
@@ -472,34 +486,3 @@ class Derivatives:
         du[m.free] = -m.tangent.solve(rate[m.free])
         self.advance(du)
         return du
-
-
-class Sheet:
-    """Part of the stress-free sheet's parameters at fixed displacement; columns : among all."""
-
-    def __init__(
-        self, membrane: Membrane, stress_free: Array, slopes: SheetSlopes, columns: Sequence[int],
-        yarn: Array,
-    ) -> None:  # fmt: skip
-        self.membrane, self.columns = membrane, list(columns)
-        surface, ways, turns = (np.stack(own) for own in zip(*slopes.values(), strict=True))
-        self.surface = np.ascontiguousarray(np.moveaxis(surface, 0, -1))
-        self.slopes, self.area = element_slopes(stress_free, membrane.quads, ways, yarn, turns)
-        self.green = np.empty((len(membrane.quads), 4, 3, len(columns)))
-        self.rate = np.empty((membrane.reference.size, len(columns)))
-
-    def at_fixed_displacement(self, u: Array, pressure: float) -> Array:
-        m, e, law = self.membrane, self.membrane.elements, self.membrane.law
-        by_sheet(
-            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure, law.pieces,
-            law.coupling, law.area_power, m.strain_old, m.stress_old, self.surface, self.slopes,
-            self.area, self.green, self.rate,
-        )  # fmt: skip
-        return self.rate
-
-    def at_points(self, point: Array) -> tuple[Array, Array]:
-        """Return those of strain and stress (elements, 4, 3, columns); point : from `explicit`."""
-        to_strain = point[..., 6:15].reshape(*point.shape[:2], 3, 3)
-        to_stress = point[..., 15:POINT].reshape(*point.shape[:2], 3, 3)
-        strain = to_strain @ self.green
-        return strain, to_stress @ strain
