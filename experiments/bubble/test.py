@@ -208,7 +208,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     points = section.data.points
     may_fall = points is not None and points.pressure is None
     for i, (before, after) in enumerate(pairwise(given or ()), start=1):
-        if after == before or (after < before and not may_fall):
+        if after == before or (after < before and (i == 1 or not may_fall)):
             problem = f"pressures must increase, got {after:g} after {before:g}"
             raise place.error(f"pressures[{i}]", problem)
     asked = None if given is None else tuple(p * scale for p in given)

@@ -186,9 +186,12 @@ def _doubts(
         if v.loss < 0:
             yield SLIP, f"{k} is a negative loop ({v.loss:.3g} J/m): the extensometer slipped"
         elif v.crossing < -0.5 * LOST:
-            yield SLIP, (
-                f"the branches of {k} cross: {-v.crossing:.2g} less strain on unloading than on "
-                "loading at the same load; the extensometer slipped"
+            yield (
+                SLIP,
+                (
+                    f"the branches of {k} cross: {-v.crossing:.2g} less strain on unloading than on "
+                    "loading at the same load; the extensometer slipped"
+                ),
             )
     for old, new in pairwise(values):
         lost = old.top - new.top
@@ -197,9 +200,12 @@ def _doubts(
             if history.travel is not None:
                 way = float(history.travel[new.cycle.peak] - history.travel[old.cycle.peak])
                 moved = f", the machine's travel {way:+.2g} mm more"
-            yield SLIP, (
-                f"at the peak of cycle {new.cycle.number} {lost:.2g} less strain than in cycle "
-                f"{old.cycle.number} at the same load{moved}: slip of the extensometer is suspected"
+            yield (
+                SLIP,
+                (
+                    f"at the peak of cycle {new.cycle.number} {lost:.2g} less strain than in cycle "
+                    f"{old.cycle.number} at the same load{moved}: slip of the extensometer is suspected"
+                ),
             )
     still = np.abs(history.load - history.load[0]) <= STILL[0] * np.ptp(history.load)
     if history.travel is not None:
@@ -211,14 +217,23 @@ def _doubts(
         whole = abs(float(slope) * np.ptp(history.time))
         kept = np.nanmax([abs(v.permanent) for v in values])
         if whole > MOST_DRIFT * kept:
-            yield DRIFT, (
-                f"the strain moves by {slope:.2g} a second before the load does, {whole:.2g} over "
-                f"the test beside a permanent strain of {kept:.2g}: the extensometer drifts"
+            yield (
+                DRIFT,
+                (
+                    f"the strain moves by {slope:.2g} a second before the load does, {whole:.2g} over "
+                    f"the test beside a permanent strain of {kept:.2g}: the extensometer drifts"
+                ),
             )
     if history.measured == "grips":
-        yield GRIPS, "strains are travel of the machine: permanent strain holds the slip in the grips"
+        yield (
+            GRIPS,
+            "strains are travel of the machine: permanent strain holds the slip in the grips",
+        )
     if not stable and len(values) > 1:
-        yield CHANGING, "no cycle repeats the one before to the same peak: the state is not conditioned"
+        yield (
+            CHANGING,
+            "no cycle repeats the one before to the same peak: the state is not conditioned",
+        )
 
 
 def evaluate_history(history: LoadHistory, reference: float | None = None) -> EvaluatedHistory:
