@@ -186,27 +186,19 @@ def _doubts(
         if v.loss < 0:
             yield SLIP, f"{k} is a negative loop ({v.loss:.3g} J/m): the extensometer slipped"
         elif v.crossing < -0.5 * LOST:
-            yield (
-                SLIP,
-                (
-                    f"the branches of {k} cross: {-v.crossing:.2g} less strain on unloading than on "
-                    "loading at the same load; the extensometer slipped"
-                ),
+            words = (
+                f"the branches of {k} cross: {-v.crossing:.2g} less strain on unloading than on "
             )
+            yield SLIP, words + "loading at the same load; the extensometer slipped"
     for old, new in pairwise(values):
         lost = old.top - new.top
         if abs(new.peak / old.peak - 1) < SAME and lost > LOST:
-            moved = ""
+            words = f"at the peak of cycle {new.cycle.number} {lost:.2g} less strain than in cycle "
+            words += f"{old.cycle.number} at the same load"
             if history.travel is not None:
                 way = float(history.travel[new.cycle.peak] - history.travel[old.cycle.peak])
-                moved = f", the machine's travel {way:+.2g} mm more"
-            yield (
-                SLIP,
-                (
-                    f"at the peak of cycle {new.cycle.number} {lost:.2g} less strain than in cycle "
-                    f"{old.cycle.number} at the same load{moved}: slip of the extensometer is suspected"
-                ),
-            )
+                words += f", the machine's travel {way:+.2g} mm more"
+            yield SLIP, f"{words}: slip of the extensometer is suspected"
     still = np.abs(history.load - history.load[0]) <= STILL[0] * np.ptp(history.load)
     if history.travel is not None:
         still &= np.abs(history.travel - history.travel[0]) <= STILL[1] * np.ptp(history.travel)
@@ -217,23 +209,15 @@ def _doubts(
         whole = abs(float(slope) * np.ptp(history.time))
         kept = np.nanmax([abs(v.permanent) for v in values])
         if whole > MOST_DRIFT * kept:
-            yield (
-                DRIFT,
-                (
-                    f"the strain moves by {slope:.2g} a second before the load does, {whole:.2g} over "
-                    f"the test beside a permanent strain of {kept:.2g}: the extensometer drifts"
-                ),
-            )
+            words = f"the strain moves by {slope:.2g} a second before the load does, {whole:.2g} "
+            words += f"over the test beside a permanent strain of {kept:.2g}"
+            yield DRIFT, f"{words}: the extensometer drifts"
     if history.measured == "grips":
-        yield (
-            GRIPS,
-            "strains are travel of the machine: permanent strain holds the slip in the grips",
-        )
+        words = "strains are travel of the machine: permanent strain holds the slip in the grips"
+        yield GRIPS, words
     if not stable and len(values) > 1:
-        yield (
-            CHANGING,
-            "no cycle repeats the one before to the same peak: the state is not conditioned",
-        )
+        words = "no cycle repeats the one before to the same peak: the state is not conditioned"
+        yield CHANGING, words
 
 
 def evaluate_history(history: LoadHistory, reference: float | None = None) -> EvaluatedHistory:
