@@ -312,7 +312,9 @@ COMPANIONS = {
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
     "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},
     "bubble.pressures": {"data": {"points": {"files": ["a"]}}},
-    "bubble.inflation": {"pressures": [10.0, 30.0, 50.0] * 2, "data": {"points": {"files": [*"abcdef"]}}},
+    "bubble.inflation": {
+        "pressures": [10.0, 30.0, 50.0] * 2, "data": {"points": {"files": [*"abcdef"]}}
+    },
     "bubble.radius": {"radius": 0.2},
     "bubble.increments": {"increments": [30.0]},
     "bubble.sheet.prior": {"sheet": {"modes": 3}},
