@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self, cast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self, cast
 
 import numpy as np
 
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
-from .kinds import Array, FittedTest, MakeSolver, Predicted, PreparedTest, Studied, Weighting
+from .kinds import Array, FittedTest, MakeSolver, Masks, Predicted, PreparedTest, Studied, Weighting
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
@@ -47,23 +47,57 @@ class FittedPart:
         return self.objective.rms(self.history)
 
 
-def fitted_parts(data: Iterable[Any], fitted: FittedTest) -> tuple[FittedPart, ...]:
-    """Return the data of each comparison of a fit, in their order, with what was found."""
-    every = zip(data, fitted.comparisons, fitted.histories, strict=True)
-    return tuple(FittedPart(own, c.model, c.objective, history) for own, c, history in every)
+@dataclass(frozen=True, eq=False)
+class PreparedParts:
+    """A test, read with its data, of which each part (a strip, a ratio) has its comparison.
+    test.matched : the data of the parts by name."""
 
+    test: Any
+    known = None  # what is matched is measured, not computed
 
-class StrainsPrepared:
-    """What prepared tests share that have one strain everywhere: no mesh, and no specimens."""
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        return {}
 
-    known: HypoelasticLaw | None = None
-    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
+    def part(self, name: str) -> str:
+        """Return the name of the comparison of a part."""
+        return f"{self.test.name}: {name}"
+
+    def count(self, data: Any) -> int:
+        """Return the number of values of a part that are matched."""
+        return len(data.load)
+
+    @property
+    def whole(self) -> dict[str, Any]:
+        """Return the masks that leave everything, by comparison."""
+        every = self.test.matched.items()
+        return {self.part(name): np.ones(self.count(own), dtype=bool) for name, own in every}
+
+    def without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
+        """Return masks without each part, by sort and name; nothing where there is one part."""
+        whole, names = self.whole, self.test.matched
+        masks: dict[str, Masks] = {
+            name: {**whole, self.part(name): ~whole[self.part(name)]} for name in names
+        }
+        return {sort: masks} if len(masks) > 1 else {}
+
+    def kept(self, masks: Masks | None) -> dict[str, Any]:
+        """Return the data of the parts in which masks leave anything to match, by name."""
+        known, every = masks or {}, self.test.matched.items()
+        return {name: own for name, own in every if known.get(self.part(name), np.True_).any()}
+
+    def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
+        """Return the data of each part of a fit, with what was found."""
+        every = zip(self.test.matched.values(), fitted.comparisons, fitted.histories, strict=True)
+        return tuple(FittedPart(own, c.model, c.objective, history) for own, c, history in every)
 
     def finer(
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        """Return the same comparisons: there is no mesh to refine."""
-        return cast(tuple[Comparison, ...], self.comparisons(make_solver, weighting))
+        """Return the comparisons with other elements, if any; increments hardly matter."""
+        models = self.test.models(what="elements", factor=factor)
+        own = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
+        return tuple(replace(comparison, model=models[name]) for name, comparison in own)
 
 
 class StrainObjective:

@@ -15,14 +15,12 @@ from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Array, Doubt, Expected, FittedTest, MakeSolver, Masks, Planning, Weighting
+from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Weighting
 from ..measured import (
     PERCENT,
     USUAL_NOISE,
-    FittedPart,
+    PreparedParts,
     StrainObjective,
-    StrainsPrepared,
-    fitted_parts,
 )
 from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
 from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
@@ -69,7 +67,7 @@ class PathObjective(StrainObjective):
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedBiaxial(StrainsPrepared):
+class PreparedBiaxial(PreparedParts):
     """A biaxial test with its data."""
 
     test: BiaxialTest
@@ -78,23 +76,11 @@ class PreparedBiaxial(StrainsPrepared):
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return the ratios as parts, where there are several."""
-        paths = self.test.data.paths
-        whole = {self.part(p.ratio): np.ones(len(p.load), dtype=bool) for p in paths}
-        ratios = {p.ratio: {**whole, self.part(p.ratio): ~whole[self.part(p.ratio)]} for p in paths}
-        return {"ratios": ratios} if len(paths) > 1 else {}
+        return self.without_each("ratios")
 
     def reach(self, masks: Masks) -> kinds.Reach:
         """Return the reach of the ratios that masks leave."""
-        return reach_of(self.kept(masks))
-
-    def kept(self, masks: Masks | None) -> tuple[BiaxialPath, ...]:
-        """Return the ratios that masks leave, which are matched whole."""
-        known, paths = masks or {}, self.test.data.paths
-        return tuple(p for p in paths if known.get(self.part(p.ratio), np.True_).any())
-
-    def part(self, ratio: str) -> str:
-        """Return the name of the comparison of a ratio."""
-        return f"{self.test.name}: {ratio}"
+        return reach_of(self.kept(masks).values())
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
@@ -103,7 +89,7 @@ class PreparedBiaxial(StrainsPrepared):
         test, models = self.test, self.test.models()
         kept, found = self.kept(masks), []
         share = weighting.weight / (2 * max(1, len(kept))) if weighting.relative else 1.0
-        for path in kept:
+        for path in kept.values():
             largest = float(np.abs(path.since).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
@@ -111,10 +97,6 @@ class PreparedBiaxial(StrainsPrepared):
             own = self.part(path.ratio), models[path.ratio], make_solver(), objective
             found.append(Comparison(*own, contracts=True))
         return tuple(found)
-
-    def fitted_paths(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
-        """Return the ratios that a fit matched."""
-        return fitted_parts(self.test.data.paths, fitted)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         used = {id(table): 0 for table in self.test.data.tables}

@@ -16,8 +16,9 @@ from ...reports.strips import ratio_chart
 from ...reports.vega import saved
 from .. import kinds
 from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
+from ..measured import PERCENT, FittedPart
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
-from .prepared import PERCENT, FittedPart, PreparedBiaxial
+from .prepared import PreparedBiaxial
 from .test import BiaxialTest
 
 YARNS = ("warp", "fill")
@@ -99,7 +100,7 @@ def simulate(
 
 def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    paths, numbers = prepared.fitted_paths(fitted), {}
+    paths, numbers = prepared.fitted_parts(fitted), {}
     for p in paths:
         warp, fill = p.rms.tolist()
         numbers[p.data.ratio] = {
@@ -124,7 +125,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
 def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
     """Return charts of strain over load, measured and modelled."""
     panels = []
-    for p in prepared.fitted_paths(fitted):
+    for p in prepared.fitted_parts(fitted):
         curve = ("model", p.data.larger, PERCENT * p.objective.modelled(p.history))
         strain = PERCENT * p.objective.strain
         panels.append(ratio_chart(p.data.ratio, p.data.larger, strain, (curve,)))
@@ -138,7 +139,7 @@ CHARTS = {"loads": fitted_paths}
 
 def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
-    paths = prepared.fitted_paths(fitted)
+    paths = prepared.fitted_parts(fitted)
     parts = []
     for p in paths:
         own = p.objective.strain, p.objective.modelled(p.history)
@@ -183,7 +184,7 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
 def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
     parts = []
-    for p in prepared.fitted_paths(fitted):
+    for p in prepared.fitted_parts(fitted):
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
         columns = {"measured": measured, "modelled": modelled, "difference": modelled - measured}
         for k, yarn in enumerate(YARNS):

@@ -1,6 +1,6 @@
 """A biaxial test, as its section describes it, and its models."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -173,6 +173,11 @@ class BiaxialTest:
         )
 
     @property
+    def matched(self) -> Mapping[str, BiaxialPath]:
+        """Return the paths by ratio."""
+        return {path.ratio: path for path in self.data.paths}
+
+    @property
     def reach(self) -> Reach:
         """Return the largest strains along warp and fill."""
         return reach_of(self.data.paths)
@@ -188,7 +193,7 @@ class BiaxialTest:
         return {"weight": self.weight, "noise": self.noise}
 
 
-def reach_of(paths: Sequence[BiaxialPath]) -> Reach:
+def reach_of(paths: Collection[BiaxialPath]) -> Reach:
     """Return the largest strains along warp and fill; the shear stays unknown."""
     if not paths:
         return Reach()

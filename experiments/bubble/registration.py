@@ -115,11 +115,10 @@ def in_all_quarters(points: NDArray[np.float64]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """A motion of a rigid body: place -> turn @ place + shift, mm, RMS `left` at so many points."""
+    """A motion of a rigid body: place -> turn @ place + shift, mm, by so many points."""
 
     turn: Array
     shift: Array
-    left: float
     points: int
 
     @property
@@ -128,7 +127,7 @@ class RigidMotion:
         return float(np.degrees(np.arccos(np.clip((np.trace(self.turn) - 1) / 2, -1.0, 1.0))))
 
 
-UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), float("nan"), 0)
+UNKNOWN = RigidMotion(np.eye(3), np.zeros(3), 0)
 
 
 def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
@@ -141,9 +140,7 @@ def clamp_motion(frame: Frame, clamp: NDArray[np.bool_]) -> RigidMotion:
     middle_before, middle_after = before.mean(axis=0), after.mean(axis=0)
     u, _, v = np.linalg.svd((after - middle_after).T @ (before - middle_before))
     turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    shift = middle_after - turn @ middle_before
-    rest = after - before @ turn.T - shift
-    return RigidMotion(turn, shift, float(np.sqrt((rest**2).sum(axis=1).mean())), len(before))
+    return RigidMotion(turn, middle_after - turn @ middle_before, len(before))
 
 
 def without(frame: Frame, motion: RigidMotion) -> Frame:
@@ -505,23 +502,11 @@ def _asymmetry(profile: Array) -> Array:
 @dataclass(frozen=True)
 class WarpDirection:
     """The direction of the warp, -90 to 90 degrees from x towards y, and its standard error.
-    clear : as that of `Axes`; None by an elliptic rim. strains : Green-Lagrange at the centre in
-    the highest frame less those of the lowest, warp and fill."""
+    clear : as that of `Axes`; None by an elliptic rim."""
 
     angle: float
     error: float
     clear: float | None
-    strains: tuple[float, float]
-
-
-def _strains(frames: Sequence[Frame], radius: float, angle: float) -> tuple[float, float]:
-    """Return the strains at the centre along an axis at `angle` degrees and across it."""
-    strain = centre_strain(frames[-1], radius)
-    if len(frames) > 1:
-        strain = strain - centre_strain(frames[0], radius)
-    turn = np.radians(angle)
-    first, second = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-    return float(first @ strain @ first), float(second @ strain @ second)
 
 
 def centre_strain(frame: Frame, radius: float) -> Array:
@@ -708,12 +693,13 @@ def _warp(
                 f"{axes.error:.1f} degrees, {axes.clear:.0%} clear); give the angle"
             )
             raise InputError(None, "warp", problem)
-        angle, error, clear = axes.angle, axes.error, axes.clear
-        along, across = _strains(frames, radius, angle)
-        if (along > across) == options.warp_is_stiff:
-            angle, along, across = angle + 90.0, across, along
-        angle = line_angle(angle)
-        return angle, WarpDirection(angle, error, clear, (along, across))
+        strain = centre_strain(frames[-1], radius)
+        if len(frames) > 1:
+            strain = strain - centre_strain(frames[0], radius)
+        along, across = (float(x @ strain @ x) for x in turned(axes.angle).axes[:2, :2])
+        swapped = (along > across) == options.warp_is_stiff
+        angle = line_angle(axes.angle + 90.0 * swapped)
+        return angle, WarpDirection(angle, axes.error, axes.clear)
     if rim is None:
         problem = "expected the warp, too, where the centre of an elliptic rim is given"
         raise InputError(None, "warp", problem)
@@ -724,8 +710,7 @@ def _warp(
         )
         raise InputError(None, "warp", problem)
     angle = line_angle(rim.angle - options.rim_angle)
-    strains = _strains(frames, radius, angle)
-    return angle, WarpDirection(angle, rim.turn_error, None, strains)
+    return angle, WarpDirection(angle, rim.turn_error, None)
 
 
 def register_fields(

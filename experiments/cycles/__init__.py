@@ -36,24 +36,16 @@ from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
-from ..measured import MeasuredKind
+from ..measured import MeasuredKind, PreparedParts
 from ..strips.prepared import LoadObjective
+from ..strips.test import FilesSection
 from .evaluation import EvaluatedHistory, evaluate_history, matched_rows
 
 Array = NDArray[np.float64]
-FileNames = Annotated[list[str], Field(min_length=1)]
 #: mm of a gauge whose length does not matter; edges of the bias strip's quads over the usual ones.
 GAUGE, COARSER = 100.0, 0.4
 #: Of the largest load: noise of one load unless the project says it. Least strain of a reading.
 NOISE, LEAST = 0.005, 1e-6
-
-
-class HistoryFiles(Section):
-    """[cycles.files]: the files of each direction, one specimen each."""
-
-    warp: FileNames | None = None
-    fill: FileNames | None = None
-    bias: FileNames | None = None
 
 
 class HistoryColumns(Section):
@@ -71,7 +63,7 @@ class CyclesSection(Section):
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
-    files: HistoryFiles
+    files: FilesSection
     folder: str = ""
     columns: HistoryColumns = HistoryColumns()
     load_unit: Literal["N", "kN", "lbf"] | None = None
@@ -156,7 +148,7 @@ class CyclesTest:
     width: float
     gauge: float
     grip_distance: float
-    specimens: Mapping[str, Specimen]
+    matched: Mapping[str, Specimen]
     noise: float | None = None
     kind: str = "cycles"
     reads_files: bool = True
@@ -166,7 +158,7 @@ class CyclesTest:
     def reach(self) -> Reach:
         """Return the largest strains; shear of a strip that keeps its area is twice its own."""
         ends: dict[str, float] = {}
-        for one in self.specimens.values():
+        for one in self.matched.values():
             end = float(np.log1p(one.strain.max())) * (2 if one.direction == "bias" else 1)
             ends[one.direction] = max(end, ends.get(one.direction, 0.0))
         return Reach((ends.get("warp"), ends.get("fill"), ends.get("bias")))
@@ -174,7 +166,7 @@ class CyclesTest:
     @property
     def pace(self) -> Pace:
         """Return rate of strain and hold by the files' times."""
-        return pace_of(one.evaluated.history for one in self.specimens.values())
+        return pace_of(one.evaluated.history for one in self.matched.values())
 
     def models(
         self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
@@ -184,7 +176,7 @@ class CyclesTest:
         quads = refined_quads("bias", COARSER * (factor if what == "elements" else 1.0))
         lengths = self.gauge, 2 * self.gauge, thick, self.width
         models = {}
-        for name, one in self.specimens.items():
+        for name, one in self.matched.items():
             if one.direction == "bias":
                 model = bias_strip(*lengths, self.grip_distance, increments=1, **quads)
             else:
@@ -229,7 +221,7 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
             specimens[one.name] = one
     return CyclesTest(
         name=name, place=place, weight=section.weight, width=width, gauge=gauge,
-        grip_distance=grips, specimens=specimens, noise=section.noise,
+        grip_distance=grips, matched=specimens, noise=section.noise,
     )  # fmt: skip
 
 
@@ -262,77 +254,54 @@ class HistoryObjective(LoadObjective):
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedCycles:
+class PreparedCycles(PreparedParts):
     """Load histories with their data."""
 
     test: CyclesTest
     objective_is = "root of the mean square error of each branch's loads over the largest load"
-    known: HypoelasticLaw | None = None
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
         """Return the number of the specimen of each reading, by comparison."""
-        every = enumerate(self.test.specimens.items())
+        every = enumerate(self.test.matched.items())
         return {self.part(name): [k] * len(one.load) for k, (name, one) in every}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each cycle that others can predict, and without each specimen."""
-        every = self.test.specimens.items()
-        whole = {self.part(name): np.ones(len(one.load), dtype=bool) for name, one in every}
         cycles: dict[str, Masks] = {
-            f"cycle {k} of {name}": {**whole, self.part(name): one.cycle != k}
-            for name, one in every for k in one.leaves
+            f"cycle {k} of {name}": {**self.whole, self.part(name): one.cycle != k}
+            for name, one in self.test.matched.items() for k in one.leaves
         }  # fmt: skip
-        specimens: dict[str, Masks] = {
-            name: {**whole, self.part(name): ~whole[self.part(name)]} for name, _ in every
-        }
-        sorts = {"cycles": cycles, "specimens": specimens if len(specimens) > 1 else {}}
-        return {sort: parts for sort, parts in sorts.items() if parts}
-
-    def part(self, name: str) -> str:
-        """Return the name of the comparison of a specimen."""
-        return f"{self.test.name}: {name}"
+        return ({"cycles": cycles} if cycles else {}) | self.without_each("specimens")
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the readings that are matched."""
-        kept = {name: replace(one, strain=one.strain[mask]) for name, one, mask in self._of(masks)}
-        return replace(self.test, specimens=kept).reach
-
-    def _of(self, masks: Masks) -> list[tuple[str, Specimen, NDArray[np.bool_]]]:
-        """Return the specimens that have readings, each with those that count."""
-        every = [
-            (name, one, masks.get(self.part(name), np.ones(len(one.load), dtype=bool)))
-            for name, one in self.test.specimens.items()
-        ]
-        return [row for row in every if row[2].any()]
+        kept = {
+            name: replace(one, strain=one.strain[masks.get(self.part(name), slice(None))])
+            for name, one in self.kept(masks).items()
+        }
+        return replace(self.test, matched=kept).reach
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison a specimen that has readings."""
-        test, models, chosen = self.test, self.test.models(), self._of(masks or {})
+        test, models, chosen = self.test, self.test.models(), self.kept(masks)
+        known = {**self.whole, **(masks or {})}
         weight = weighting.weight / max(len(chosen), 1) if weighting.relative else 1.0
         return tuple(
             Comparison(
                 self.part(name), models[name], make_solver(),
-                HistoryObjective(one, mask, weight, test.noise), contracts=True,
+                HistoryObjective(one, known[self.part(name)], weight, test.noise), contracts=True,
                 must_be_stable=False,
             )
-            for name, one, mask in chosen
+            for name, one in chosen.items()
         )  # fmt: skip
-
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the comparisons on other quads of the bias strips."""
-        models = self.test.models(what="elements", factor=factor)
-        own = zip(self.comparisons(make_solver, weighting), models.values(), strict=True)
-        return tuple(replace(comparison, model=model) for comparison, model in own)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         """Return the files."""
-        every = [one.evaluated.history for one in self.test.specimens.values()]
+        every = [one.evaluated.history for one in self.test.matched.values()]
         return [
             kinds.DataFile(h.path, FrameSource("machine table", notes=h.notes), len(h.load))
             for h in every

@@ -21,14 +21,14 @@ FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled
 
 
 def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, History]:
-    return dict(zip(prepared.test.specimens, fitted.histories, strict=True))
+    return dict(zip(prepared.test.matched, fitted.histories, strict=True))
 
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N from the reference load on."""
     parts = []
     for name, history in _by_specimen(prepared, fitted).items():
-        one = prepared.test.specimens[name]
+        one = prepared.test.matched[name]
         columns = {"part": name, "cycle": one.cycle, "strain": one.strain, "quantity": "load"}
         columns |= {"measured": one.load, "modelled": history.load}
         table = pd.DataFrame(columns)
@@ -37,7 +37,7 @@ def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
 
 
 def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, dict[str, float]]:
-    every = [(name, test.specimens[name], history.load) for name, history in histories.items()]
+    every = [(name, test.matched[name], history.load) for name, history in histories.items()]
     return {
         name: {f"cycle {k}": float(np.sqrt(np.mean((load - one.load)[one.cycle == k] ** 2)))
                for k in np.unique(one.cycle)}
@@ -56,10 +56,10 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     """Return the RMS errors of the best fit, and the doubts about the histories."""
     histories = _by_specimen(prepared, fitted)
     numbers = _numbers(prepared.test, histories)
-    notes = [n for one in prepared.test.specimens.values() for n in one.evaluated.notes]
+    notes = [n for one in prepared.test.matched.values() for n in one.evaluated.notes]
     shares = [
-        100 * np.sqrt(np.mean((h.load - prepared.test.specimens[n].load) ** 2))
-        / prepared.test.specimens[n].load.max()
+        100 * np.sqrt(np.mean((h.load - prepared.test.matched[n].load) ** 2))
+        / prepared.test.matched[n].load.max()
         for n, h in histories.items()
     ]  # fmt: skip
     words = f"RMS error of load {max(shares):.2g} % of the largest"
@@ -88,7 +88,7 @@ def simulate(
     lines: list[str] = []
     good: dict[str, dict[str, History]] = {}
     for card in cards:
-        ended = {name: runs[card, name].outcome for name in test.specimens}
+        ended = {name: runs[card, name].outcome for name in test.matched}
         good[card] = {name: one for name, one in ended.items() if isinstance(one, History)}
         numbers[card] = {"rms_N": _numbers(test, good[card])}
         lines += [f"{card}: {words}" for words in _lines(numbers[card]["rms_N"])]
@@ -103,7 +103,7 @@ def simulate(
 def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:
     """Return load over strain, a chart a specimen."""
     charts = []
-    for name, one in test.specimens.items():
+    for name, one in test.matched.items():
         series = [dots("measured", 100 * one.strain, one.load, colour=7)]
         for rank, (label, own) in enumerate(curves.items()):
             if name in own:

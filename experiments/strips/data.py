@@ -24,37 +24,21 @@ from ...readers.tables import STRAIN_UNITS
 from ..kinds import Array, DataFile, Doubt, Expected
 
 
-@dataclass(frozen=True)
-class OrderScore:
-    """Scores of one order of a load polynomial.
-    R^2 and rmse (N) are best for the highest order offered (thesis section 3.2): each contains the
-    ones below it. left_out : N, RMS error at points, or whole specimens, that the fit did not see.
-    """
-
-    order: int
-    r_squared: float
-    rmse: float
-    left_out: float
-
-
 def compare_orders(
     elongation: ArrayLike, load: ArrayLike, orders: Sequence[int] = range(1, 9),
     through_origin: bool = True, specimens: Sequence[object] | None = None,
-) -> tuple[OrderScore, ...]:  # fmt: skip
-    """Fit each order to the points (n,) mm and (n,) N and return its scores, by rising order.
+) -> list[tuple[int, float, float]]:  # fmt: skip
+    """Return each order and its RMS errors (N): at the points (n,) mm and (n,) N it is fitted to,
+    least for the highest order, and at points left out one by one.
     specimens : (n,) of each point. With it a whole specimen is left out at a time: points of one
     specimen err together, so leaving out one of them flatters."""
     u, f = checked_points(elongation, load)
     names = list(range(len(u))) if specimens is None else list(specimens)
-    if len(names) != len(u):
-        raise InputError(None, "specimens", f"expected {len(u)} names, got {len(names)}")
-    if not len(orders):
-        raise InputError(None, "orders", "expected at least one, got none")
     groups = [
         np.array([i for i, name in enumerate(names) if name == one]) for one in dict.fromkeys(names)
     ]
     scores = []
-    for order in sorted(set(orders)):
+    for order in orders:
         fitted = fit_load_polynomial(u, f, order, through_origin)
         terms, _, _ = terms_of(u, order, through_origin)
         n, k = terms.shape
@@ -70,9 +54,8 @@ def compare_orders(
                 squares = float("inf")  # the others do not settle the coefficients
                 break
             squares += float((np.linalg.solve(without, left[group]) ** 2).sum())
-        error = float(np.sqrt(squares / n))
-        scores.append(OrderScore(order, fitted.r_squared, fitted.rmse, error))
-    return tuple(scores)
+        scores.append((order, fitted.rmse, float(np.sqrt(squares / n))))
+    return scores
 
 
 #: Places that a break may take between zero and the last strain.

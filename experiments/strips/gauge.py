@@ -173,48 +173,29 @@ def _end(point: ArrayLike, name: str) -> Array:
 
 def gauge_load_curve(
     record: GaugeRecord, loads: ArrayLike, *, direction: str, specimen: str,
-    frame_times: ArrayLike | None = None, load_times: ArrayLike | None = None,
+    frame_times: NDArray[Any] | None = None, load_times: Array | None = None,
     path: Path | None = None,
 ) -> LoadCurve:  # fmt: skip
     """Return the machine's load over the gauge's elongation; lost frames are left out.
-    loads : (n,) N, or (k,) at rising load_times, interpolated at frame_times (n,); frames before
-    the first or after the last load are left out, which is logged."""
-    way = direction_named(direction)
-    load, count = np.asarray(loads, dtype=float), len(record.length)
-    if not np.isfinite(load).all():
-        raise InputError(path, "loads", "expected finite numbers; leave out rows without a load")
-    if (frame_times is None) != (load_times is None):
-        raise InputError(path, "times", "expected both frame_times and load_times, or neither")
-    inside = np.ones(count, dtype=bool)
+    loads : N, one a frame, or (k,) at rising load_times, interpolated at frame_times (n,); frames
+    before the first or after the last load are left out, which is logged."""
+    load, kept = np.asarray(loads, dtype=float), np.isfinite(record.elongation)
     if frame_times is not None and load_times is not None:
-        load, inside = _at_times(load, np.asarray(frame_times), np.asarray(load_times), count, path)
-    elif load.shape != (count,):
-        problem = f"expected one load a frame, got {load.size} for {count} frames; pair by time"
-        raise InputError(path, "loads", problem)
-    if len(early := np.flatnonzero(~inside)):
-        problem = "%s: %d of %d frames have no load at their time: %s"
-        log.warning(problem, specimen, len(early), count, ", ".join(map(str, early)))
-    kept = inside & np.isfinite(record.elongation)
+        if len(load) < 2 or (np.diff(load_times) <= 0).any():
+            problem = "expected two or more, each later than the one before"
+            raise InputError(path, "load_times", problem)
+        load = np.interp(frame_times, load_times, load)
+        inside = (frame_times >= load_times[0]) & (frame_times <= load_times[-1])
+        if len(early := np.flatnonzero(~inside)):
+            problem = "%s: %d of %d frames have no load at their time: %s"
+            log.warning(problem, specimen, len(early), len(kept), ", ".join(map(str, early)))
+        kept &= inside
     if kept.sum() < 2:
-        problem = f"only {kept.sum()} of {count} frames have both length and load; expected two"
+        problem = f"only {kept.sum()} of {len(kept)} frames have both length and load; expected two"
         raise InputError(path, f"specimen {specimen!r}", problem)
-    times = None if frame_times is None else np.asarray(frame_times, dtype=float)[kept]
-    frame = np.flatnonzero(kept)
+    times = None if frame_times is None else frame_times[kept]
+    way, frame = direction_named(direction), np.flatnonzero(kept)
     return LoadCurve(way, specimen, record.elongation[kept], load[kept], path, times, frame)
-
-
-def _at_times(
-    load: Array, frame_times: Array, load_times: Array, count: int, path: Path | None
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return loads (n,) at the frames' times, and which of them lie within the record."""
-    pairs = (("frame_times", frame_times, count), ("load_times", load_times, load.size))
-    for name, times, expected in pairs:
-        if times.shape != (expected,) or not np.isfinite(times).all():
-            raise InputError(path, name, f"expected {expected} finite numbers, got {times.size}")
-    if load.size < 2 or (np.diff(load_times) <= 0).any():
-        raise InputError(path, "load_times", "expected two or more, each later than the one before")
-    inside = (frame_times >= load_times[0]) & (frame_times <= load_times[-1])
-    return np.interp(frame_times, load_times, load), inside
 
 
 @dataclass(frozen=True)

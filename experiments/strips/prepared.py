@@ -27,7 +27,6 @@ from ..kinds import (
     DataFile,
     Doubt,
     Expected,
-    FittedTest,
     MakeSolver,
     Masks,
     Planning,
@@ -35,7 +34,7 @@ from ..kinds import (
     Weighting,
     joined,
 )
-from ..measured import FittedPart, fitted_parts
+from ..measured import PreparedParts
 from .data import Strip, doubts_of_strips
 from .test import StripsTest, reach_of
 
@@ -184,11 +183,10 @@ STRAIGHT, BIAS = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedStrips:
+class PreparedStrips(PreparedParts):
     """A test of strips with its data."""
 
     test: StripsTest
-    known = None  # loads are measured, not computed
 
     @property
     def objective_is(self) -> str:
@@ -197,42 +195,26 @@ class PreparedStrips:
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
         """Return number of the specimen of each measured point that is matched, by comparison."""
-        matched = self.test.matched if self.test.match_by == "points" else ()
-        return {self.part(d): self.test.strips[d].specimen_of.tolist() for d in matched}
+        matched = self.test.matched if self.test.match_by == "points" else {}
+        return {self.part(d): strip.specimen_of.tolist() for d, strip in matched.items()}
+
+    def count(self, data: Strip) -> int:
+        by_points = self.test.match_by == "points"
+        return len(data.points[0]) if by_points else self.test.increments
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each part, by sort and name; sorts of one part are left out."""
-        test = self.test
-        points = test.match_by == "points"
-        whole = {
-            self.part(d): np.ones(
-                len(test.strips[d].points[0]) if points else test.increments, dtype=bool
-            )
-            for d in test.matched
-        }
-        sorts: dict[str, dict[str, Masks]] = {
-            "directions": {d: {**whole, self.part(d): ~whole[self.part(d)]} for d in test.matched},
-            "specimens": {
-                f"{d}, {which}": {**whole, self.part(d): mask}
-                for d in test.matched if points
-                for which, mask in _without(test.strips[d]).items()
-            },
+        matched = self.test.matched if self.test.match_by == "points" else {}
+        specimens: dict[str, Masks] = {
+            f"{d}, {which}": {**self.whole, self.part(d): mask}
+            for d, strip in matched.items() for which, mask in _without(strip).items()
         }  # fmt: skip
-        return {sort: parts for sort, parts in sorts.items() if len(parts) > 1}
+        return self.without_each("directions") | ({"specimens": specimens} if specimens else {})
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the law in the points matched."""
         return reach_of(self.test, {d: masks.get(self.part(d)) for d in self.test.matched})
-
-    def kept(self, masks: Masks | None) -> tuple[str, ...]:
-        """Return the directions in which masks leave points to match."""
-        known = masks or {}
-        return tuple(d for d in self.test.matched if known.get(self.part(d), np.True_).any())
-
-    def part(self, direction: str) -> str:
-        """Return the name of the comparison of a direction."""
-        return f"{self.test.name}: {direction}"
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
@@ -256,17 +238,6 @@ class PreparedStrips:
                 must_be_stable=False,
             )
             for direction in kept
-        )
-
-    def finer(
-        self, make_solver: MakeSolver, weighting: Weighting, factor: float
-    ) -> tuple[Comparison, ...]:
-        """Return the comparisons on other quads; increments hardly matter."""
-        models = self.test.models(what="elements", factor=factor)
-        own = self.comparisons(make_solver, weighting)
-        return tuple(
-            replace(comparison, model=models[direction])
-            for comparison, direction in zip(own, self.test.matched, strict=True)
         )
 
     def virtual_work(self, make_solver: MakeSolver) -> tuple[Comparison, ...]:
@@ -294,13 +265,9 @@ class PreparedStrips:
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
-    def fitted_strips(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
-        """Return the strips that a fit matched."""
-        return fitted_parts((self.test.strips[d] for d in self.test.matched), fitted)
-
     def data_files(self) -> Sequence[DataFile]:
         test, points = self.test, self.test.match_by == "points"
-        return joined(file for d in test.matched for file in test.strips[d].data_files(points))
+        return joined(file for own in test.matched.values() for file in own.data_files(points))
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         test = self.test

@@ -145,8 +145,7 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
             )
         except InputError:  # too few points for the highest order, or at too few elongations
             continue
-        names = "order", "rmse", "left_out"
-        orders, rms, left_out = ([getattr(s, n) for s in scores] for n in names)
+        orders, rms, left_out = map(list, zip(*scores, strict=True))
         order = strip.polynomial.order
         panels.append(order_chart(strip.direction, orders, rms, left_out, order))
     if panels:
@@ -225,7 +224,7 @@ def _within(model: UniaxialModel, card: MaterialCard, history: History) -> int:
 
 def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     """Return the numbers, warnings and words of the best fit."""
-    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    test, strips = prepared.test, prepared.fitted_parts(fitted)
     total = sum(s.rms for s in strips)
     errors = [f"{s.data.direction} {s.rms:.3g}" for s in strips]
     scatter = [s.data.scatter for s in strips]
@@ -250,7 +249,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
 
 def fitted_loads(prepared: PreparedStrips, fitted: FittedTest) -> Charts:
     """Return charts of load over elongation, measured and modelled, and of their difference."""
-    strips = prepared.fitted_strips(fitted)
+    strips = prepared.fitted_parts(fitted)
     panels = [
         load_panel(s.data, [("model", np.array(s.model.elongations), s.history.load)], [s.rms])
         for s in strips
@@ -265,7 +264,7 @@ CHARTS = {"loads": fitted_loads}
 
 def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write load curves, the deformed bias strip, moduli, orders and loads.csv."""
-    test, strips = prepared.test, prepared.fitted_strips(fitted)
+    test, strips = prepared.test, prepared.fitted_parts(fitted)
     parts = []
     for s in strips:
         u, polynomial = np.array(s.model.elongations), s.data.polynomial
@@ -377,7 +376,7 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load."""
     parts = []
-    for s in prepared.fitted_strips(fitted):
+    for s in prepared.fitted_parts(fitted):
         modelled, measured = s.objective.modelled(s.history), s.objective.load
         columns = {
             "part": s.data.direction, "elongation_mm": s.objective.elongation, "quantity": "load",

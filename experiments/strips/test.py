@@ -63,7 +63,7 @@ class ColumnsSection(Section):
 
 
 class FilesSection(Section):
-    """Files that do not name their direction, by direction."""
+    """Files by direction, which they need not name."""
 
     warp: FileNames | None = None
     fill: FileNames | None = None
@@ -170,9 +170,9 @@ class StripsTest:
         return reach_of(self)
 
     @property
-    def matched(self) -> tuple[str, ...]:
-        """Return the directions of a weight above 0."""
-        return tuple(d for d in self.strips if self.weights[d] > 0)
+    def matched(self) -> dict[str, Strip]:
+        """Return the strips of a weight above 0, by direction."""
+        return {d: strip for d, strip in self.strips.items() if self.weights[d] > 0}
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
-from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, StrainObjective, StrainsPrepared
+from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, StrainObjective
 
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
@@ -155,10 +155,12 @@ def _centred(values: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedTube(StrainsPrepared):
+class PreparedTube:
     """A tube with its data."""
 
     test: TubeTest
+    known = None
+    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
     objective_is = "sum of the RMS errors of the measured strains over their largest"
 
     def reach(self, masks: Masks) -> Reach:
@@ -166,13 +168,15 @@ class PreparedTube(StrainsPrepared):
         return self.test.reach
 
     def comparisons(
-        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None
     ) -> tuple[Comparison, ...]:
         test = self.test
         count = int((~np.isnan(test.strain).any(axis=0)).sum())
         weight = weighting.weight / count if weighting.relative else 1.0
         objective = TubeObjective(test, weight)
         return (Comparison(test.name, objective.model, make_solver(), objective, contracts=True),)
+
+    finer = comparisons  # there is no mesh
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         own = self.test.path

@@ -140,8 +140,9 @@ def test_loads_are_paired_by_time(caplog):
         [stretched(grid(), stretch, 0.0) for stretch in (1.0, 1.1, 1.2, 1.3)], LOWER, UPPER
     )
     with caplog.at_level(logging.WARNING, logger="bubblefit"):
-        how = {"direction": "warp", "specimen": "1", "load_times": [0, 1, 2]}
-        curve = gauge_load_curve(record, [0, 10, 30], **how, frame_times=[-1, 0.5, 1.5, 2])
+        how = {"direction": "warp", "specimen": "1", "load_times": np.arange(3.0)}
+        times = np.array([-1, 0.5, 1.5, 2])
+        curve = gauge_load_curve(record, [0, 10, 30], **how, frame_times=times)
     np.testing.assert_allclose(curve.load, [5, 20, 30])
     np.testing.assert_allclose(curve.elongation, record.elongation[1:])
     np.testing.assert_allclose(curve.time, [0.5, 1.5, 2])
@@ -149,7 +150,7 @@ def test_loads_are_paired_by_time(caplog):
     record = virtual_strain_gauge([square()] * 4, (2.0, 2.0), (2.0, 8.0))
 
     def at(frames):
-        times = {"frame_times": frames, "load_times": [1, 3]}
+        times = {"frame_times": np.array(frames), "load_times": np.array([1, 3])}
         return gauge_load_curve(record, [0, 10], direction="warp", specimen="1", **times)
 
     curve = at([1, 2, 3, 3.001])
@@ -161,18 +162,15 @@ def test_loads_are_paired_by_time(caplog):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"loads": [1, 2]}, "expected one load a frame, got 2 for 3 frames"),
-        ({"loads": [1, np.nan, 2]}, "loads: expected finite numbers"),
-        ({"direction": "90"}, "unknown direction '90'"), ({"frame_times": [0, 1, 2]}, "times: "),
-        ({"frame_times": [0, 1], "load_times": [0, 1, 2]}, "frame_times: expected 3"),
+        ({"direction": "90"}, "unknown direction '90'"),
         ({"frame_times": [0, 1, 2], "load_times": [0, 2, 1]}, "load_times: expected two"),
         ({"frame_times": [0, 1, 2], "load_times": [0, 1, 1]}, "load_times: expected two"),
-        ({"frame_times": [0, 1, 2], "load_times": [0]}, "load_times: expected 3"),
-        ({"frame_times": [0, 1, 2], "load_times": [0, 1, np.nan]}, "load_times: expected 3"),
+        ({"loads": [1], "frame_times": [0, 1, 2], "load_times": [0]}, "load_times: expected two"),
         ({"frame_times": [7, 8, 9], "load_times": [0, 1, 2]}, "only 0 of 3 frames"),
     ],
 )  # fmt: skip
 def test_loads_that_do_not_pair(options, words):
+    options = {k: np.array(v) if k.endswith("times") else v for k, v in options.items()}
     asked = {"loads": [1, 2, 3], "direction": "warp", "specimen": "1"} | options
     assert words in complaint(gauge_load_curve, three_frames(), **asked)
 

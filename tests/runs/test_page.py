@@ -222,7 +222,7 @@ def test_what_is_determined_in_closed_form(together, written):
     shown = {row[0]: row[1:] for row in titled(found, "Residual beside the noise").rows}
     noise, alone = {}, {}
     for prepared in fit.setup.tests:
-        for strip in prepared.fitted_strips(fit.tests[prepared.test.name]):
+        for strip in prepared.fitted_parts(fit.tests[prepared.test.name]):
             scatter, part = strip.data.scatter, prepared.part(strip.data.direction)
             noise[part] = max(strip.rms, scatter)
             rms, of, unit, _, times = shown.pop(part)

@@ -95,7 +95,7 @@ def test_weights_and_units_of_the_errors(published):
     assert sum(norms(weighted, True, 2.0).values()) == pytest.approx(wanted)
     # A direction without weight is not run.
     unmatched = published(("[data]", "[weights]\nfill = 0\n[data]"))
-    assert unmatched.test.matched == ("warp", "bias")
+    assert list(unmatched.test.matched) == ["warp", "bias"]
     assert list(norms(unmatched)) == ["strips: warp", "strips: bias"]
 
 
@@ -155,7 +155,7 @@ def test_no_modulus_is_shown_beyond_where_it_is_fitted(published, monkeypatch):
     """Gauges that went further than the card is valid for are drawn to the card's end."""
     prepared = published()
     fit = fitted(prepared)
-    strips = prepared.fitted_strips(fit)
+    strips = prepared.fitted_parts(fit)
     gauges = [s.data.strain_by() for s in strips]
     assert gauges[0] > fit.valid[0] and gauges[1] < fit.valid[1]
     ends = report.failure_strains(strips, fit.valid)
@@ -201,8 +201,7 @@ def test_orders_are_those_of_polynomials_as_they_are_fitted(
             *strip.points, range(1, 9), through_origin=through_origin,
             specimens=strip.specimen_of.tolist() if several else None,
         )  # fmt: skip
-        errors = [s.rmse for s in scores], [s.left_out for s in scores]
-        assert panel == (direction, [*range(1, 9)], *errors, 3)
+        assert panel == (direction, *map(list, zip(*scores, strict=True)), 3)
     # A load at rest of 50 N: only a polynomial with a constant can follow it.
     assert (min(panels[0][2]) < 1.0) == (not through_origin)
     assert not report.draw_orders([bare], tmp_path / "orders.png")
@@ -267,7 +266,7 @@ def matched(strip: Strip = WARP, loads=(203.0, 396.0)) -> FittedPart:
 
 
 def holding(test, strips) -> Any:
-    return SimpleNamespace(test=test, fitted_strips=lambda _: strips)
+    return SimpleNamespace(test=test, fitted_parts=lambda _: strips)
 
 
 def test_findings():
