@@ -57,7 +57,7 @@ def beside(model, curve):
         return [None] * 3
     way = np.array([0.0, *model.deflections])[: len(history.load)]
     found = against_measured(model.reading, way, history.load, [curve])
-    ratios = found.ratios()
+    ratios = found.ratios
     return [ratios[f"load at {PLACE:g} mm"], ratios["stiffness"], ratios["knee"]]
 
 

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
@@ -214,6 +215,15 @@ class Studied:
     responses: Callable[[Any, History], Mapping[str, float]]
     response: str
     curve: Callable[[Any, History], tuple[Array, Array]] | None = None
+
+
+def divided(steps: Sequence[float], factor: float, what: str) -> list[float]:
+    """Return load steps above 0, each divided by a factor; InputError if it is no whole number."""
+    if factor != int(factor):
+        problem = f"the {what}'s steps are divided, never joined: use --coarser 0"
+        raise InputError(None, "increments", problem)
+    parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise((0.0, *steps))]
+    return [float(value) for part in parts for value in part]
 
 
 @dataclass(frozen=True, eq=False)

@@ -264,7 +264,7 @@ def measured_files(
     forward = pressures is not None and not place.need_data
     if not several and (points.pressure is None or forward):
         return measured
-    how = measured.files, measured.options, measured.format, place, _folder(points, place)
+    how = measured.files, measured.options, measured.format, place, place.folder(points.folder)
     recorded = recorded_frames(points.pressure, pressures, *how, section.inflation)
     return replace(measured, files=recorded.files, recorded=recorded)
 
@@ -273,26 +273,17 @@ def _reference(points: PointsSection, place: Place) -> Path | None:
     """Return the file of the undeformed state, None without one; raises InputError."""
     if points.reference is None:
         return None
-    path = _folder(points, place) / points.reference
-    if place.need_data and not is_file(path):
-        raise place.error("data.points.reference", f"there is no file {path}")
+    path = place.folder(points.folder) / points.reference
+    place.has(path, "data.points.reference")
     return path
-
-
-def _folder(points: PointsSection, place: Place) -> Path:
-    return Path(place.data_folder or place.path.parent / points.folder)
 
 
 #: A name of files with {index} in it, which may have a width; other braces are doubled.
 PATTERN = r"([^{}]|\{\{|\}\}|\{index(:\d{0,2}d?)?\})*"
 
 
-def _file_names(points: PointsSection, place: Place) -> list[str]:
-    if (points.files is None) == (points.pattern is None):
-        problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
-        raise place.error("data.points", problem)
-    if points.files is not None:
-        return points.files
+def _numbered(points: PointsSection, place: Place) -> list[str]:
+    """Return the names that `pattern` gives with `indices`."""
     pattern = points.pattern or ""
     if points.indices is None:
         raise place.error("data.points.indices", "this key is missing; 'pattern' needs it")
@@ -308,24 +299,23 @@ def _file_names(points: PointsSection, place: Place) -> list[str]:
 
 def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
     """Return the files, patterns in `files` put into the natural order of their matches."""
-    names = _file_names(points, place)
-    folder = _folder(points, place)
-    advice = "give the folder of the measured data with --data DIR"
-    needed = place.need_data
-    if needed and not os.path.isdir(folder):
-        raise place.error("data.points", f"there is no folder {folder}; {advice}")
+    folder, advice = place.folder(points.folder), "--data DIR names another folder"
+    if (points.files is None) == (points.pattern is None):
+        problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
+        raise place.error("data.points", problem)
     if points.files is None:
-        files = [folder / name for name in names]
-    else:
+        files = [folder / name for name in _numbered(points, place)]
+    if place.need_data and not os.path.isdir(folder):
+        raise place.error("data.points", f"there is no folder {folder}; {advice}")
+    if points.files is not None:
         try:
-            files, _ = frame_files(names, "data.points.files", folder)
+            files, _ = frame_files(points.files, "data.points.files", folder)
         except InputError as error:
-            if error.path is None and not needed:
+            if error.path is None and not place.need_data:
                 return ()
             where = f"{error.path} " if error.path is not None else ""
             raise place.error(error.field, f"{where}{error.problem}; {advice}") from None
     files = [file for file in files if file != _reference(points, place)]
     for file in files:
-        if needed and not is_file(file):
-            raise place.error("data.points", f"there is no file {file}; {advice}")
+        place.has(file, "data.points")
     return tuple(files)

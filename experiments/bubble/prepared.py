@@ -104,8 +104,8 @@ class PreparedBubble:
 
     @property
     def source(self) -> str:
-        """Describe where the fields come from."""
-        return "the known solution" if self.known is not None else "what was measured"
+        """Return the name of the data: only what a camera saw is measured."""
+        return "measured" if self.known is None else "known"
 
     @property
     def dropped(self) -> int:

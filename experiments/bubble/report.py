@@ -160,8 +160,9 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     modelled = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     pressures = [t.pressure for t in objective.targets]
     seen = [t.displacement[:, 2] for t in objective.targets]
-    source = "known solution" if prepared.known is not None else "measured"
-    heights = bubbles.height_charts(pressures, seen, [own[:, 2] for own in modelled], source)
+    heights = bubbles.height_charts(
+        pressures, seen, [own[:, 2] for own in modelled], prepared.source
+    )
     series = out.path("bubble.pvd")
     write_series(fitted_model(fitted), fitted.histories[0], fitted.law, series, left)
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
@@ -236,7 +237,7 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
         fitted.comparisons[0].model.mesh.points,
         fitted.histories[0].displacement + amounts_of(OFFSETS, fitted.nuisance),
         [(seen.points, seen.displacement) for seen in prepared.fields],
-        f"{prepared.test.name}: lines are the model, dots {prepared.source}.",
+        f"{prepared.test.name}: lines are the model, dots are {prepared.source}.",
     )
 
 
@@ -244,16 +245,11 @@ def profile_charts(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
 CHARTS = {"heights": profile_charts}
 
 
-def _source(prepared: PreparedBubble) -> str:
-    """Return the name of the data: only what a camera saw is measured."""
-    return "measured" if prepared.known is None else "known"
-
-
 def residual_chart(prepared: PreparedBubble, fitted: FittedTest) -> Charts:
     """Return the residuals of dx, dy and dz over the measured height."""
     objective = objective_of(fitted)
     left = objective.differences(fitted.histories[0].displacement, fitted.nuisance)
-    targets, source = objective.targets, _source(prepared)
+    targets, source = objective.targets, prepared.source
     rounding = ROUNDING * max(float(np.abs(t.displacement).max()) for t in targets)
     numbers, charts = bubbles.chosen(len(targets)), []
     for axis, name in enumerate(DIRECTIONS):
@@ -289,7 +285,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
         a, b, c = ([own[:, k] for own in one] for one in (measured, modelled, left))
         rows.append((quantity, "mm", a, b, c))
     caption = (
-        f"{name}: displacement of {prepared.source}, of the model, and their difference. Colours "
+        f"{name}: displacement {prepared.source}, modelled, and their difference. Colours "
         "end at the least and the largest value of the pressure shown."
     )
     if objective.constant:
@@ -297,7 +293,7 @@ def field_maps(prepared: PreparedBubble, fitted: FittedTest) -> Maps:
     return maps_of(
         f"{name} maps", "pressure", [bubbles.kilo(t.pressure) for t in targets],
         [target.at(nodes) for target in targets], rows, LABELS, caption,
-        f"maps of dx, dy and dz of {name}", _source(prepared),
+        f"maps of dx, dy and dz of {name}", prepared.source,
     )  # fmt: skip
 
 
@@ -328,7 +324,7 @@ def bubble_solid(
     caption = (
         f"{test.name}: the modelled bubble; drag it, or use the arrow keys, to turn it. Strain is "
         "logarithmic, stress Cauchy stress, both in the middle of each element; the residual "
-        f"is the distance of modelled and {_source(prepared)}, grey where there are no data. The "
+        f"is the distance of modelled and {prepared.source}, grey where there are no data. The "
         "arrow is the warp."
     )
     alt = f"the inflated bubble of {test.name}, {points[-1, :, 2].max():.3g} mm high at the end"

@@ -8,7 +8,6 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
@@ -17,7 +16,7 @@ from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import Which
 from ...solvers.base import History
-from ..kinds import Place, Reach, Refined, Studied
+from ..kinds import Place, Reach, Refined, Studied, divided
 from .point_files import PointFiles, measured_files
 from .registration import clamp_radius
 from .section import (
@@ -171,13 +170,8 @@ class BubbleTest:
             # From the count that the mesh has, not the one asked for: finer meshes divide quads.
             whole = len(own.mesh.quads) * (4 if self.symmetry == "quarter" else 1)
             return {PART: self.model(thickness, elements=round(whole * factor**2))}
-        if factor != int(factor):
-            problem = "the bubble's steps are divided, never joined: use --coarser 0"
-            raise InputError(None, "increments", problem)
-        ends = (0.0, *self.increments)
-        parts = [np.linspace(a, b, int(factor) + 1)[1:] for a, b in pairwise(ends)]
-        steps = tuple(float(p) for part in parts for p in part)
-        return {PART: self.model(thickness, increments=steps)}
+        steps = divided(self.increments, factor, "bubble")
+        return {PART: self.model(thickness, increments=tuple(steps))}
 
     def settings(self) -> Mapping[str, object]:
         names = (

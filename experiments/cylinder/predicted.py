@@ -96,22 +96,19 @@ SECANT = (0.1, 0.35)
 
 @dataclass(frozen=True)
 class Against:
-    """A run beside the mean of the measured repetitions: pairs (predicted, measured), or None.
+    """A run beside the mean of the measured repetitions: (predicted, measured), or None.
 
-    stiffness : N/mm, between `SECANT` of the load at the `reference` deflection (mm), of each curve
-    its own. knee : N. loads : N by place.
+    pairs : "stiffness" (N/mm, between `SECANT` of the load at the `reference` deflection, mm, of
+    each curve its own), "knee" and "load at PLACE" (N).
     """
 
     reference: float
-    stiffness: tuple[float, float] | None
-    knee: tuple[float, float] | None
-    loads: Mapping[str, tuple[float, float] | None]
+    pairs: Mapping[str, tuple[float, float] | None]
 
+    @property
     def ratios(self) -> Mapping[str, float | None]:
-        """Return predicted over measured by quantity: "stiffness", "knee", "load at PLACE"."""
-        pairs = {"stiffness": self.stiffness, "knee": self.knee}
-        pairs |= {f"load at {place}": pair for place, pair in self.loads.items()}
-        return {name: pair and pair[0] / pair[1] for name, pair in pairs.items()}
+        """Return predicted over measured by quantity."""
+        return {name: pair and pair[0] / pair[1] for name, pair in self.pairs.items()}
 
 
 def against_measured(
@@ -122,22 +119,21 @@ def against_measured(
         return None
     curves = [(d, load), *((c.deflection, c.load) for c in measured)]
     reached = min(float(x[-1]) for x, _ in curves)
-    places = {n: p for n, p in reading.places.items() if p <= reached * (1 + 1e-9)}
+    every = {f"load at {n}": p for n, p in reading.places.items()}
+    places = {n: p for n, p in every.items() if p <= reached * (1 + 1e-9)}
     reference = max(places.values(), default=reached)
     rows = []
     for x, y in curves:
         stiffness = secant_stiffness(x, y, reference)
         knee = knee_point(x, y, stiffness, reading.slope_over)
-        found = {"stiffness": stiffness, "knee": knee and knee[1]}
-        rows.append(found | {n: loads_at(x, y, {n: p})[n] for n, p in places.items()})
-    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys(reading.places)
+        rows.append({"stiffness": stiffness, "knee": knee and knee[1], **loads_at(x, y, places)})
+    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys(["stiffness", "knee", *every])
     for name in rows[0]:
         own, *others = (row[name] for row in rows)
         known = [value for value in others if value is not None]
         whole = own is not None and len(known) == len(others)
         pairs[name] = (float(own or 0.0), float(np.mean(known))) if whole else None
-    stiff, knees = pairs.pop("stiffness"), pairs.pop("knee")
-    return Against(reference, stiff, knees, pairs)
+    return Against(reference, pairs)
 
 
 def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
@@ -457,7 +453,7 @@ class CylinderOutcome:
             "reached_mm": m and m.reached,
         }
         if m is not None and m.against is not None:
-            ratios = m.against.ratios().items()
+            ratios = m.against.ratios.items()
             row |= {f"{n.replace(' ', '_')}_over_measured": ratio for n, ratio in ratios}
         if number in self.spreads:
             sigma = zip(places, self.sigma(number).values(), strict=True)
@@ -526,11 +522,11 @@ class CylinderOutcome:
 
 
 def _against(found: Against) -> dict[str, Any]:
-    pairs = {"stiffness_N_per_mm": found.stiffness, "knee_N": found.knee}
-    pairs |= {f"load_at_{n.replace(' ', '_')}_N": pair for n, pair in found.loads.items()}
-    names = ("predicted", "measured")
-    named = {n: pair and dict(zip(names, pair, strict=True)) for n, pair in pairs.items()}
-    return {"reference_mm": found.reference, **named}
+    numbers: dict[str, Any] = {"reference_mm": found.reference}
+    for name, pair in found.pairs.items():
+        key = f"{name.replace(' ', '_')}_{'N_per_mm' if name == 'stiffness' else 'N'}"
+        numbers[key] = pair and {"predicted": pair[0], "measured": pair[1]}
+    return numbers
 
 
 def _point(point: Point | None) -> dict[str, float | None]:

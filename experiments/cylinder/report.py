@@ -1,7 +1,7 @@
 """Results of bent cylinders as facts, figures, tables and files."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -245,15 +245,6 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
     return BendPanel(test.name, lines, measured, f"{100 * LEVEL:g} % by the card", along)
 
 
-#: mm, of what a project may leave to the usual values.
-SIZES: Mapping[str, Callable[[CylinderTest], float]] = {
-    "span": lambda test: test.supports.span,
-    "seam width": lambda test: test.seam_width,
-    "length": lambda test: test.length,
-    "diameter of the supports": lambda test: test.supports.diameter,
-}
-
-
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
     """Return notes on the uncertainty of the loads and on assumptions."""
     lines = []
@@ -270,10 +261,8 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
         lines.append(f"The solver's answer lies between walls ({ends}).")
     for words in dict.fromkeys(words for test in tests for words in test.assumed):
         own = [test for test in tests if words in test.assumed]
-        sizes = sorted({f"{SIZES[words](t):g} mm" for t in own}) if words in SIZES else []
         of = "" if len(own) == len(tests) else f" for {', '.join(t.name for t in own)}"
-        size = f" ({', '.join(sizes)})" if sizes else ""
-        lines.append(f"Assumed{of}, as the project does not say: the usual {words}{size}.")
+        lines.append(f"Assumed{of}, as the project does not say: the usual {words}.")
     return lines
 
 
@@ -420,6 +409,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     """Return the tables of what is measured too: quantities, and loads reading by reading."""
     walls = ["wall"] if outcome.band else []
     places = place_names(run.test for run in outcome.runs)
+    compared = ["stiffness", "knee", *(f"load at {place}" for place in places)]
     rows, beside = list[list[object]](), list[list[object]]()
     for i, m in outcome.measures.items():
         run = outcome.runs[i]
@@ -428,8 +418,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
             numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
             rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
         if m.against is not None:
-            pairs = m.against.stiffness, m.against.knee, *map(m.against.loads.get, places)
-            for pair in pairs:
+            for pair in map(m.against.pairs.get, compared):
                 of = None if pair is None else f"{pair[0] / pair[1]:.3f}"
                 head += [None if pair is None else f"{pair[1]:.4g}", of]
             beside.append(_unbroken(head))
@@ -439,7 +428,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
     text = tuple(range(1, len(named)))
-    over = ("stiffness, N/mm", "knee, N", *(f"load at {place}, N" for place in places))
+    over = (f"{name}, {'N/mm' if name == 'stiffness' else 'N'}" for name in compared)
     columns = [*named, *(words for name in over for words in (name, "of it"))]
     low, high = (f"{100 * share:g}" for share in SECANT)
     how = "Measured (mean of the repetitions), and predicted over measured. Stiffness: between "

@@ -6,14 +6,12 @@ each are refused where the other is asked for.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ...errors import InputError
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
@@ -51,6 +49,7 @@ from ..kinds import (
     Place,
     Reach,
     Refined,
+    divided,
     joined,
     named_format,
 )
@@ -163,8 +162,11 @@ PART = "cylinder"
 #: mm of an element, unless the file says otherwise.
 SIZE = 25.0
 #: Keys that may be left out, and what is then as usual.
-USUAL = {"span": "span", "seam_width": "seam width", "length": "length", "collar": "collar",
-         "support_diameter": "diameter of the supports"}  # fmt: skip
+USUAL = {
+    "span": f"span ({RigidSupports().span:g} mm)", "seam_width": f"seam width ({SEAM_WIDTH:g} mm)",
+    "length": f"length ({LENGTH:g} mm)", "collar": "collar",
+    "support_diameter": f"diameter of the supports ({RigidSupports().diameter:g} mm)",
+}  # fmt: skip
 KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
 #: Keys of a membrane alone, and of a beam alone.
 OF_MEMBRANE = ("length", "seam_width", "symmetry", "support_diameter", "collar", "cap_warp", "gas")
@@ -246,15 +248,9 @@ class CylinderTest:
             if self.beam is not None:
                 return {PART: replace(self.beam, size=self.beam.size / factor)}
             return {PART: replace(self, size=self.size / factor).model(thickness)}
-        if factor != int(factor):
-            problem = "the cylinder's steps are divided, never joined: use --coarser 0"
-            raise InputError(None, "increments", problem)
-        model, parts = self.model(thickness), int(factor)
-        finer: dict[str, Any] = {}
-        for name in ("inflation", "increments") if self.beam is None else ("increments",):
-            ends = pairwise((0.0, *getattr(model, name)))
-            steps = [np.linspace(a, b, parts + 1)[1:] for a, b in ends]
-            finer[name] = [float(value) for part in steps for value in part]
+        model = self.model(thickness)
+        names = ("inflation", "increments") if self.beam is None else ("increments",)
+        finer: dict[str, Any] = {n: divided(getattr(model, n), factor, "cylinder") for n in names}
         return {PART: replace(model, **finer)}
 
     def settings(self) -> Mapping[str, object]:
@@ -378,7 +374,7 @@ def _beam(
             size=own.element_size or SIZE,
             reading=curve_reading(own.diameter, own.places, own.slope_over),
         )  # fmt: skip
-    assumed = ["span"] if section.span is None else []
+    assumed = [USUAL["span"]] if section.span is None else []
     assumed += ["constant pressure while bending"]
     assumed += ["weightless tube"] if section.mass_per_length is None else []
     return CylinderTest(

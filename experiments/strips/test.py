@@ -254,16 +254,13 @@ def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[Listed
     """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [(folder / data.polynomials, "data.polynomials", None)]
-    by_direction: dict[str | None, list[str]] = {None: []}
-    if isinstance(data.files, list):
-        by_direction[None] = data.files
-    else:
-        by_direction |= {d: getattr(data.files, d) or [] for d in DIRECTIONS}
-    for direction, names in by_direction.items():
-        by_direction[direction] = [file for name in names for file in _matches(folder, name)]
+    said: dict[str | None, Any] = {None: data.files}
+    if not isinstance(data.files, list):
+        said = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
     listed: list[ListedFile] = []
-    for direction, names in by_direction.items():
+    for direction, given in said.items():
         key = "data.files" if direction is None else f"data.files.{direction}"
+        names = [file for name in given for file in _matches(folder, name)]
         for i, name in enumerate(names):
             if Path(name) in map(Path, names[:i]):
                 problem = f"{name!r} is listed twice; its points would count double"

@@ -322,13 +322,13 @@ def test_a_curve_beside_measured_ones():
     reading = curve_reading(340.0, [100.0, 500.0], 4.0)
     found = against_measured(reading, way, load, [BendingCurve("a", way[:1101], read[:1101])])
     assert found.reference == 100.0
-    assert found.stiffness == pytest.approx((40.0, 30.0), rel=1e-6)
-    assert found.knee == pytest.approx((396.0, 0.75 * 396.0 + 30.0), rel=0.02)
-    assert found.loads["100 mm"] == pytest.approx((760.0, 600.0))
-    assert found.loads["500 mm"] is None and found.ratios()["load at 500 mm"] is None
-    assert found.ratios()["stiffness"] == pytest.approx(40.0 / 30.0)
+    assert found.pairs["stiffness"] == pytest.approx((40.0, 30.0), rel=1e-6)
+    assert found.pairs["knee"] == pytest.approx((396.0, 0.75 * 396.0 + 30.0), rel=0.02)
+    assert found.pairs["load at 100 mm"] == pytest.approx((760.0, 600.0))
+    assert found.pairs["load at 500 mm"] is None and found.ratios["load at 500 mm"] is None
+    assert found.ratios["stiffness"] == pytest.approx(40.0 / 30.0)
     twice = [BendingCurve(name, way, factor * read) for name, factor in (("a", 0.9), ("b", 1.1))]
-    assert against_measured(reading, way, load, twice).stiffness[1] == pytest.approx(30.0)
+    assert against_measured(reading, way, load, twice).pairs["stiffness"][1] == pytest.approx(30.0)
     assert against_measured(reading, way, load, ()) is None
 
 
