@@ -1,7 +1,5 @@
 """Readers of measured files, by content or `format`; InputError names file, line and column."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Load over deflection of three-point bending, as sensors or a notebook recorded it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

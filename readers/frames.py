@@ -1,7 +1,5 @@
 """Frames of image correlation (DIC): places at rest, displacements; headings as `formats` cite."""
 
-from __future__ import annotations
-
 import glob
 import math
 import os

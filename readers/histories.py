@@ -1,7 +1,5 @@
 """Load over strain of a specimen through all its cycles, and the branches of the history."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 The apex of a conditioned sheet is higher than that of the first loading at the same pressure.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

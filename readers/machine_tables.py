@@ -1,7 +1,5 @@
 """A test machine's table: which column holds what, and its numbers in mm and N."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

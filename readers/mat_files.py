@@ -6,8 +6,6 @@ crashes or hangs on hostile files (tests/readers/test_hostile_frames.py). HDF5 n
 (`pip install "bubblefit[hdf5]"`); nothing outside the file is read.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping

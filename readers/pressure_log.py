@@ -7,8 +7,6 @@ by isotonic regression, the sheet at rest at the least pressure of the log.
 Outline: the log, heights, offset of the clocks, choice of frames, numbers in names and in files.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

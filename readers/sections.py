@@ -1,7 +1,5 @@
 """The base of all sections of a project file, its numbers and units, and errors in one line."""
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

@@ -1,7 +1,5 @@
 """Points of a frame from text: columns by pandas, else cell by cell so that errors name lines."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Four bars with published end stresses of another program: does a solver carry the law?"""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Input decks from Jinja2 templates, ours or the user's, and digests of all that shapes a run."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import re

@@ -6,8 +6,6 @@ are empty and never removed. In a cluster a Dask scheduler leases licences. A le
 renewed is free again after `distributed.scheduler.locks.lease-timeout`, 30 s by default.
 """
 
-from __future__ import annotations
-
 import os
 import random
 import socket

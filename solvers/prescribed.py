@@ -6,8 +6,6 @@ interpolated to the model's elongations. Supports and collar are solids of presc
 contact needs faces.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

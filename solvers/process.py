@@ -1,7 +1,5 @@
 """Other processes: programs in a group of their own, with a log and no orphans, and Dask's."""
 
-from __future__ import annotations
-
 import logging
 import math
 import os

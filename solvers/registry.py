@@ -1,7 +1,5 @@
 """Solvers by name: the one place where a name, with a table of settings, becomes a solver."""
 
-from __future__ import annotations
-
 import inspect
 import tomllib
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ A file a run, named by its key; it appears whole under its name, so that process
 share the folder, also on a network file system: no lock, no database, nothing unpickled.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import io

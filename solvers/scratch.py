@@ -4,8 +4,6 @@ One under way holds a file locked by its process, whose number it names: the fol
 processes are found and removed. A folder without that file is kept for inspection.
 """
 
-from __future__ import annotations
-
 import atexit
 import functools
 import logging

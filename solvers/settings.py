@@ -1,7 +1,5 @@
 """Settings that every solver has in common: `[solver.NAME]` of a project file."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import re

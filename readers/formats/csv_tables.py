@@ -3,8 +3,6 @@
 Load polynomials: direction, gauge_length_mm, final_length_mm, c1, c2 ..., c0, data_scatter_N.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

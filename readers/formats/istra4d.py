@@ -5,8 +5,6 @@ Source: the public reader istra2py of the planar export (coordinates of the defo
 `length_unit` says otherwise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path

@@ -6,8 +6,6 @@ and specimens one block after the other: of several tables the one with most row
 blocks with the same names.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

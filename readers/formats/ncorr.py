@@ -11,8 +11,6 @@ Points3D (n, 3), places in the frame as MultiDIC uses them, Disp.DispVec (n, 3) 
 calibration's unit, mm unless `length_unit` says otherwise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -9,8 +9,6 @@ left camera's axes, so that y points down and z away from it). Its .mat cannot b
 names alone unless points3D is among them.
 """
 
-from __future__ import annotations
-
 import math
 import zipfile
 import zlib

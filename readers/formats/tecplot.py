@@ -7,8 +7,6 @@ POINT (a row a point) or BLOCK (a variable after the other). Vx, Vy, Vz are infe
 displacements where their unit is a length. Finite elements' zones are refused.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

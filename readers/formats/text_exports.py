@@ -43,8 +43,6 @@ MODEL_COORDINATES. COORDINATE_X is in pixels; y points down; that z points away 
 could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the calibration's unit.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -13,8 +13,6 @@ Y, Z, U, V, W are lengths, x, y, u, v in small letters pixels, and points with a
 bad. The unit is not in the file: mm unless `length_unit` says otherwise (could not be confirmed).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

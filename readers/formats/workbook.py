@@ -3,8 +3,6 @@
 Untrusted: size is limited, formulas give their stored value, macros, links, pictures nothing.
 """
 
-from __future__ import annotations
-
 import warnings
 import zipfile
 from io import BytesIO

@@ -8,8 +8,6 @@ Bending: total time of the step is the collar's way in mm (`REST` later). Calcul
 `analyse` runs the deck again with better pressures over the way.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace

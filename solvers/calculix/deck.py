@@ -1,7 +1,5 @@
 """Write what the decks of all models share: shells, material, control of Newton's method."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

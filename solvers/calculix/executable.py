@@ -1,7 +1,5 @@
 """Find the ccx to run, see if it can load material libraries, and judge how its run ended."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -5,8 +5,6 @@ one increment, 9999 the end; text in fixed columns, or binary (flag 2: float32, 
 that does not hold what its headers announce, or stops before 9999, is refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 A file carries its moduli: CalculiX 2.20 has room for 21 constants, and writes on beyond them.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

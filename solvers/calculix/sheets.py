@@ -1,7 +1,5 @@
 """Bubble, strip and patch in CalculiX: their decks of shells, and their results."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

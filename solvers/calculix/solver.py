@@ -1,7 +1,5 @@
 """CalculiX behind the solver protocol: a deck, a subprocess, its results."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Callable, Mapping

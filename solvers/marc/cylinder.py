@@ -1,7 +1,5 @@
 """The inflated cylinder as Marc decks: inflation alone, and with bending."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

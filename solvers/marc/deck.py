@@ -1,7 +1,5 @@
 """Write what the decks of all models share: law, schedule, supports, sets, fabric."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Run Marc once: a fresh folder, a deck in it, the program, the judgement, the results."""
 
-from __future__ import annotations
-
 import logging
 import os
 import re

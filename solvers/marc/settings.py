@@ -1,7 +1,5 @@
 """Settings of a site's Marc: `[solver.marc]` of a project file, or a file of the site's own."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Bubble and strip in Marc: their decks, and what their post files hold."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """MSC Marc behind the solver protocol: a deck, a run of run_marc, its results."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from dataclasses import replace

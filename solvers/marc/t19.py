@@ -1,7 +1,5 @@
 """Marc's formatted post file (.t19), read to its last mark; layout: docs/reference/marc-deck.md."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
