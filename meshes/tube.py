@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .disk import divided_quarter_disk
-from .mesh import Array, Mesh, snapped, with_mirror_image
+from .mesh import Array, Mesh, Numbers, snapped, with_mirror_image
 
-Numbers = NDArray[np.intp]
 NEAR = 1e-9  # in radii
 
 

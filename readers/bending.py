@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .frames import FrameSource
+from .frames import Array, FrameSource
 from .machine_tables import (
     AS_FOUND,
     Channel,
@@ -21,7 +21,6 @@ from .machine_tables import (
 )
 from .tables import LENGTH_UNITS, LOAD_UNITS
 
-Array = NDArray[np.float64]
 Zero = Literal["none", "first", "line"]
 #: N per kg of the weights on the strap, and N in one of each unit of load.
 GRAVITY = 9.80665

@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from . import machine_tables, tables
-from .frames import FrameSource
+from .frames import Array, FrameSource
 from .registry import read_file
 
-Array = NDArray[np.float64]
 #: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
 LoadUnit = Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"]
 LengthUnit = Literal["mm", "cm", "m", "in", "%"]

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .frames import LOST, Frame, FrameOptions, FrameSource, read_frames
+from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
 from .tables import TextTable, read_table, write_table
 
-Array = NDArray[np.float64]
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
 QUANTITIES = ("x", "y", "dx", "dy", "dz")

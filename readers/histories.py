@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import tables
+from .frames import Array
 from .machine_tables import (
     MachineTable,
     TableOptions,
@@ -20,7 +20,6 @@ from .machine_tables import (
     read_machine_table,
 )
 
-Array = NDArray[np.float64]
 QUANTITIES = ("load", "strain", "elongation", "travel", "time")
 #: Of the rise before it, the part that an unloading goes back; of the unloading, that a loading
 #: rises again; and of the range of all loads, the least change that is no noise.

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from . import tables
-from .frames import FrameSource
+from .frames import Array, FrameSource
 from .registry import format_of, read_file
 
-Array = NDArray[np.float64]
 NEEDED = ("elongation", "load")
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import ends
 from . import tables
-from .frames import Frame, heading_of
+from .frames import Array, Frame, heading_of
 from .inflations import Which, branches_of
 from .machine_tables import (
     AS_FOUND,
@@ -32,7 +32,6 @@ from .machine_tables import (
 )
 from .text_frames import SEPARATORS, TOP, Lines, cells_of
 
-Array = NDArray[np.float64]
 #: The apex of a frame is what moved most; so large a share of the points moved less, lest a stray
 #: point be it.
 APEX = 0.98

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
-from ..meshes.mesh import Mesh, X, log_strain_of, meshio_of, surface_strain
+from ..meshes.mesh import Array, Mesh, X, log_strain_of, meshio_of, surface_strain
 from .membrane.kernel import reference_elements
 
 if TYPE_CHECKING:
@@ -29,7 +28,6 @@ SNAP = NoteKind("snap", mark=2)
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-Array = NDArray[np.float64]
 #: Loads that are named one by one; of more, the first and the last.
 FEW = 3
 #: Places of strain and stress: the middle of each element, or its Gauss points.

@@ -17,15 +17,13 @@ from ..errors import InputError, Note, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import BubbleModel
 from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
-from ..meshes.mesh import enclosed_volume
+from ..meshes.mesh import Array, Numbers, enclosed_volume
 from ..meshes.strip_models import UniaxialModel
 from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver
 
 log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 #: How much further than expected the grips go, so that the gauge reaches its length for sure.
 BEYOND = 1.02
 #: mm of elongation over mm of gauge below which a gauge is as long as it should be.

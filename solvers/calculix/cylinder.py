@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import SEAM_LAYERS, ClosedGas, CylinderModel
+from ...meshes.mesh import Array, Numbers
 from .. import prescribed
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, volumes
@@ -31,8 +31,6 @@ from .sheets import NEAR, whole_times
 
 GAS = NoteKind("gas")
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 log = logging.getLogger(__name__)
 
 #: Incompatible modes: flat solids lock without.

@@ -12,7 +12,7 @@ from ...errors import Note, NoteKind, SolverFailure
 from ...files import __version__
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import rim_form, rim_share
-from ...meshes.mesh import Mesh
+from ...meshes.mesh import Array, Mesh
 from ..decks import render
 from .library import MATERIAL, STATE_VARIABLES
 
@@ -125,8 +125,6 @@ class Setup:
     templates: Path | None
     shells: Callable[[Mesh], ShellMesh]
 
-
-Array = NDArray[np.float64]
 
 #: Corners, then midsides, of the square [-1, 1]^2.
 _NATURAL = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [0, -1], [1, 0], [0, 1], [-1, 0]], float)

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.mesh import Array
 from ...meshes.strip_models import (
     PULLED,
     ROLLERS_PATCH,
@@ -36,7 +36,6 @@ from .deck import (
 from .frd import FrdFile
 from .library import constants
 
-Array = NDArray[np.float64]
 NEAR = 1e-6
 #: Largest residual force over the mean force, and largest correction over the largest change
 #: (CalculiX: 5e-3, 1e-2, off by up to 7e-3 mm). A bubble's are within 1.4e-6 mm of converged, for

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import CylinderModel
+from ...meshes.mesh import Array, Numbers
 from ..base import EARLY, History, extremes, log_strain
 from ..prescribed import ABOVE, bodies, may_touch, volumes, without_cords
 from .deck import Run, deck_text, fabric_context, fixed, node_sets, supports, time_table
@@ -19,7 +19,6 @@ from .sheets import NO_FORCES, REACTION, by_time, displacements, pressure_contex
 UNCONFIRMED = NoteKind("unconfirmed")
 UNBALANCED = NoteKind("unbalanced forces")
 
-Array = NDArray[np.float64]
 
 #: mm that the support waits below while the cylinder is inflated.
 BELOW = 50.0
@@ -93,8 +92,6 @@ def _deck(
     deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held
     return deck_text(*deck, pressure=pressure_context(settings), **(bending or {}))
 
-
-Numbers = NDArray[np.intp]
 
 #: Nodal vector of contact forces; its name is from memory.
 CONTACT = "Contact Normal Force"

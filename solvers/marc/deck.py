@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import __version__
 from ...materials.exports.subroutines import NUMBERS, STATE_VARIABLES, guarded
 from ...materials.law import HypoelasticLaw
 from ...materials.responses import modulus_tables
-from ...meshes.mesh import Mesh
+from ...meshes.mesh import Array, Mesh, Numbers
 from ..decks import render
 from ..prescribed import held_dofs
 from .settings import MarcSettings
@@ -105,9 +104,6 @@ def deck_text(
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
     return render("marc", template, whole, folder, instead)
 
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 
 FABRIC = "fabric"
 PER_LINE = 8

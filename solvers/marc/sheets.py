@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
-from ...meshes.mesh import Mesh
+from ...meshes.mesh import Array, Mesh
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
 from ..prescribed import gauge_opened, grip_pulls, inflated_history, strip_history
@@ -29,7 +28,6 @@ from .t19 import T19File
 
 NO_REACTIONS = NoteKind("no reactions")
 
-Array = NDArray[np.float64]
 WARP = np.array([1.0, 0.0, 0.0])
 #: The set of all nodes.
 FLAT = "all_nodes"

@@ -11,15 +11,14 @@ of mid-span is given, the load an unknown.
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, Note, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
+from ...meshes.mesh import Array
 from ..base import EARLY, History
 from .newton import Asked, Done
 
-Array = NDArray[np.float64]
 #: Newton's iterations in a step; how often it is halved.
 MOST_ITERATIONS, MOST_CUTS = 30, 6
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError, SolverFailure
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, MeasuredShape
 from ...meshes.disk import rim_form, rim_share
+from ...meshes.mesh import Array
 from ..base import BandEnd, History
 from .factorisation import tangent_for
 from .kernel import reference_elements
@@ -50,7 +50,6 @@ class Wall:
             raise InputError(None, "bending_stiffness", problem)
 
 
-Array = NDArray[np.float64]
 #: Increments from which the start of the next one is extrapolated.
 LOOK_BACK = 4
 #: Heights tried for the first increment, as multiples of the estimate; and multiples of the first

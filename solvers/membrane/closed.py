@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
-from ...meshes.mesh import volume_and_gradient
+from ...meshes.mesh import Array, Numbers, volume_and_gradient
 from .bubble import STIFF, Wall
 from .cords import Cords, cords_on
 from .factorisation import BorderedTangent, tangent_for
 from .kernel import reference_elements
 from .newton import Membrane, forgets, initial_stiffness, searched_equilibrium
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 #: cos of the largest angle in a line of the mesh: a cap's rim is a seam, and carries no moment.
 STRAIGHT = 0.7
 #: mm to which the first touch is found, and places tried at once on the way to it.

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...meshes.cylinder_model import Cord
-from ...meshes.mesh import Mesh
+from ...meshes.mesh import Array, Mesh, Numbers
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 #: Of a tube's radius and of an angle in radians: what is rounding.
 NEAR = 1e-6
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from ...errors import InputError
@@ -15,6 +14,7 @@ from ...materials.responses import bar
 from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel
+from ...meshes.mesh import Array
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..bars import BARS, INCREMENTS, TOLERANCE, bar_law, difference
 from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_of, parameters_of
@@ -22,8 +22,6 @@ from ..decks import in_words
 from . import beam, bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
 from .newton import Asked, Membrane
-
-Array = NDArray[np.float64]
 
 
 class Analysis(NamedTuple):
