@@ -174,8 +174,8 @@ class Reach:
 
 class Test(Protocol):
     """One test as its section describes it: lengths mm, loads N, pressures and moduli MPa.
-    weight : among several tests in one fit. reach : of its data. reads_files : whether its data are
-    measured files, which a folder can be named for."""
+    weight : among several tests in one fit. reach : of its data. Optional: `reads_files`, whether
+    its data are measured files, which a folder can be named for."""
 
     @property
     def kind(self) -> str: ...
@@ -188,9 +188,6 @@ class Test(Protocol):
 
     @property
     def reach(self) -> Reach: ...
-
-    @property
-    def reads_files(self) -> bool: ...
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0

@@ -137,9 +137,6 @@ class StrainObjective:
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.in_blocks(self.modelled(history) - self.measured)
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        return np.empty((sum(self.sizes), 0))
-
     def shifted(self, here: History, there: History) -> Self:
         other = copy.copy(self)
         other.strain = self.strain - (self.modelled(here) - self.modelled(there))

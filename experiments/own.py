@@ -137,9 +137,6 @@ class ValuesObjective:
         assert history.load_slope is not None
         return np.asarray(history.load_slope / self.scale[:, None])
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        return np.empty((len(self.measured), 0))
-
     def shifted(self, here: History, there: History) -> ValuesObjective:
         return self  # it is asked by the same solver, whichever leads
 

@@ -123,7 +123,8 @@ class Objective(Protocol):
     sizes : of the blocks, together m. scale : (m,) `unit`s in one unit of residual. data : all that
     was measured. Optional: `noise_is` (else "assumed"); `places`, (n, 2) mm on a sheet or (n, 1)
     along a curve, of each block, where neighbours may err as one; `alike`, how many do;
-    `specimens`, (m,) numbers, or None."""
+    `specimens`, (m,) numbers, or None; `nuisance_columns(names, nuisance)`, (m, names), slopes by
+    nuisance of its own, at its values."""
 
     @property
     def sizes(self) -> tuple[int, ...]: ...
@@ -145,9 +146,6 @@ class Objective(Protocol):
 
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from the solver's slope of the displacements."""
-
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """Return (m, names), slopes by the nuisance that the objective knows, at its values."""
 
     def shifted(self, here: History, there: History) -> Objective:
         """Return the objective of a model that shows `here` where this one shows `there`."""
@@ -294,7 +292,8 @@ class Comparison:
         by = {n.name: n.scale for n in self.nuisance if n.model_parameter is not None}
         by |= {n.name: n.scale for n in self.nuisance if n.law_parameter is not None}
         own = [n.name for n in self.nuisance if n.name not in by]
-        by_objective = self.objective.nuisance_columns(own, nuisance).T if own else ()
+        objective: Any = self.objective
+        by_objective = objective.nuisance_columns(own, nuisance).T if own else ()
         columns = dict(zip(own, by_objective, strict=True))
         scaled = zip(by.items(), by_solver.T[len(free) :], strict=True)
         columns |= {name: scale * column for (name, scale), column in scaled}

@@ -211,7 +211,7 @@ class PreparedBubble:
         assert isinstance(own.objective, FieldObjective)
         moved = copy.copy(own.objective)
         reading = matching.reading_of(test, model.mesh)
-        moved.targets = resampled(own.objective.targets, own.model.mesh, model.mesh, reading)
+        moved.targets = resampled(own.objective.targets, own.model.mesh, reading)
         prolong = partial(_prolonged, own.model, model) if factor > 1 else None
         return replace(own, model=model, objective=moved, prolong=prolong)
 
@@ -268,19 +268,15 @@ def registration_nuisance(
     """Return the unknowns of the registration: the yarns' angle, which is the model's, and places.
     begin : where a fit of each begins, by name, if within its bounds. Their priors weigh as the
     noise does: the field's symmetry tells far more."""
-    known, found = test.registration, list[Nuisance]()
+    found = list[Nuisance]()
     weight = prior_weight(objective.least_noise, objective.scale)
-    for name, prior in known.items():
-        most = MOST_SIGMAS * prior
-        if name == "turn":
-            most = min(most, MOST_TURN)
-            found.append(
-                Nuisance(name, -most, most, "deg", TURN, float(np.pi / 180), prior, weight)
-            )
-            continue
-        unit = "deg" if name == "tilt" else "mm"
-        own = (one for one in matching.PLACED if one.startswith(name))
-        found += [Nuisance(one, -most, most, unit, prior=prior, weight=weight) for one in own]
+    for name, prior in test.registration.items():
+        most, unit = MOST_SIGMAS * prior, "mm" if name == "shift" else "deg"
+        of_model: tuple[str | None, float] = (None, 1.0)
+        if name == TURN:
+            most, of_model = min(most, MOST_TURN), (TURN, float(np.pi / 180))
+        own = (one for one in (TURN, *matching.PLACED) if one.startswith(name))
+        found += [Nuisance(one, -most, most, unit, *of_model, prior, weight) for one in own]
     return [
         replace(one, begin=begin[one.name]) if abs(begin.get(one.name, np.inf)) < one.upper else one
         for one in found
@@ -288,11 +284,9 @@ def registration_nuisance(
 
 
 def resampled(
-    targets: tuple[FieldTarget, ...], own: Mesh, other: Mesh,
-    reading: SmoothReading | FacetReading | None = None,
-) -> tuple[FieldTarget, ...]:  # fmt: skip
-    """Return the targets at the same places of another mesh; its reading is smooth unless given."""
-    reading = reading or SmoothReading.of(other)
+    targets: tuple[FieldTarget, ...], own: Mesh, reading: SmoothReading | FacetReading
+) -> tuple[FieldTarget, ...]:
+    """Return the targets of a mesh at the same places of another, by its reading."""
     found: list[tuple[Array, scipy.sparse.csr_matrix]] = []
     moved = []
     for target in targets:

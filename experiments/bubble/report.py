@@ -21,6 +21,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField, write_surfaces
+from ...readers.pressure_log import ClockOffset
 from ...reports import bubbles
 from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
@@ -188,7 +189,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     taken = prepared.recorded
     if taken is not None:
         tables.insert(0, recorded_table(taken))
-        figures += clock_pictures(taken, out)
+        figures += [] if taken.clock is None else [clock_picture(taken, taken.clock, out)]
     shapes = field_maps(prepared, fitted), bubble_solid(prepared, fitted, left)
     parts: list[Part] = [cuts, *shapes, residual_chart(prepared, fitted)]
     numbers, record = findings.numbers, correlation_table(prepared)
@@ -392,29 +393,30 @@ def sheet_exhibit(
     prepared: PreparedBubble, fitted: FittedTest, out: Output
 ) -> tuple[list[Shown], list[Shown]]:
     """Write figures and files of the surface and of a constant field, where there are any."""
-    figures, files = list[Shown](), list[Shown]()
+    figures, files, shown = list[Shown](), list[Shown](), []
     sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
-        columns = dict(zip(("x_mm", "y_mm", "z0_mm"), points.T, strict=True))
-        charts = bubbles.disk_charts([("z0, mm", points[:, :2], points[:, 2])], edge)
         shapes = ("measured surface", "modes")
         how = " and ".join(used for used in wording.used_of(prepared) if used in shapes)
         words = "surface of the sheet in the reference picture"
         caption = f"{prepared.test.name}: {words} ({how})"
-        figures.append(saved(out, "reference_surface.png", charts, caption))
-        table, what = pd.DataFrame(columns), f"{words}, node by node"
-        files.append(out.write("reference_surface.csv", table, what, "%.6g"))
+        values = {"z0": points[:, 2]}
+        shown.append(
+            ("reference_surface", points[:, :2], values, f"{words}, node by node", caption)
+        )
     if sheet.constant:
         places, field = wording.constant_field(fitted)
-        own = [(f"{DIRECTIONS[k]}, mm", places, field[:, k]) for k in sheet.constant]
-        columns = {f"{DIRECTIONS[k]}_mm": field[:, k] for k in sheet.constant}
-        columns = {"x_mm": places[:, 0], "y_mm": places[:, 1], **columns}
         words = "measured less modelled, as far as it is the same at all pressures"
         caption = f"Taken out of the fit: {words}"
-        figures.append(saved(out, "constant_field.png", bubbles.disk_charts(own, edge), caption))
-        table, what = pd.DataFrame(columns), f"{words}, point by point"
-        files.append(out.write("constant_field.csv", table, what, "%.6g"))
+        values = {DIRECTIONS[k]: field[:, k] for k in sheet.constant}
+        shown.append(("constant_field", places, values, f"{words}, point by point", caption))
+    for stem, places, values, what, caption in shown:
+        own = [(f"{name}, mm", places, column) for name, column in values.items()]
+        figures.append(saved(out, f"{stem}.png", bubbles.disk_charts(own, edge), caption))
+        columns = {"x": places[:, 0], "y": places[:, 1], **values}
+        table = pd.DataFrame(columns).add_suffix("_mm")
+        files.append(out.write(f"{stem}.csv", table, what, "%.6g"))
     return figures, files
 
 
@@ -437,15 +439,12 @@ def recorded_table(taken: RecordedFrames) -> Table:
     return Table("Frames taken", list(columns), rows, note)
 
 
-def clock_pictures(taken: RecordedFrames, out: Output) -> list[Shown]:
-    """Draw pressures of the log beside the heights of all frames; none without a log."""
-    clock = taken.clock
-    if clock is None:
-        return []
+def clock_picture(taken: RecordedFrames, clock: ClockOffset, out: Output) -> Shown:
+    """Draw pressures of the log beside the heights of all frames."""
     times = clock.times + clock.offset
     charts = bubbles.clock_charts(times, clock.pressure, clock.heights, taken.pressure)
     words = "pressures of the log and heights of the frames, by one clock"
-    return [saved(out, "clock.png", charts, words)]
+    return saved(out, "clock.png", charts, words)
 
 
 def registration_table(found: Registration) -> Table:

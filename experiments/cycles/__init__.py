@@ -32,7 +32,7 @@ from ...meshes.strip_models import (
 from ...readers.curves import DIRECTIONS, LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
-from ...readers.sections import Length, Name, Positive, Section
+from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
@@ -194,15 +194,14 @@ class CyclesTest:
 
 def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
     """Read the section of a test, and its histories."""
-    length, folder = place.scales.length, place.folder(section.folder)
-    width = WIDTH if section.width is None else section.width * length
-    gauge = GAUGE if section.gauge_length is None else section.gauge_length * length
-    grips = GRIP_DISTANCE if section.grip_distance is None else section.grip_distance * length
+    section, folder = whole_in_base_units(section, place.scales), place.folder(section.folder)
+    width, gauge = section.width or WIDTH, section.gauge_length or GAUGE
+    grips = section.grip_distance or GRIP_DISTANCE
     if section.files.bias and (section.gauge_length is None or not gauge < grips):
         problem = f"of bias strips expected a length below the distance of the grips, {grips:g} mm"
         raise place.error("gauge_length", problem)
-    said = {key: getattr(section, key) for key in ("load_unit", "length_unit", "strain_unit")}
-    of = None if section.gauge_length is None else gauge
+    keys = ("load_unit", "length_unit", "strain_unit")
+    said = {key: getattr(section, key) for key in keys} | {"length": section.gauge_length}
     specimens: dict[str, Specimen] = {}
     listed = {d: own for d in DIRECTIONS if (own := getattr(section.files, d))}
     if not listed:
@@ -213,7 +212,7 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
             if not place.has(path, key):
                 continue
             columns = section.columns.model_dump(exclude_none=True)
-            history = read_history(path, columns=columns or None, length=of, **said)
+            history = read_history(path, columns=columns or None, **said)
             found = evaluate_history(history, section.reference_load)
             one = specimen_of(direction, found, section.increments)
             if one.name in specimens:
@@ -235,11 +234,11 @@ class HistoryObjective(LoadObjective):
         self, one: Specimen, kept: NDArray[np.bool_], weight: float, noise: float | None
     ) -> None:
         self.rows, peak = np.flatnonzero(kept), float(one.load.max())
-        self.elongation, self.load = one.strain[self.rows], one.load[self.rows]
+        self.elongation, self.measured = one.strain[self.rows], one.load[self.rows]
         _, number, count = np.unique(one.branch[self.rows], return_inverse=True, return_counts=True)
         self.sizes, self.specimens, self.alike = (len(self.rows),), None, 1.0
         self.sample = np.eye(len(kept))[self.rows]
-        self._unit = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
+        self.scale = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
         self.least_noise = NOISE * peak if noise is None else noise
         self.noise_is = "assumed" if noise is None else "given"
 

@@ -285,7 +285,7 @@ MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetiti
 
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
-    """Return mean and scatter of the repetitions on a grid, of the tests that were measured."""
+    """Return mean and scatter of the repetitions on a grid; one test at least was measured."""
     import pandas as pd
 
     parts = []
@@ -294,7 +294,7 @@ def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
             s = scatter(test.measured)
             values = ([test.name] * len(s.mean), s.deflection, s.mean, s.deviation, s.count)
             parts.append(pd.DataFrame(dict(zip(MEASURED, values, strict=True))))
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(MEASURED))
+    return pd.concat(parts, ignore_index=True)
 
 
 def place_names(tests: Iterable[CylinderTest]) -> list[str]:

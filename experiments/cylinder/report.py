@@ -338,15 +338,11 @@ def _write_tables(
         for k, column in enumerate((run.test.name, run.card, run.wall)):
             curve.insert(k, ("test", "card", "wall")[k], column)
     what = "every curve: deflection, load, pressure, volume, wrinkled share"
-    found = [
-        (CURVES, pd.concat(curves), what),
-        (MEASURED, measured_table(tests), "mean and scatter of the repetitions on a grid"),
-    ]
-    return [
-        out.write(name, table, what, None)
-        for name, table, what in found
-        if len(table) or name == CURVES
-    ]
+    files = [out.write(CURVES, pd.concat(curves), what, None)]
+    if any(test.measured for test in tests):
+        what = "mean and scatter of the repetitions on a grid"
+        files.append(out.write(MEASURED, measured_table(tests), what, None))
+    return files
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:

@@ -109,9 +109,10 @@ def virtual_strain_gauge(
     point of a square grid (1.41 there); points scattered at random need about 2.5."""
     if not np.isfinite(max_gap):
         raise InputError(None, "max_gap", f"expected a finite number, got {max_gap:g}")
-    ends = [_end(lower, "lower"), _end(upper, "upper")]
-    if not frames:
-        raise InputError(None, "frames", "expected at least one, got none")
+    ends = [np.asarray(end, dtype=float) for end in (lower, upper)]
+    for name, end in zip(("lower", "upper"), ends, strict=True):
+        if not np.isfinite(end).all():
+            raise InputError(None, name, f"expected x and y in mm, got {end.tolist()}")
     if np.array_equal(ends[0], ends[1]):
         raise InputError(None, "gauge", "lower and upper are the same point; expected two")
     seen: list[Surface | None] = []
@@ -162,13 +163,6 @@ def virtual_strain_gauge(
     further = length - reference
     strains = further / reference, np.log(length / reference)
     return GaugeRecord(reference, length, further, *strains, lost, tuple(warnings))
-
-
-def _end(point: ArrayLike, name: str) -> Array:
-    end = np.asarray(point, dtype=float)
-    if end.shape != (2,) or not np.isfinite(end).all():
-        raise InputError(None, name, f"expected x and y in mm, got {point!r}")
-    return end
 
 
 def gauge_load_curve(

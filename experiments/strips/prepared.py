@@ -15,7 +15,6 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
 from ...inference.comparison import Comparison, NoiseIs
 from ...inference.noise import alike
 from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
@@ -54,30 +53,22 @@ class LoadObjective:
         alike: float = 1.0, specimens: ArrayLike | None = None,
     ) -> None:  # fmt: skip
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
-        self.elongation, self.load = np.asarray(elongation, float), np.asarray(load, float)
+        self.elongation, self.measured = np.asarray(elongation, float), np.asarray(load, float)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
         from scipy.interpolate import CubicSpline
 
         curve = CubicSpline(knots, np.eye(len(knots)))
         self.sample = curve(self.elongation)[:, 1:]
         self.steep = curve(self.elongation, 1)[:, 1:]
-        self.sizes = (len(self.load),)
-        self.weight, self.least_noise, self.noise_is = weight, least_noise, noise_is
+        self.sizes = (len(self.measured),)
+        self.least_noise, self.noise_is = least_noise, noise_is
         self.specimens = None if specimens is None else np.asarray(specimens)
-        self.alike = min(max(alike, 1.0), float(len(self.load)))
-        self._unit = scale * np.sqrt(len(self.load)) / weight
-
-    @property
-    def scale(self) -> Array:
-        return np.full(len(self.load), self._unit)
-
-    @property
-    def measured(self) -> Array:
-        return self.load
+        self.alike = min(max(alike, 1.0), float(len(self.measured)))
+        self.scale = np.full(len(self.measured), scale * np.sqrt(len(self.measured)) / weight)
 
     @property
     def data(self) -> tuple[Array, ...]:
-        return self.elongation, self.load
+        return self.elongation, self.measured
 
     @property
     def places(self) -> tuple[Array, ...]:
@@ -89,7 +80,7 @@ class LoadObjective:
 
     def shifted(self, here: History, there: History) -> LoadObjective:
         other = copy.copy(self)
-        other.load = self.load - self.sample @ (here.load - there.load)
+        other.measured = self.measured - self.sample @ (here.load - there.load)
         return other
 
     def modelled(self, history: History) -> Array:
@@ -97,29 +88,25 @@ class LoadObjective:
         return np.asarray(self.sample @ history.load)
 
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
-        return np.asarray((self.modelled(history) - self.load) / self._unit)
+        return np.asarray((self.modelled(history) - self.measured) / self.scale)
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        if history.load_slope is None:
-            raise InputError(None, "history", "the solver gives no derivatives of the load")
-        return np.asarray(self.sample @ history.load_slope / np.reshape(self._unit, (-1, 1)))
+        assert history.load_slope is not None
+        return np.asarray(self.sample @ history.load_slope / self.scale[:, None])
 
     def causes(self, history: History) -> dict[str, Array]:
         """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
-        slope = self.steep @ history.load / self._unit
+        slope = self.steep @ history.load / self.scale
         return {
             "loads off by {:+.2g} N (zero the load cell, name the preload)":
-                np.full((len(self.load), 1), 1.0 / self._unit),
+                (1.0 / self.scale)[:, None],
             "elongations off by {:+.2g} mm (count them from the preload)": -slope[:, None],
             "a gauge length off by {:+.1%} (measure it)": (slope * self.elongation)[:, None],
         }  # fmt: skip
 
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        return np.empty((len(self.load), 0))
-
     def rms(self, history: History) -> float:
         """Return RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
-        return float(np.sqrt(np.mean((self.modelled(history) - self.load) ** 2)))
+        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
 
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of

@@ -70,7 +70,7 @@ def misfit_table(strips: Sequence[FittedPart]) -> Table:
     for s in strips:
         p = s.data.polynomial
         rows.append([s.data.direction, s.rms, s.data.scatter, p and p.r_squared, p and p.rmse,
-                     len(s.objective.load), float(s.history.load[-1])])  # fmt: skip
+                     len(s.objective.measured), float(s.history.load[-1])])  # fmt: skip
     header = ["strip", "RMS error, N", "scatter of specimens, N", "R² of polynomial",
               "its RMSE, N", "points matched", "load at the end, N"]  # fmt: skip
     note = (
@@ -233,7 +233,7 @@ def findings(prepared: PreparedStrips, fitted: FittedTest) -> Findings:
     numbers = {
         s.data.direction: {
             "rms_N": s.rms, "scatter_N": s.data.scatter, "weight": test.weights[s.data.direction],
-            "matched": len(s.objective.load), "gauge_length_mm": s.data.gauge_length,
+            "matched": len(s.objective.measured), "gauge_length_mm": s.data.gauge_length,
             "final_length_mm": s.data.final_length, "end_load_N": float(s.history.load[-1]),
         }
         for s in strips
@@ -377,7 +377,7 @@ def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load."""
     parts = []
     for s in prepared.fitted_parts(fitted):
-        modelled, measured = s.objective.modelled(s.history), s.objective.load
+        modelled, measured = s.objective.modelled(s.history), s.objective.measured
         columns = {
             "part": s.data.direction, "elongation_mm": s.objective.elongation, "quantity": "load",
             "measured": measured, "modelled": modelled, "difference": modelled - measured,

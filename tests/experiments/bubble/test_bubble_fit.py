@@ -158,7 +158,7 @@ def test_the_same_places_from_other_nodes():
         FieldTarget(p, np.zeros((n, 3)), sample, places=np.arange(n))
         for p, n, sample in ((0.1, len(OWN.points), None), (0.2, 3, some), (0.3, 3, some))
     )
-    every, one, two = resampled(targets, OWN, OTHER)
+    every, one, two = resampled(targets, OWN, SmoothReading.of(OTHER))
     assert one.sample is two.sample is not every.sample
     assert [t.pressure for t in (every, one, two)] == [0.1, 0.2, 0.3]
     assert one.places is targets[1].places and targets[0].sample is None

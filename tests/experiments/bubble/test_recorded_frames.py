@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bubblefit.experiments.bubble.findings import recorded_lines, recorded_numbers
 from bubblefit.experiments.bubble.prepared import prepare
-from bubblefit.experiments.bubble.report import clock_pictures, recorded_table
+from bubblefit.experiments.bubble.report import clock_picture, recorded_table
 from bubblefit.experiments.kinds import Output
 from bubblefit.project.project import read_project
 from bubblefit.readers.pressure_log import picture_numbers
@@ -133,7 +133,7 @@ def test_a_log_in_volts_with_a_clock_of_its_own(folder, tmp_path):
     assert f"uncertain by {np.mean([*each.values()]):.2g} kPa" in second
     table = recorded_table(taken)
     assert table.header[-1] == "uncertain by the clocks, +- kPa" and second in table.note
-    ((name, _),) = clock_pictures(taken, Output(tmp_path))
+    name, _ = clock_picture(taken, taken.clock, Output(tmp_path))
     assert (tmp_path / name).stat().st_size > 20_000
     # Given, nothing is looked for.
     given = bubble(project(folder, LOG.format(more="") + f"offset = {AHEAD}\n"))

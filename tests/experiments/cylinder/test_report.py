@@ -111,7 +111,6 @@ def test_curves_and_readings():
     assert list(table.columns) == columns.split()
     assert len(table) == 61 and set(table["test"]) == {"x"}
     assert table.iloc[30].tolist()[1:] == pytest.approx([15.0, 29.5, np.sqrt(0.5), 2])
-    assert list(measured_table([y]).columns) == list(table.columns)
     runs = run(x, "soft"), run(x, "soft", failure="killed")
     outcome = outcome_of(*runs, bent={0: replace(BENT, wrinkled=np.empty(0))})
     curve, none = outcome.curve(0), outcome.curve(1)

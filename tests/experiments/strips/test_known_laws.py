@@ -154,7 +154,7 @@ def test_the_objective_is_the_sum_of_rms_errors_as_printed():
     point = fit.evaluate(near(CUBIC, LAW), False)
     total = 0.0
     for experiment, history in zip(fit.comparisons, point.histories, strict=True):
-        difference = history.load - experiment.objective.load
+        difference = history.load - experiment.objective.measured
         rms = np.sqrt(np.sum(difference**2) / len(difference))
         assert rms > 1.0
         assert experiment.objective.rms(history) == pytest.approx(rms)

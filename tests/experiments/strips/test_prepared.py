@@ -75,17 +75,17 @@ def test_a_comparison_a_direction(published):
     assert [c.stage for c in compared] == [0, 0, 1] and all(c.contracts for c in compared)
     assert not any(c.must_be_stable or c.nuisance for c in compared)
     assert len({id(c.solver) for c in compared}) == 3
-    assert [len(c.objective.load) for c in compared] == [5, 5, 5]
+    assert [len(c.objective.measured) for c in compared] == [5, 5, 5]
     assert [c.objective.least_noise for c in compared] == [21.7, 64.1, 40.3]
     load = prepared.test.strips["warp"].polynomial(compared[0].model.elongations)
-    np.testing.assert_allclose(compared[0].objective.load, load)
+    np.testing.assert_allclose(compared[0].objective.measured, load)
 
 
 def test_weights_and_units_of_the_errors(published):
     relative = ('objective = "N"', 'objective = "relative"')
     plain, alone = published(), published(relative)
     assert "N" in plain.objective_is and "largest load" in alone.objective_is
-    largest = [c.objective.load.max() for c in plain.comparisons(MembraneSolver, Weighting())]
+    largest = [c.objective.measured.max() for c in plain.comparisons(MembraneSolver, Weighting())]
     newtons, shares = list(norms(plain).values()), list(norms(alone).values())
     assert min(newtons) > 1
     assert shares == pytest.approx([rms / load for rms, load in zip(newtons, largest, strict=True)])
@@ -107,7 +107,7 @@ def test_specimens_of_points_can_be_left_out(published, exported):
     masks = {"strips: warp": whose["warp"] == 1}
     warp, fill, _ = prepared.comparisons(MembraneSolver, Weighting(), masks)
     np.testing.assert_allclose(warp.objective.elongation, 0.9 * np.linspace(0, 4, 21), atol=1e-6)
-    assert len(fill.objective.load) == 21
+    assert len(fill.objective.measured) == 21
     assert prepared.reach(masks).break_shares[1] == prepared.test.reach.break_shares[1]
 
 
