@@ -380,11 +380,25 @@ def cache_folder() -> Path:
 
 @cache
 def _kernel_folder() -> Path | None:
-    """Return the folder of the kernels compiled from exactly these sources; None if unwritable."""
-    digest = hashlib.sha256()
+    """Return the folder of the kernels compiled from exactly these sources; None if unwritable.
+
+    A new one starts with the kernels that came with the installation, if any: numba takes those
+    that were compiled by its own version for this processor, and compiles the others.
+    """
+    digest = hashlib.sha256(__version__.encode())
     for name in KERNELS:
         digest.update((ROOT / name).read_bytes())
-    folder = cache_folder() / f"kernels-{digest.hexdigest()[:12]}"
+    name = f"kernels-{digest.hexdigest()[:12]}"
+    folder = cache_folder() / name
+    if (ROOT / name).is_dir() and not folder.exists():
+        import shutil
+
+        # Another process may do the same: whole or not there.
+        fresh = folder.with_name(f"{name}-{os.getpid()}")
+        with suppress(OSError):
+            shutil.copytree(ROOT / name, fresh)
+            fresh.rename(folder)
+        shutil.rmtree(fresh, ignore_errors=True)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -416,17 +430,39 @@ class Compiled:
         for name in self.function.__code__.co_names:
             if isinstance(other := names.get(name), Compiled):
                 names[name] = other.dispatcher
-        folder = _kernel_folder()
-        # numba reads this setting once, here; other packages' functions keep their own.
-        settings: Any = numba.config
-        before = settings.CACHE_DIR
-        settings.CACHE_DIR = str(folder or before)
-        try:
-            made = numba.njit(cache=folder is not None, **self.options)(self.function)
-        finally:
-            settings.CACHE_DIR = before
+        made = numba.njit(**self.options)(self.function)
+        if folder := _kernel_folder():
+            made._cache = _kernel_cache(folder)(self.function)
         names[self.function.__name__] = made
         return made
+
+
+@cache
+def _kernel_cache(folder: Path) -> Any:
+    """Return numba's cache of functions with its files in a folder, wherever the sources lie."""
+    from numba.core import caching
+
+    class Locator(caching._CacheLocator):  # type: ignore[misc]
+        def __init__(self, function: Any, file: str) -> None:
+            self.line, self._py_file = str(function.__code__.co_firstlineno), file
+
+        def get_cache_path(self) -> str:
+            return str(folder)
+
+        def get_source_stamp(self) -> str:
+            return folder.name
+
+        def get_disambiguator(self) -> str:
+            return self.line
+
+        @classmethod
+        def from_function(cls, function: Any, file: str) -> Any:
+            return cls(function, file)
+
+    class Results(caching.CompileResultCacheImpl):  # type: ignore[misc]
+        _locator_classes = (Locator,)
+
+    return type("Cache", (caching.FunctionCache,), {"_impl_class": Results})
 
 
 def compiled(**options: Any) -> Callable[[Any], Any]:

@@ -1,6 +1,11 @@
-"""The repository root is the package `bubblefit`: which of its folders are packages of it."""
+"""The repository root is the package `bubblefit`: which of its folders are packages of it.
+
+What needs the dependencies, the pages of the Python interface and the compiled kernels, is left out
+of the package where the environment that builds it does not have them.
+"""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,19 +17,35 @@ from setuptools.command.build_py import build_py
 APART = ("tests", "benchmarks", "examples", "docs", "build", "out")
 
 
+#: Compiles what fits use, in the user's cache as a first fit would; prints the folder.
+COMPILE = """
+import bubblefit as bf
+from bubblefit import files
+for name in ("biaxial-computed", "bubble-known-solution"):
+    bf.fit(bf.read_project(f"{bf.__path__[0]}/examples/{name}/project.toml"), starts=1)
+print(files._kernel_folder() or "")
+"""
+
+
 class Modules(build_py):
-    """Leave this file out of the package, and add the pages of the Python interface to it."""
+    """Leave this file out of the package; add what is made: pages of the interface, kernels."""
 
     def run(self):
-        """Build; the pages are left out where the dependencies are not installed."""
+        """Build."""
         super().run()
         if not self.editable_mode:
-            pages = Path(self.build_lib, "bubblefit/docs/reference/api")
-            subprocess.run(
-                [sys.executable, "docs/make_api.py", pages],
-                env=os.environ | {"PYTHONPATH": os.path.abspath(self.build_lib)},
-                capture_output=True,
-            )
+            package = Path(self.build_lib, "bubblefit")
+            self.made("docs/make_api.py", package / "docs/reference/api")
+            kernels = Path(self.made("-c", COMPILE))
+            if kernels.name:
+                shutil.copytree(kernels, package / kernels.name, dirs_exist_ok=True)
+
+    def made(self, *arguments):
+        """Run Python on the modules that are built; return the last line that it prints."""
+        python = [sys.executable, *arguments]
+        path = {"PYTHONPATH": os.path.abspath(self.build_lib)}
+        done = subprocess.run(python, env=os.environ | path, capture_output=True, text=True)
+        return done.stdout.strip().rpartition("\n")[2] if done.returncode == 0 else ""
 
     def find_package_modules(self, package, package_dir):
         """(package, module, path) of what is installed."""
