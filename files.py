@@ -442,7 +442,7 @@ def _kernel_cache(folder: Path) -> Any:
     """Return numba's cache of functions with its files in a folder, wherever the sources lie."""
     from numba.core import caching
 
-    class Locator(caching._CacheLocator):  # type: ignore[misc]
+    class Locator(caching._CacheLocator):
         def __init__(self, function: Any, file: str) -> None:
             self.line, self._py_file = str(function.__code__.co_firstlineno), file
 
@@ -459,10 +459,9 @@ def _kernel_cache(folder: Path) -> Any:
         def from_function(cls, function: Any, file: str) -> Any:
             return cls(function, file)
 
-    class Results(caching.CompileResultCacheImpl):  # type: ignore[misc]
-        _locator_classes = (Locator,)
-
-    return type("Cache", (caching.FunctionCache,), {"_impl_class": Results})
+    # Attributes are given to `type`: numba has changed the types that it declares for them.
+    results = type("Results", (caching.CompileResultCacheImpl,), {"_locator_classes": [Locator]})
+    return type("Cache", (caching.FunctionCache,), {"_impl_class": results})
 
 
 def compiled(**options: Any) -> Callable[[Any], Any]:
