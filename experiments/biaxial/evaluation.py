@@ -174,19 +174,14 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
                     stiff[own] = line.load[own] / line.strain[own]
                 if unloaded and line.strain[1 - own] > 0:
                     nu[own] = -line.strain[own] / line.strain[1 - own]
-        table.append({**row, **_standard(ends, stiff, nu, _percent(k.after))})
-    c, nothing = found.chosen.constants, np.full((2, 2), np.nan)
-    row = {"file": "", "ratio": "all", "load_cycles": sum(k.cycles for k in found.kept)}
-    together = np.array([c.warp, c.fill]), np.array([c.nu_warp, c.nu_fill])
-    table.append({**row, "cycle_evaluated": "", **_standard(nothing, *together, nothing[0])})
-    return pd.DataFrame(table)
-
-
-def _standard(ends: Array, stiff: Array, nu: Array, kept: Array) -> dict[str, float]:
-    return _by_yarn(
-        from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
-        strain_kept_percent=kept,
-    )  # fmt: skip
+        table.append(row | _by_yarn(
+            from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
+            strain_kept_percent=_percent(k.after),
+        ))  # fmt: skip
+    c, count = found.chosen.constants, sum(k.cycles for k in found.kept)
+    row = {"file": "", "ratio": "all", "load_cycles": count, "cycle_evaluated": ""}
+    together = _by_yarn(stiffness_kN_per_m=(c.warp, c.fill), poisson=(c.nu_warp, c.nu_fill))
+    return pd.DataFrame([*table, row | together])
 
 
 def _by_yarn(**pairs: ArrayLike) -> dict[str, float]:

@@ -610,8 +610,7 @@ def register(
         rest = (rim.angle - angle) % 180.0 if rim.angle else 0.0
         rim = Rim(0.0, 0.0, rest, rim.error, rim.turn_error)
     full = turn.after(placement)
-    x = full.axes @ np.array([1.0, 0.0, 0.0])
-    from_camera_x = line_angle(-float(np.degrees(np.arctan2(x[1], x[0]))))
+    from_camera_x = line_angle(-float(np.degrees(np.arctan2(full.axes[1, 0], full.axes[0, 0]))))
     return turn.applied(moved), Registration(
         full, plane_of, flatness, rim, warp, from_camera_x, motions, options
     )

@@ -51,21 +51,20 @@ class FilterSection(sections.Section):
     step: sections.Length | None = None
 
 
-def facet_of(
-    section: FilterSection | None, place: Place, scale: float, symmetry: str, match: str
-) -> Facet | None:
-    """Return the facet in mm, None without one; scale: mm per unit; raises InputError."""
-    if section is None:
+def facet_of(section: BubbleSection, place: Place) -> Facet | None:
+    """Return the facet in mm, None without one; raises InputError."""
+    given = None if section.data.points is None else section.data.points.filter
+    if given is None:
         return None
-    at = "data.points.filter"
-    if symmetry == "quarter":
+    at, scale = "data.points.filter", place.scales.length
+    if section.symmetry == "quarter":
         problem = 'a facet reaches over the edge of a quarter; expected symmetry = "full"'
         raise place.error(at, problem)
-    if match != "points":
+    if section.match.by != "points":
         raise place.error(at, "surfaces are matched, not points: leave this out")
-    step = None if section.step is None else section.step * scale
+    step = None if given.step is None else given.step * scale
     with place.naming(at):
-        return Facet(section.facet * scale, section.order, section.smoothing, step)
+        return Facet(given.facet * scale, given.order, given.smoothing, step)
 
 
 class EllipseSection(sections.Section):
@@ -162,21 +161,14 @@ def registration_options(
     """Return the given steps in mm, None without a section; scale: mm per unit of the files."""
     if section is None:
         return None
-    marks = [_point(one, scale) for one in section.warp_points or ()]
+    said = section.model_dump(exclude={"warp_is", "centre", "warp_points"})
+    centre, *marks = (
+        None if one is None else tuple(scale * value for value in one)
+        for one in (section.centre, *(section.warp_points or ()))
+    )
+    said |= {"centre": centre, "warp_points": tuple(marks) or None}
     with place.naming("data.points.registration"):
-        return RegistrationOptions(
-            plane=section.plane,
-            centre=None if section.centre is None else _point(section.centre, scale),
-            warp=section.warp,
-            warp_points=(marks[0], marks[1]) if marks else None,
-            warp_is_stiff=section.warp_is == "stiff",
-            remove_clamp_motion=section.remove_clamp_motion,
-        )
-
-
-def _point(given: list[float], scale: float) -> tuple[float, float, float]:
-    x, y, z = (scale * value for value in given)
-    return x, y, z
+        return RegistrationOptions(**said, warp_is_stiff=section.warp_is == "stiff")
 
 
 def with_units(said: Mapping[str, Any], scales: Scales) -> dict[str, Any]:
@@ -256,14 +248,11 @@ def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float
     return {name: found[name] for name in LEFT_OPEN if name in found}
 
 
-def sheet_of(
-    section: SheetSection, place: Place, pressures: Sequence[float], symmetry: str, of_files: bool,
-    offset: bool,
-) -> Sheet:  # fmt: skip
-    """Return the section in mm; pressures in MPa; raises InputError for keys at odds.
-    of_files : the data are measured points. offset : a displacement offset is an unknown."""
+def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> Sheet:
+    """Return the sheet in mm; pressures in MPa; raises InputError for keys at odds."""
+    section, offset = of.sheet, of.nuisance.displacement_offset
     for key in ("surface", "rim"):
-        if not of_files and getattr(section, key) == "measured":
+        if of.data.points is None and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
     given, since = section.model_fields_set, None
     if section.from_pressure is not None:
@@ -272,7 +261,7 @@ def sheet_of(
             problem = f"expected one of several 'pressures', got {section.from_pressure:g}"
             raise place.error("sheet.from_pressure", problem)
         since = int(np.argmax(near))
-    quarter, measured = symmetry == "quarter", section.surface == "measured"
+    quarter, measured = of.symmetry == "quarter", section.surface == "measured"
     unknown, taken = section.modes or section.slack, since is not None or section.constant_field
     stressed = "a surface measured under pressure is not without stress: use modes instead"
     out = "takes up what from_pressure and constant_field take out; use one of them"

@@ -231,9 +231,6 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
             clamp, _ = clamp_radius(fields, measured.registration)
     outline = outline_of(section, place, clamp)
     source = data_source(section, place, pressures, increments, measured)
-    camera = None if section.data.points is None else section.data.points.filter
-    of_files, offset = isinstance(source, PointFiles), section.nuisance.displacement_offset
-    sheet = sheet_of(section.sheet, place, pressures, section.symmetry, of_files, offset)
     return BubbleTest(
         name=name, place=place, weight=section.weight, outline=outline, elements=section.elements,
         symmetry=section.symmetry, generator=section.generator, pressures=pressures,
@@ -242,7 +239,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         noise=None if section.noise is None else section.noise * length,
-        facet=facet_of(camera, place, length, section.symmetry, section.match.by), sheet=sheet,
+        facet=facet_of(section, place), sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
         inflation=section.inflation,
     )  # fmt: skip

@@ -27,10 +27,9 @@ def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, Hist
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N from the reference load on."""
     parts = []
-    for name, history in _by_specimen(prepared, fitted).items():
-        one = prepared.test.matched[name]
-        columns = {"part": name, "cycle": one.cycle, "strain": one.strain, "quantity": "load"}
-        columns |= {"measured": one.load, "modelled": history.load}
+    for p in prepared.fitted_parts(fitted):
+        columns = {"part": p.data.name, "cycle": p.data.cycle, "strain": p.data.strain}
+        columns |= {"quantity": "load", "measured": p.data.load, "modelled": p.history.load}
         table = pd.DataFrame(columns)
         parts.append(table.assign(difference=table["modelled"] - table["measured"], unit="N"))
     return pd.concat(parts, ignore_index=True)
@@ -54,15 +53,10 @@ def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     """Return the RMS errors of the best fit, and the doubts about the histories."""
-    histories = _by_specimen(prepared, fitted)
-    numbers = _numbers(prepared.test, histories)
+    numbers = _numbers(prepared.test, _by_specimen(prepared, fitted))
     notes = [n for one in prepared.test.matched.values() for n in one.evaluated.notes]
-    shares = [
-        100 * np.sqrt(np.mean((h.load - prepared.test.matched[n].load) ** 2))
-        / prepared.test.matched[n].load.max()
-        for n, h in histories.items()
-    ]  # fmt: skip
-    words = f"RMS error of load {max(shares):.2g} % of the largest"
+    share = max(100 * p.rms / p.data.load.max() for p in prepared.fitted_parts(fitted))
+    words = f"RMS error of load {share:.2g} % of the largest"
     return Findings({"rms_N": numbers}, tuple(notes), tuple(_lines(numbers)), words, words)
 
 

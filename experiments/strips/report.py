@@ -85,7 +85,6 @@ Curve = tuple[str, Array, Array]
 
 SMOOTH = 200  # places at which a polynomial is drawn
 FINE = 121  # places at which a modulus is drawn
-ORDERS = range(1, 9)
 
 
 def load_panel(strip: Strip, models: Sequence[Curve], rms: Sequence[float]) -> StripCurves:
@@ -141,7 +140,7 @@ def draw_orders(strips: Sequence[Strip], picture: Path) -> bool:
         specimens = owners if len(set(owners)) > 1 else None
         try:
             scores = compare_orders(
-                *strip.points, ORDERS, through_origin=strip.through_origin, specimens=specimens
+                *strip.points, through_origin=strip.through_origin, specimens=specimens
             )
         except InputError:  # too few points for the highest order, or at too few elongations
             continue

@@ -190,7 +190,12 @@ def test_load_steps_are_in_the_unit_of_the_file():
 def sheet(place: Place = PLACE, **said: Any) -> Sheet:
     how = {"pressures": (0.02, 0.2), "symmetry": "full", "of_files": True, "offset": False}
     how |= {key: said.pop(key) for key in [*how] if key in said}
-    return sheet_of(SheetSection(**said), place, **how)
+    section: Any = SimpleNamespace(
+        sheet=SheetSection(**said), symmetry=how["symmetry"],
+        nuisance=SimpleNamespace(displacement_offset=how["offset"]),
+        data=SimpleNamespace(points="points" if how["of_files"] else None),
+    )  # fmt: skip
+    return sheet_of(section, place, how["pressures"])
 
 
 def test_what_a_section_says_of_the_sheet():
