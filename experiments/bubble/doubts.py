@@ -15,6 +15,7 @@ from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ..kinds import Array, Doubt, Expected
 from . import registration
+from .registration import MAD
 from .sheet import fit_disk_polynomial
 
 #: Of the highest rise: a centre that sinks by more while the pressure rises is no noise.
@@ -44,8 +45,6 @@ SHAPE, DEGREE = 0.004, 4
 GROSS, OF_RISE, SMOOTH, ROUNDS, WELL_INSIDE = 10.0, 0.04, 8, 5, 0.95
 #: Points of a frame that are enough to look at; of more, every so many.
 ENOUGH = 4000
-#: A median absolute deviation of a normal distribution in standard deviations.
-MAD = 1.4826
 #: Degrees.
 TILT, STEEP, TURN = 1.2, 8.0, 5.0
 #: Standard errors that a place or an angle must be off by.

@@ -63,10 +63,11 @@ class FieldTarget:
         return np.asarray(self.sample @ nodal.reshape(len(nodal), -1)).reshape(-1, *nodal.shape[1:])
 
     def only(self, which: NDArray[Any]) -> FieldTarget:
-        """Return the target of some of its places; `sample` is left as it is."""
-        places = None if self.places is None else self.places[which]
-        rest = None if self.at_rest is None else self.at_rest[which]
-        return replace(self, displacement=self.displacement[which], places=places, at_rest=rest)
+        """Return the target of some of its places."""
+        columns = self.sample, self.places, self.at_rest
+        sample, places, rest = (None if own is None else own[which] for own in columns)
+        moved = self.displacement[which]
+        return replace(self, displacement=moved, sample=sample, places=places, at_rest=rest)
 
     def of(self, frames: Array, number: int) -> Array:
         """Return that of frames (frames, nodes, ...), as target `number` of its objective."""
@@ -452,7 +453,5 @@ def counted_from(targets: Sequence[FieldTarget], since: int) -> list[FieldTarget
             )
             raise InputError(None, "sheet.from_pressure", problem)
         moved = target.displacement[mine] - origin.displacement[its]
-        sample = None if target.sample is None else target.sample[mine]
-        own = target.only(mine)
-        relative.append(replace(own, displacement=moved, sample=sample, frame=k, since=since))
+        relative.append(replace(target.only(mine), displacement=moved, frame=k, since=since))
     return relative

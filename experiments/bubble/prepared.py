@@ -344,11 +344,9 @@ def kept_targets(
         if not own.any():
             continue
         frame = k if target.frame is None else target.frame
-        whole = target.sample
-        if whole is None and not own.all():
-            whole = scipy.sparse.identity(len(own), format="csr")
-        sample = None if whole is None else scipy.sparse.csr_matrix(whole[own])
-        kept.append(replace(target.only(own), sample=sample, frame=frame))
+        if target.sample is None and not own.all():
+            target = replace(target, sample=scipy.sparse.identity(len(own), format="csr"))
+        kept.append(replace(target.only(own), frame=frame))
     return kept
 
 

@@ -27,7 +27,8 @@ Point = tuple[float, float, float]
 PlaneOf = Literal["found", "clamp", "edge", "camera"]
 #: Points further from the plane than this many robust deviations do not count.
 FAR = 4.0
-ROUNDS = 20
+#: Rounds of a search, of points of a plane and of a circle.
+ROUNDS = 8
 #: A median absolute deviation of a normal distribution in standard deviations.
 MAD = 1.4826
 #: Points from this share of the rim's radius on are on the clamp, and so many of them are needed.
@@ -101,11 +102,6 @@ def plane_through(points: Array, up: Array) -> tuple[Placement, float]:
 def line_angle(degrees: float) -> float:
     """Return the angle of a line, which repeats after 180 degrees: from -90 to below 90."""
     return (degrees + 90.0) % 180.0 - 90.0
-
-
-def axes_angle(degrees: float) -> float:
-    """Return the angle of two axes at right angles, which repeats after 90: -45 to below 45."""
-    return (degrees + 45.0) % 90.0 - 45.0
 
 
 def in_all_quarters(points: NDArray[np.float64]) -> bool:
@@ -319,8 +315,8 @@ def clamp_of_motion(
     return Rim(x, y, angle, error, scale=size, still=int(beyond.sum()))
 
 
-#: Rounds of the search for a circle, and the change of its size after which it ends.
-ROUNDS, ENDED = 8, 1e-4
+#: Change of a circle's size after which the search for it ends.
+ENDED = 1e-4
 
 
 def clamp_radius(
@@ -408,8 +404,8 @@ class Axes:
 
     @property
     def off(self) -> float:
-        """Return the turn from x and y, degrees, from -45 to below 45."""
-        return axes_angle(self.angle)
+        """Return the turn from x and y, degrees, which repeats after 90: from -45 to below 45."""
+        return (self.angle + 45.0) % 90.0 - 45.0
 
 
 def symmetry_axes(frames: Sequence[Frame], radius: float) -> Axes:

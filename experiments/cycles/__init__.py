@@ -35,13 +35,12 @@ from ...readers.histories import Pace, pace_of, read_history
 from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
+from ..kinds import Array, Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
 from ..measured import MeasuredKind, PreparedParts
 from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
 from .evaluation import EvaluatedHistory, evaluate_history, matched_rows
 
-Array = NDArray[np.float64]
 #: mm of a gauge whose length does not matter; edges of the bias strip's quads over the usual ones.
 GAUGE, COARSER = 100.0, 0.4
 #: Of the largest load: noise of one load unless the project says it. Least strain of a reading.

@@ -32,12 +32,11 @@ from ...readers.histories import (
     passage,
     read_history,
 )
-from ..kinds import READING
+from ..kinds import READING, Array
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 SLIP, DRIFT = NoteKind("extensometer slip", 3.0), NoteKind("extensometer drift", 2.0)
 GRIPS, CHANGING = NoteKind("strain between grips", 1.0), NoteKind("not conditioned", 1.0)
 #: Of a cycle's peak: the ends of the tangent stiffness.

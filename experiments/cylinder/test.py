@@ -276,18 +276,20 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
     if deflections is None:
         end = own.deflection or DEFLECTION
         deflections = np.linspace(0.0, end, (own.frames or FRAMES) + 1)[1:].tolist()
-    cords = tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(own.cord))
+    shared: dict[str, Any] = {
+        "name": name, "place": place, "diameter": own.diameter, "deflections": tuple(deflections),
+        "reads_files": bool(section.measured.files),
+        "cords": tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(own.cord)),
+    }  # fmt: skip
     if own.model == "beam":
-        return _beam(section, place, name, deflections, cords)
+        return _beam(section, own, shared)
     usual = RigidSupports()
     with place.naming(keys=KEYS):
         collar = usual_collar(own.diameter)
         if own.collar is not None:
             collar = Collar(**own.collar.model_dump(exclude_none=True))
         test = CylinderTest(
-            name=name,
-            place=place,
-            diameter=own.diameter,
+            **shared,
             pressure=own.pressure,
             length=own.length or LENGTH,
             seam_width=SEAM_WIDTH if own.seam_width is None else own.seam_width,
@@ -296,16 +298,13 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
             cap_warp=own.cap_warp,
             supports=RigidSupports(own.span or usual.span, own.support_diameter or usual.diameter),
             collar=collar,
-            deflections=tuple(deflections),
             gas=Gas(**own.gas.model_dump(exclude_none=True)),
             reading=curve_reading(own.diameter, own.places, own.slope_over),
-            cords=cords,
         )
         test.model()
     return replace(
         test,
         measured=read_measured(section.measured, place),
-        reads_files=bool(section.measured.files),
         assumed=tuple(words for key, words in USUAL.items() if getattr(own, key) is None),
     )
 
@@ -354,22 +353,18 @@ def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedW
         return PlainWall(**values, wrinkles=section.wrinkles)
 
 
-def _beam(
-    section: CylinderSection, place: Place, name: str, deflections: Sequence[float],
-    cords: tuple[Cord, ...],
-) -> CylinderTest:  # fmt: skip
-    """Read the section of a beam."""
+def _beam(section: CylinderSection, own: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
+    """Read the section of a beam; own : in base units. shared : by fields of any test."""
+    place = shared["place"]
     if section.wall is None:
         raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
-    wall, own = (
-        _wall(section.wall, section.pressure, place),
-        whole_in_base_units(section, place.scales),
-    )
+    wall = _wall(section.wall, section.pressure, place)
     with place.naming(keys={**KEYS, "angle": "wall.angle"}):
         beam = BeamModel(
-            TubeSection(0.5 * own.diameter, own.pressure, wall, cords),
-            own.span or RigidSupports().span, deflections, own.load_spacing or 0.0,
-            load_width=own.load_width or 0.0, roller_below=own.roller_below_axis or 0.0,
+            TubeSection(0.5 * own.diameter, own.pressure, wall, shared["cords"]),
+            own.span or RigidSupports().span, list(shared["deflections"]),
+            own.load_spacing or 0.0, load_width=own.load_width or 0.0,
+            roller_below=own.roller_below_axis or 0.0,
             weight=1e-3 * GRAVITY * (own.mass_per_length or 0.0), friction=own.friction or 0.0,
             size=own.element_size or SIZE,
             reading=curve_reading(own.diameter, own.places, own.slope_over),
@@ -378,11 +373,10 @@ def _beam(
     assumed += ["constant pressure while bending"]
     assumed += ["weightless tube"] if section.mass_per_length is None else []
     return CylinderTest(
-        name=name, place=place, diameter=own.diameter, pressure=beam.pressure, length=beam.span,
-        seam_width=0.0, size=beam.size, symmetry="quarter", cap_warp="x", supports=beam.supports,
-        collar=beam.collar, deflections=tuple(deflections), gas=Gas(), reading=beam.reading,
-        cords=cords, beam=beam, measured=read_measured(section.measured, place),
-        reads_files=bool(section.measured.files), assumed=tuple(assumed),
+        **shared, pressure=beam.pressure, length=beam.span, seam_width=0.0, size=beam.size,
+        symmetry="quarter", cap_warp="x", supports=beam.supports, collar=beam.collar, gas=Gas(),
+        reading=beam.reading, beam=beam, measured=read_measured(section.measured, place),
+        assumed=tuple(assumed),
     )  # fmt: skip
 
 
