@@ -20,7 +20,8 @@ from .terminal import FILE, WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
     from ..project.project import Project
-    from ..runs.result import Answered, Fit
+    from ..runs.estimate import Estimate
+    from ..runs.result import Fit
 
 #: Words for the modulus in the table of the terminal.
 WORDS = {"E1": "along warp", "E2": "along fill", "G12": "in shear"}
@@ -190,7 +191,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     ]
 
 
-def modulus_lines(fit: Answered) -> list[str]:
+def modulus_lines(fit: Fit | Estimate) -> list[str]:
     """Return a table: each modulus at a few strains, in MPa and kN/m, with sigma and band."""
     from ..inference.posterior import LEVEL
     from ..reports.fit_page import sigma_words
@@ -207,7 +208,7 @@ def modulus_lines(fit: Answered) -> list[str]:
         f"{f'{percent(LEVEL)} band, MPa':>20}{'kN/m':>10}",
     ]
     before = ""
-    for one in answers(fit):
+    for one in answers(fit.best, fit.thickness):
         name = f"{one.modulus}, {WORDS[one.modulus]}" if one.modulus != before else ""
         before = one.modulus
         sigma = "not known" if one.sigma is None else sigma_words(one.sigma)

@@ -14,13 +14,12 @@ from rich.console import Console
 from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError
-from ..files import write_text
+from ..files import ROOT, write_text
 from ..project.new_project import writable_kinds, write_project
-from ..project.schema import schema_text
+from ..project.schema import SHIPPED, schema_text
 from .options import numbers
 from .terminal import FILE, command, did_you_mean, wrapped
 
-ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 #: Folders of pages; of two pages with one name the first is meant.
 FOLDERS = ("how-to", "reference", "", "validation", "reference/api")
@@ -35,7 +34,6 @@ KINDS = {
     "joint": ("joint-valmex7318", "bubblefit fit {} --data DIR", "test1.toml"),
 }
 PROJECT = "project.toml"
-SCHEMA = ROOT / "templates" / "project" / "project.schema.json"
 #: First line of an example, where it lies and where it is copied to: editors find the schema by it.
 FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
 COUNT = click.IntRange(0, 99)
@@ -78,7 +76,7 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
     else:
         name, advice, project = KINDS[example or "known"]
         files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
-        for file in (*files, SCHEMA):
+        for file in (*files, SHIPPED):
             _free(folder / file.name)
         written = []
         try:
@@ -86,8 +84,8 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
             for file in files:
                 written.append(folder / file.name)
                 written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
-            written.append(folder / SCHEMA.name)
-            written[-1].write_bytes(SCHEMA.read_bytes())
+            written.append(folder / SHIPPED.name)
+            written[-1].write_bytes(SHIPPED.read_bytes())
         except OSError as error:
             for path in written:  # half an example would be in the way of the next attempt
                 with suppress(OSError):
@@ -126,7 +124,7 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     if "pressures" in said:
         said["pressures"] = numbers(said["pressures"], "--pressures")
     write_project(path, tests, **said)
-    write_text(folder / SCHEMA.name, SCHEMA.read_text(encoding="utf-8"))
+    write_text(folder / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
     if tests["bubble"]:
         words = '[bubble.sheet] surface = "measured" takes the heights z of the files'

@@ -68,13 +68,13 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def checked_keys(section: type[BaseModel], said: Mapping[str, Any], at: str = "") -> dict[str, Any]:
+def checked_keys(section: type[BaseModel], said: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a table says as plain values; InputError names the wrong key."""
     values: dict[str, Any] = plain(said)
     try:
         section.model_validate(values)
     except ValidationError as errors:
-        raise first_error(None, errors, section, at) from None
+        raise first_error(None, errors, section) from None
     return values
 
 

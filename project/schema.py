@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError
 from ..experiments.kinds import Place
 from ..experiments.registry import kind_named, kinds
-from ..files import plug_in_named, plug_ins, toml_of
+from ..files import TEMPLATES, plug_in_named, plug_ins, toml_of
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
@@ -265,7 +265,7 @@ def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]
 
 
 #: The one that is shipped: of the kinds of test and solvers that come with bubblefit.
-SHIPPED = Path(__file__).resolve().parent.parent / "templates" / "project" / "project.schema.json"
+SHIPPED = TEMPLATES / "project" / "project.schema.json"
 DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
 
 

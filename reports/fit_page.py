@@ -228,7 +228,7 @@ def answer_tables(fit: Fit) -> list[Part]:
     tables: list[Part] = []
     for name, words in WORDS.items():
         rows: list[list[object]] = []
-        for one in answers(fit):
+        for one in answers(fit.best, fit.thickness):
             if one.modulus == name and not 0.0 < one.strain < LEAST_STRAIN:
                 ends = one.band or (np.nan, np.nan)
                 cells = [

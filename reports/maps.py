@@ -82,14 +82,15 @@ MOST_PLACES = 700
 
 @dataclass(frozen=True)
 class Panel:
-    """One map: values (places of all loads one after the other,) in a unit.
+    """One map: values (places of all loads one after the other,) in a unit; of a solid, values
+    (loads, faces) that colour it.
     row : in which it stands; maps of a row with the same shades have the same ends of colours."""
 
     name: str
     unit: str
     values: Packed
-    row: int = 0
     shades: Shades = "from least"
+    row: int = 0
 
 
 @dataclass(frozen=True)
@@ -110,16 +111,6 @@ class Maps:
 
 
 @dataclass(frozen=True)
-class Shade:
-    """Values that colour a solid: (loads, faces) in a unit."""
-
-    name: str
-    unit: str
-    values: Packed
-    shades: Shades = "from least"
-
-
-@dataclass(frozen=True)
 class Solid:
     """A surface of quads to turn: points (loads, nodes, 3) mm, faces (m, 4) of node numbers.
     warp : (k, 3) mm, an arrow along the warp, as one line."""
@@ -129,7 +120,7 @@ class Solid:
     slider: str
     points: Packed
     faces: Packed
-    shades: Sequence[Shade]
+    shades: Sequence[Panel]
     caption: str
     alt: str = ""
     warp: Packed | None = None
@@ -160,7 +151,7 @@ def maps_of(
         )
 
     panels = [
-        Panel(f"{title}, {what}", unit, pack(thin(values)), number, shades)
+        Panel(f"{title}, {what}", unit, pack(thin(values)), shades, number)
         for number, (title, unit, *three) in enumerate(rows)
         for what, shades, values in zip(names, BESIDE, three, strict=True)
     ]
@@ -275,14 +266,14 @@ TURN, RAISE = 35.0, 28.0
 CENTRE = (0.5 * (WIDTH - BAR), 0.5 * HEIGHT)
 
 
-def solid_svg(solid: Solid, load: int, shade: int = 0) -> Markup:
-    """Draw the surface at a load, coloured by one of its shades."""
+def solid_svg(solid: Solid, load: int) -> Markup:
+    """Draw the surface at a load, coloured by the first of its shades."""
     every = solid.points.values
     faces = np.rint(solid.faces.values).astype(int)
     flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
     scale = scale_of(every, solid.warp)
     flat = flat * scale * (1.0, -1.0) + CENTRE
-    own = solid.shades[shade]
+    own = solid.shades[0]
     low, high = ends_of(own.values.values, own.shades)
     number = classes(own.values.values[load], low, high)
     colours = COLOURS[own.shades]

@@ -177,7 +177,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
         return [Words([f"Not estimated: {check.not_estimated}"])] if check.not_estimated else []
     rows: list[list[object]] = [
         [one.modulus, 100 * one.strain, one.value, *(one.band or ("", ""))]
-        for one in answers(found)
+        for one in answers(found.best, found.thickness)
     ]
     header = ["modulus", "strain, %", "MPa", f"{percent(LEVEL)} from", "to"]
     gaps: list[list[object]] = [[gap.name, gap.chi, gap.words] for gap in found.gaps]
@@ -306,9 +306,3 @@ def _starts(folder: Path) -> list[Part]:
     ]
     header = ["start", "mesh", "objective", "analyses", "how it ended"]
     return [Facts(facts), *([Table("Starts", header, rows, text=(1, 4))] if rows else [])]
-
-
-def _runs(folder: Path) -> list[Part]:
-    """Return the number of predictions that are kept."""
-    kept = [path for path in (folder / RUNS).glob("*.npz") if not path.name.startswith(".")]
-    return [Facts([("runs that ended", len(kept))])] if kept else []

@@ -138,7 +138,7 @@ class Drawing:
 
 
 class _Converter:
-    """vl-convert, in this process or, where a fork has left its thread behind, in one beside it."""
+    """vl-convert in a process beside this one: a fork would leave its thread behind."""
 
     #: Reads a line of JSON a drawing, writes a line of base64.
     PROGRAM = """
@@ -152,47 +152,27 @@ for line in sys.stdin:
 """
 
     def __init__(self) -> None:
-        self.owner = 0
         self.beside: tuple[int, subprocess.Popen[str]] | None = None
 
-    def __call__(self, name: str, spec: Spec | str, options: Spec) -> bytes:
-        """Return what the function of vl-convert makes of a specification."""
-        self.owner = self.owner or os.getpid()
-        if self.owner == os.getpid():
-            import vl_convert
-
-            made = getattr(vl_convert, name)(spec, **options)
-            return made.encode() if isinstance(made, str) else bytes(made)
-        line = json.dumps([name, spec, options]) + "\n"
-        # Once more where the process was killed, as a machine short of memory may do.
-        made_there = self._asked(line) or self._asked(line)
-        if not made_there:
-            raise OutputError("vl-convert ended before it had drawn a chart")
-        return base64.b64decode(made_there)
-
-    def _asked(self, line: str) -> str:
-        """Return the answer of the process beside this one, "" where it has ended."""
-        if self.beside is None or self.beside[0] != os.getpid():
-            command, pipe = [sys.executable, "-c", self.PROGRAM], subprocess.PIPE
-            self.beside = os.getpid(), subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
-        program = self.beside[1]
-        assert program.stdin is not None and program.stdout is not None
-        answer = ""
-        with suppress(OSError):
-            program.stdin.write(line)
-            program.stdin.flush()
-            answer = program.stdout.readline()
-        if not answer:
+    def __call__(self, kind: str, spec: Spec) -> bytes:
+        """Return a drawing; kind : "png", "svg" or "pdf". OutputError."""
+        line = json.dumps([f"vega_to_{kind}", spec, {"scale": DOTS} if kind == "png" else {}])
+        for _ in range(2):  # once more where it was killed, as a machine short of memory may do
+            if self.beside is None or self.beside[0] != os.getpid():
+                command, pipe = [sys.executable, "-c", self.PROGRAM], subprocess.PIPE
+                own = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+                self.beside = os.getpid(), own
+            program = self.beside[1]
+            assert program.stdin is not None and program.stdout is not None
+            with suppress(OSError):
+                print(line, file=program.stdin, flush=True)
+                if answer := program.stdout.readline():
+                    return base64.b64decode(answer)
             self.beside = None
-        return answer
+        raise OutputError("vl-convert ended before it had drawn a chart")
 
 
-_convert = _Converter()
-
-
-def _drawn(kind: str, spec: Spec) -> bytes:
-    """Return a drawing as bytes; kind : "png", "svg" or "pdf"."""
-    return _convert(f"vega_to_{kind}", spec, {"scale": DOTS} if kind == "png" else {})
+_drawn = _Converter()
 
 
 def picture(charts: Charts) -> Spec:

@@ -360,7 +360,3 @@ def _form(form: FormFit) -> dict[str, Any]:
         "folds": form.left_out(),
         "starts_objective": [r.objective for r in form.fit.best.ranked],
     }  # fmt: skip
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

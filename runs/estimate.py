@@ -95,7 +95,7 @@ class Estimate:
     @property
     def result(self) -> dict[str, Any]:
         moduli: dict[str, list[dict[str, Any]]] = {}
-        for one in answers(self):
+        for one in answers(self.best, self.thickness):
             entry = {"strain": one.strain, "MPa": one.value, "sigma": one.sigma, "band": one.band}
             moduli.setdefault(one.modulus, []).append(entry)
         return {

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,7 +276,7 @@ class Fit:
         rows = [
             [a.modulus, f"{100 * a.strain:.3g} %", f"{a.value:.4g}",
              "" if a.band is None else "{:.4g} to {:.4g}".format(*a.band), f"{a.per_width:.4g}"]
-            for a in answers(self)
+            for a in answers(self.best, self.thickness)
         ]  # fmt: skip
         words = f"{self.project.title}: {', '.join(self.tests)}, objective {self.objective:.4g}, "
         words += f"best of {len(self.best.ranked)} starts, {len(self.notes)} notes"
@@ -370,50 +370,25 @@ class Answer:
     strain: float
     value: float
     per_width: float
-    sigma: float | None = None
-    band: tuple[float, float] | None = None
-    end: bool = False
+    sigma: float | None
+    band: tuple[float, float] | None
+    end: bool
 
 
-class Answered(Protocol):
-    """A fit, or an estimate: its law, and how certain it is."""
-
-    @property
-    def project(self) -> Project: ...
-
-    @property
-    def law(self) -> HypoelasticLaw: ...
-
-    @property
-    def thickness(self) -> float: ...
-
-    @property
-    def best(self) -> BestFit: ...
-
-
-def answers(fit: Answered) -> list[Answer]:
-    """Return E1, E2 and G12 at a few strains up to the end of the valid ones."""
-    found = []
+def answers(best: BestFit, thickness: float) -> list[Answer]:
+    """Return E1, E2 and G12 at a few strains up to the end of the valid ones; thickness : mm."""
+    found, sure = [], best.certainty
     for name, component in COMPONENTS.items():
-        end = float(fit.best.valid[component])
-        strains = [*(strain for strain in STRAINS if strain < NEAR * end), end]
-        found += [answer_at(fit, name, strain, strain == end) for strain in strains]
+        end = float(best.valid[component])
+        for strain in [*(strain for strain in STRAINS if strain < NEAR * end), end]:
+            value, sigma, band = float(best.law.modulus(name, strain)), None, None
+            if sure is not None:
+                sigma = float(np.interp(strain, sure.strain[name], sure.total[name]))
+                ends = sure.ends(name, strain, np.array(value))
+                band = None if ends is None else (float(ends[0]), float(ends[1]))
+            one = Answer(name, strain, value, value * thickness, sigma, band, strain == end)
+            found.append(one)
     return found
-
-
-def answer_at(fit: Answered, name: str, strain: float, end: bool = False) -> Answer:
-    """Return one modulus (E1, E2 or G12) at one strain."""
-    value, sure = float(fit.law.modulus(name, strain)), fit.best.certainty
-    per_width = value * fit.thickness
-    if sure is None:
-        return Answer(name, strain, value, per_width, end=end)
-
-    def at(values: np.ndarray) -> float:
-        return float(np.interp(strain, sure.strain[name], values))
-
-    ends = sure.ends(name, strain, np.array(value))
-    band = None if ends is None else (float(ends[0]), float(ends[1]))
-    return Answer(name, strain, value, per_width, at(sure.total[name]), band, end)
 
 
 #: Relative half width of the 95 % band up to which a modulus is to be used, and from which it is

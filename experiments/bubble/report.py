@@ -28,7 +28,7 @@ from ...reports.content import Exhibit, Part, Table
 from ...reports.maps import (
     ROUNDING,
     Maps,
-    Shade,
+    Panel,
     Solid,
     maps_of,
     pack,
@@ -310,13 +310,13 @@ def bubble_solid(
     # Means over the corners; NaN where one of them has none.
     residual = np.tile(np.array([own[mesh.quads].mean(axis=1) for own in apart]), len(signs))
     residual[residual < ROUNDING * float(np.abs(known.displacement).max())] = 0.0
-    shades = [Shade("residual, length", "mm", pack(residual))]
+    shades = [Panel("residual, length", "mm", pack(residual))]
     fields = ((STRAIN_LABELS, "%", 100 * known.strain()), (STRESSES, "MPa", known.stress()))
     for names, unit, values in fields:
         # A mirrored part is sheared the other way.
         every = np.concatenate([values * (1.0, 1.0, sx * sy) for sx, sy in signs], axis=1)
         shades += [
-            Shade(name, unit, pack(every[..., k]), "about zero" if k == 2 else "from least")
+            Panel(name, unit, pack(every[..., k]), "about zero" if k == 2 else "from least")
             for k, name in enumerate(names)
         ]
     points = mesh.points + known.displacement

@@ -33,14 +33,10 @@ from .closed_forms import Number, bent_tubes, hencky_membranes, loaded_tubes, th
 SOURCE = "MSC Marc; Jekel et al., Composite Structures 161 (2017)"
 
 
-def marc_bars(solver: Solver | None = None) -> Iterator[Number]:
-    """Compare the four published bars on a solver, the embedded membrane unless given."""
-    return end_stresses(strip_stresses(solver or MembraneSolver()))
-
-
-def end_stresses(stresses: Sequence[float], program: str = "") -> Iterator[Number]:
-    """Compare end stresses (MPa) of the bars, in order, with Marc's; `program` begins each name."""
-    for bar, stress in zip(BARS, stresses, strict=True):
+def marc_bars(stresses: Sequence[float] | None = None, program: str = "") -> Iterator[Number]:
+    """Compare end stresses (MPa) of the four bars, in order, with Marc's; `program` begins each
+    name. Those of the embedded membrane unless given."""
+    for bar, stress in zip(BARS, stresses or strip_stresses(MembraneSolver()), strict=True):
         what = f"{program}end stress, {bar.model} {bar.direction} bar"
         yield Number(what, stress, bar.stress, "MPa", TOLERANCE, SOURCE)
 
@@ -223,7 +219,7 @@ def with_calculix() -> Iterator[Number]:
     usable = next((one for one in diagnose() if one.usable), None)
     if usable is None or usable.stresses is None or usable.path is None:
         return
-    yield from end_stresses(usable.stresses, "CalculiX: ")
+    yield from marc_bars(usable.stresses, "CalculiX: ")
     rows = dict(cases())[CASE]
     found = shapes(rows, ELEMENTS_CALCULIX, CalculixSolver(usable.path))
     for i in (len(rows) // 2, len(rows) - 1):

@@ -286,7 +286,7 @@ def test_moduli_are_told_up_to_where_they_are_fitted_with_sigma_and_band_of_the_
     sure = fitted.best.certainty
     sure = replace(sure, mesh={name: 0.3 + 0.0 * own for name, own in sure.sigma.items()})
     fitted = replace(fitted, best=replace(fitted.best, certainty=sure))
-    told, table = answers(fitted), fitted.moduli()
+    told, table = answers(fitted.best, fitted.thickness), fitted.moduli()
     for name, component in (("E1", 0), ("E2", 1), ("G12", 2)):
         own = [one for one in told if one.modulus == name]
         end = fitted.best.valid[component]

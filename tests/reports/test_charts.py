@@ -20,7 +20,7 @@ from bubblefit.reports import content, maps, vega
 from bubblefit.reports.charts import Chart, Charts, axis_ends, dots, faces, line, scale_ends
 from bubblefit.reports.content import Picture, Report, Section, Table, read_page_data, round_trip
 from bubblefit.reports.html import folds, number, percent, write_page, write_report
-from bubblefit.reports.maps import Shade, Solid, maps_of, pack, write_vtu
+from bubblefit.reports.maps import Panel, Solid, maps_of, pack, write_vtu
 from bubblefit.reports.vega import figure, panel, save, view
 from hypothesis import given
 from hypothesis import strategies as st
@@ -195,7 +195,7 @@ def test_a_surface_from_the_front_and_from_above():
         np.testing.assert_allclose(near, nearness, atol=1e-12)
     corners = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1], [2, 1, 1]]], float)
     quads = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
-    shade = maps.Shade("s", "mm", pack([[1.0, np.nan]]))
+    shade = maps.Panel("s", "mm", pack([[1.0, np.nan]]))
     svg = maps.solid_svg(maps.Solid("n", ["1"], "p", pack(corners), pack(quads), [shade], "c"), 0)
     assert svg.count("Z") == 2 and 'fill="#999"' in svg
     turn = np.linspace(0, 2 * np.pi, 25)
@@ -239,7 +239,7 @@ def full_report():
     rows = [("dz", "mm", [h + 0.1 for h in HEIGHTS], HEIGHTS, [-0.1 * h for h in HEIGHTS])]
     maps = maps_of("bubble", "pressure", LOADS, [PLACES] * 2, rows, ("x", "y"), "Maps", "a dome")
     points = np.array([np.column_stack([PLACES, h]) for h in HEIGHTS])
-    shade = Shade("height", "mm", pack([h[QUADS].mean(axis=1) for h in HEIGHTS]))
+    shade = Panel("height", "mm", pack([h[QUADS].mean(axis=1) for h in HEIGHTS]))
     solid = Solid("dome", LOADS, "pressure", pack(points), pack(QUADS), [shade], "Dome", "a dome")
     return Report(
         "Test <1> & more", "Good.", [("objective e", 3.1234567e-12), ("method", "lm")],

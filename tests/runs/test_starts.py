@@ -413,7 +413,7 @@ def test_what_is_taken_out_lies_well_within_its_band(off):
 def test_one_band_in_every_place(off, change, tmp_path):
     """Card and export, moduli.csv and terminal: the same ends, and the value between them."""
     fitted = change(off)
-    table, told = fitted.moduli(), answers(fitted)
+    table, told = fitted.moduli(), answers(fitted.best, fitted.thickness)
     fitted.card.write(tmp_path / "card.toml")
     card = read_card(tmp_path / "card.toml")
     beside = pd.read_csv(StringIO(band_table(card)), comment="#")
