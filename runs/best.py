@@ -107,11 +107,14 @@ def best_fit(problem: FitProblem, records: Sequence[StartRecord], tolerance: flo
     first = replace(record, objective=now)
     ranked = [_like(r, first) for r in ranked]
     again = [_like(r, first) for r in records]
-    strains = [strains_of(h) for h in point.histories]
-    reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
     law = problem.unknowns.law(problem.law, unknowns)
     slopes = point if leading is problem else leading.evaluate(unknowns, True, warm=False)
-    return BestFit(point, slopes, law, ranked, again, reached)
+    return BestFit(point, slopes, law, ranked, again, reached_by(point))
+
+
+def reached_by(point: Evaluation) -> Array:
+    """Return the largest (eps1, eps2, gamma12) of all analyses."""
+    return np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
 
 
 def _like(record: StartRecord, first: StartRecord) -> StartRecord:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
-from ..experiments.kinds import Weighting, strains_of
+from ..experiments.kinds import Weighting
 from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
 from ..inference.comparison import Comparison
@@ -23,7 +23,7 @@ from ..inference.unknowns import EstimatedStarts
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
 from ..project.project import Project
-from .best import LEAST_STRAIN, BestFit
+from .best import BestFit, reached_by
 from .result import answers
 from .setup import FitSetup, prepare_fit
 
@@ -140,9 +140,7 @@ def estimate_of(setup: FitSetup) -> Estimate:
             left = misfits(problem, point.residual).items()
             problem, point = _fitted(setup, alone, {k: max(m.rms, m.noise) for k, m in left})
         law = problem.unknowns.law(problem.law, point.unknowns)
-        strains = [strains_of(history) for history in point.histories]
-        reached = np.maximum(np.max(strains, axis=0), LEAST_STRAIN)
-        best = BestFit(point, point, law, (), (), reached)
+        best = BestFit(point, point, law, (), (), reached_by(point))
         sure = certainty(problem, point, law, best.valid)
     gaps = tuple(_gaps(problem, best))
     for gap in gaps:

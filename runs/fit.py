@@ -36,12 +36,12 @@ from .executor import Task, executor_of
 from .folder import (
     NAMES,
     Record,
+    Reported,
     Store,
     check_asked,
     failure_page,
     finished,
     solver_facts,
-    write_report,
 )
 from .progress import Listener, listener
 from .result import Fit
@@ -421,7 +421,7 @@ NOTHING = "nothing doubtful"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check:
+class Check(Reported):
     """A look at the data of tests, with their doubts.
     estimate : by virtual work; None where there is none, and `not_estimated` why."""
 
@@ -491,10 +491,6 @@ class Check:
 
     def _repr_html_(self) -> str:
         return html_table(self.setup.project.title, ["test", "", "doubt", ""], self.rows())
-
-    def report(self, folder: Path | str) -> Path:
-        """Write check.json, figures and report.html; return the page's path."""
-        return write_report(self, folder)
 
 
 @checked

@@ -57,34 +57,32 @@ Facts = Mapping[str, Any]
 
 def differences(before: Facts, now: Facts) -> list[str]:
     """Return the differences of two runs, one each: key, old value, new value."""
-    words = list(_values("version of bubblefit", before.get("version"), now.get("version")))
+    words = _values("version of bubblefit", before.get("version"), now.get("version"))
     one, other = before.get("solver", {}), now.get("solver", {})
-    if one.get("name") != other.get("name"):  # what one says of itself, the other cannot
-        words += _values("the solver", one.get("name"), other.get("name"))
+    name = other.get("name")
+    if one.get("name") != name:  # what one says of itself, the other cannot
+        words += _values("the solver", one.get("name"), name)
     else:
-        words += _tables(f"the solver {other.get('name')}: ", one, other)
-    words += _tables("", before.get("settings", {}), now.get("settings", {}))
+        both = ({f"the solver {name}: {k}": v for k, v in own.items()} for own in (one, other))
+        words += _values("", *both)
+    words += _values("", before.get("settings", {}), now.get("settings", {}))
     tests, others = before.get("tests", {}), now.get("tests", {})
     if list(tests) != list(others):
         words.append(f"the tests: {', '.join(tests)}, now {', '.join(others)}")
     for name in tests:
         if name in others:
-            words += _tables(f"{name}.", tests[name], others[name])
+            words += _values(name, tests[name], others[name])
             files = before.get("files", {}).get(name, []), now.get("files", {}).get(name, [])
             words += _files(name, *files)
     return words
 
 
-def _tables(head: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    for key in dict.fromkeys([*before, *now]):
-        yield from _values(f"{head}{key}", before.get(key), now.get(key))
-
-
-def _values(key: str, before: Any, now: Any) -> Iterable[str]:
+def _values(key: str, before: Any, now: Any) -> list[str]:
     if before == now:
         return []
     if isinstance(before, Mapping) and isinstance(now, Mapping):
-        return _tables(f"{key}.", before, now)
+        keys = [(own, before.get(own), now.get(own)) for own in {**before, **now}]
+        return [w for own, *two in keys for w in _values(f"{key}.{own}".lstrip("."), *two)]
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         pairs = [(i, a, b) for i, (a, b) in enumerate(zip(before, now, strict=True)) if a != b]
         if len(pairs) <= FEW:
@@ -175,7 +173,7 @@ class Store:
                 (self.path / name).unlink(missing_ok=True)
         if not resume:
             content = {PARTS: dict(parts), FACTS: dict(facts or {})}
-            self.write(RUN, json.dumps(content, indent=1) + "\n")
+            write_text(self.path / RUN, json.dumps(content, indent=1) + "\n")
         return resume
 
     def forget(self) -> None:
@@ -184,13 +182,9 @@ class Store:
             for name in (RESULT, RUN):
                 (self.path / name).unlink(missing_ok=True)
 
-    def write(self, name: str, text: str) -> None:
-        """Write a file whole or not at all; raises OutputError."""
-        write_text(self.path / name, text)
-
     def finish(self, result: Mapping[str, Any]) -> None:
         """Write result.json, after everything else; raises OutputError."""
-        self.write(RESULT, json_text(result))
+        write_text(self.path / RESULT, json_text(result))
 
     def _check(self, parts: Mapping[str, str], facts: Facts) -> None:
         path = self.path / RUN
@@ -351,6 +345,14 @@ def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
     check_asked(out, resume, overwrite)
     if out is not None and (Path(out) / RESULT).exists() and not (overwrite or resume):
         raise OutputError(f"{out}: already holds a result; use --overwrite or another --out")
+
+
+class Reported:
+    """A result whose presenter writes a page."""
+
+    def report(self, folder: Path | str) -> Path:
+        """Write all files of the result into a folder; return the path of report.html."""
+        return write_report(self, folder)
 
 
 class Presented:

@@ -38,11 +38,11 @@ from .executor import Task, executor_of
 from .folder import (
     PROVENANCE,
     Record,
+    Reported,
     RunRecords,
     check_asked,
     failure_page,
     versions,
-    write_report,
 )
 from .progress import Listener, listener
 from .simulation import attempt
@@ -57,7 +57,7 @@ def predicted_kind(name: str) -> Predicted:
 
 
 @dataclass(frozen=True, eq=False)
-class Predictions:
+class Predictions(Reported):
     """The runs of tests with cards, in this order in every table."""
 
     project: Project
@@ -169,10 +169,6 @@ class Predictions:
         """Return for the terminal a table of each kind of test, then the notes."""
         lines = [line for outcome, _ in self.outcomes.values() for line in outcome.lines()]
         return [*lines, *note_lines(self.notes)]
-
-    def report(self, folder: Path | str) -> Path:
-        """Write tables, figures, report.html and last result.json; return the page's path."""
-        return write_report(self, folder)
 
     def _own(self, number: int) -> tuple[PredictedOutcome, int]:
         """Return the outcome that a run belongs to, and its number there."""

@@ -39,7 +39,7 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
-from .folder import PROVENANCE, Record, draw, versions, write_report, write_table
+from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
 from .setup import CoarseToFine, FitSetup
 from .simulation import Histories
 
@@ -66,7 +66,7 @@ PLACES = 61
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit:
+class Fit(Reported):
     """The result of a fit; best : of the starts, run once more from the unloaded state.
 
     agreement : words on whether starts ended in one optimum.
@@ -332,10 +332,6 @@ class Fit:
         own = [r for r in self.best.ranked[1:] if r.same_as is None]
         others = [np.array(r.unknowns) for r in own[: BEST - 1]]
         return [self.law, *(unknowns.law(self.law, y) for y in others)]
-
-    def report(self, folder: Path | str) -> Path:
-        """Write card, tables, figures, report.html and last result.json; return the page's path."""
-        return write_report(self, folder)
 
     def output(self, folder: Path, test: str) -> Output:
         """Return where a test writes: files carry its name if there are several tests."""

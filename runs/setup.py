@@ -152,13 +152,10 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
         problem = "the lower bounds of E1, E2 and G12 are the margins; leave this out"
         raise InputError(path, "law.margin", problem)
     if of_moduli:
-        keys = {name: f"law.bounds.{name}" for name in ranges}
-        return LawBounds.of_moduli(
-            {
-                name: _ordered(project, key, getattr(section, name), unit)
-                for name, key in keys.items()
-            }
-        )
+        return LawBounds.of_moduli({
+            name: _ordered(project, f"law.bounds.{name}", pair, unit)
+            for name, pair in ranges.items()
+        })  # fmt: skip
     lower, upper = (_listed(project, form, name) for name in ("lower", "upper"))
     for i, (place, low, high) in enumerate(zip(form.free, lower, upper, strict=True)):
         if low > high:
@@ -428,29 +425,25 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
     InputError : in the project or its data. SolverFailure : the solver is not there, or a known
         solution cannot be run."""
     with project.naming_arguments():
-        return _prepared(project, tests, saw)
-
-
-def _prepared(project: Project, tests: Sequence[Test], saw: Saw) -> FitSetup:
-    fit = project.fit
-    options = project.options_of(fit.solver)
-    # Once here, in one line, rather than as the failure of every analysis.
-    solver = usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
-    shared_unknowns(project)  # says now what is wrong with them
-    law = law_of(project, [test.reach for test in tests])
-    try:
-        check_carries(solver, law)
-    except InputError as error:
-        raise InputError(project.path, "law.form", error.problem) from None
-    bounds = bounds_of(project, law.form)
-    make = functools.partial(make_solver, project)
-    ready = []
-    for test in tests:
-        saw(f"reading {test.name}")
-        with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
-            ready.append(kind_named(test.kind).prepare(test, law, make))
-    setup = FitSetup(project, law, bounds, tuple(ready))
-    return replace(setup, starts=_starts(setup))
+        fit = project.fit
+        options = project.options_of(fit.solver)
+        # Once here, in one line, rather than as the failure of every analysis.
+        solver = usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
+        shared_unknowns(project)  # says now what is wrong with them
+        law = law_of(project, [test.reach for test in tests])
+        try:
+            check_carries(solver, law)
+        except InputError as error:
+            raise InputError(project.path, "law.form", error.problem) from None
+        bounds = bounds_of(project, law.form)
+        make = functools.partial(make_solver, project)
+        ready = []
+        for test in tests:
+            saw(f"reading {test.name}")
+            with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
+                ready.append(kind_named(test.kind).prepare(test, law, make))
+        setup = FitSetup(project, law, bounds, tuple(ready))
+        return replace(setup, starts=_starts(setup))
 
 
 def _starts(setup: FitSetup) -> Starts:

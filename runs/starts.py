@@ -21,7 +21,7 @@ from pydantic import TypeAdapter
 
 from ..errors import InputError, NoFeasibleStart
 from ..experiments.kinds import RunRecord, strains_of
-from ..files import output_errors
+from ..files import output_errors, write_text
 from ..inference.methods import FitOptions
 from ..inference.problem import FitProblem
 from ..inference.search import feasible_start, fit_from
@@ -164,8 +164,8 @@ class RunningFiles:
         done = self.finished() if resume else []
         ended = {(str(record.number), record.mesh) for record in done}
         rows = [r for r in self._read() if (r[0], r[MESH]) in ended] if resume else []
-        self.store.write(STARTS, "".join(record.text for record in done))
-        self.store.write(HISTORY, _table([[*HEADER, *self.columns], *rows]))
+        write_text(self.store.path / STARTS, "".join(record.text for record in done))
+        write_text(self.store.path / HISTORY, _table([[*HEADER, *self.columns], *rows]))
         with output_errors(self.store.path):
             # Unbuffered: a row is the system's as soon as it is written, and closing cannot fail.
             self._starts = open(self.store.path / STARTS, "ab", buffering=0)
@@ -192,7 +192,7 @@ class RunningFiles:
         rows = self._read()
         last = {(int(row[0]), int(row[1])): row for row in rows[1:]}
         body = [last[number] for number in sorted(last)]
-        self.store.write(HISTORY, _table([rows[0], *body]))
+        write_text(self.store.path / HISTORY, _table([rows[0], *body]))
 
     def close(self) -> None:
         for stream in (self._rows, self._starts):

@@ -35,7 +35,7 @@ from ..inference.search import evaluate_law, problem_at
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project, chosen_cards
-from .best import LEAST_STRAIN
+from .best import reached_by
 from .compare import candidates, errors, fit_of, plain
 from .executor import Task
 from .fit import stored_fit
@@ -111,7 +111,7 @@ def _fitted(
     make_solver: MakeSolver,
 ) -> FittedTest:  # fmt: skip
     """Return the test as after a fit, in its own objective."""
-    reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
+    reached = reached_by(point)
     own = prepared.comparisons(make_solver, Weighting())
     values = nuisance_of(problem, point.unknowns).values()
     nuisance = {name: value for of_one in values for name, value in of_one.items()}
@@ -273,10 +273,9 @@ def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     point = problem.evaluate(unknowns, False, warm=False)
     if point is None:
         return not_judged(name, f"{NO_FIT}: {problem.failure}", units)
-    reached = np.maximum(np.max([strains_of(h) for h in point.histories], axis=0), LEAST_STRAIN)
     law = problem.unknowns.law(own.law, unknowns)
     # As of a card: known as far as the rest of the data has strained the fabric.
-    law = replace(law, strain_range=np.minimum(reached, law.strain_range))
+    law = replace(law, strain_range=np.minimum(reached_by(point), law.strain_range))
     nuisance = nuisance_of(problem, unknowns)
     return held_out(test, law, own.make_solver, part.alone, nuisance, name)
 
