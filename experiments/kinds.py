@@ -688,15 +688,11 @@ class Expected:
 
 @dataclass(frozen=True)
 class Judgement:
-    """The doubts of one test; those whose names are trusted stop nothing."""
+    """The doubts of one test, sure ones first; those whose names are trusted stop nothing."""
 
     test: str
     doubts: tuple[Doubt, ...]
     trusted: Collection[str]
-
-    def __post_init__(self) -> None:
-        sure_first = tuple(sorted(self.doubts, key=lambda d: not d.sure))
-        object.__setattr__(self, "doubts", sure_first)
 
     @property
     def errors(self) -> tuple[Doubt, ...]:

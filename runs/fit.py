@@ -413,7 +413,8 @@ def judge(setup: FitSetup, saw: Saw = lambda words: None) -> tuple[Judgement, ..
         saw(f"looking at {name}")
         if (look := getattr(one, "doubts", None)) is not None:
             with one_blas_thread(), timed(f"{name}, looked at for doubts"):
-                judgements.append(Judgement(name, tuple(look(expected)), trust))
+                doubts = sorted(look(expected), key=lambda doubt: not doubt.sure)
+                judgements.append(Judgement(name, tuple(doubts), trust))
     return tuple(judgements)
 
 

@@ -158,15 +158,13 @@ def prior_weight(misfit: float, scale: Array) -> float:
 
 def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisance]:
     """Return unknowns of the sheet; scale (m,) : mm in one unit of each residual."""
-    weight = prior_weight(sheet.misfit, scale)
-    most = MOST_SIGMAS * sheet.prior
-    unknowns = [
-        Nuisance(name, -most, most, "mm", name, 1.0, sheet.prior, weight) for name in model.modes
+    weight, most = prior_weight(sheet.misfit, scale), MOST_SIGMAS
+    every = [(name, "mm", 1.0, sheet.prior) for name in model.modes]
+    every += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
+    return [
+        Nuisance(name, -most * prior, most * prior, unit, name, size, prior, weight)
+        for name, unit, size, prior in every
     ]
-    own = sheet.slack_prior
-    most = MOST_SIGMAS * own
-    slack = [Nuisance(n, -most, most, "%", n, 1e-2, own, weight) for n in SLACK]
-    return unknowns + (slack if sheet.slack else [])
 
 
 #: States of a quad by its principal stresses, as the files have them.

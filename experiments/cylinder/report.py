@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -44,13 +43,8 @@ from .test import PART, CylinderTest
 LINES = ("mid_span", "top_line", "bottom_line")
 
 
-@dataclass(frozen=True, eq=False)
-class Beam:
-    """The whole cylinder: mesh (mm, with warp), displacements when inflated and at the end."""
-
-    mesh: Mesh
-    inflated: Array
-    bent: Array
+#: The whole cylinder: mesh (mm, with warp), displacements (nodes, 3) when inflated and at the end.
+Beam = tuple[Mesh, Array, Array]
 
 
 def whole_beam(model: CylinderModel | BeamModel, run: BendingRun) -> Beam:
@@ -72,28 +66,24 @@ def whole_beam(model: CylinderModel | BeamModel, run: BendingRun) -> Beam:
         warp = np.concatenate([warp, warp * turned])
         lines = {name: line[source] for name, line in lines.items()}
     sets = {name: np.flatnonzero(line) for name, line in lines.items()}
-    return Beam(Mesh(points, quads, sets, {}, warp), moves[0], moves[1])
-
-
-def _axis(beam: Beam) -> tuple[Array, Array]:
-    """Return z (mm, before bending) and y of the axis of the bent beam, row by row."""
-    rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
-    height = (beam.mesh.points + beam.bent)[:, 1]
-    return rows, np.bincount(row, height) / np.bincount(row)
+    return Mesh(points, quads, sets, {}, warp), moves[0], moves[1]
 
 
 def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -> BeamBodies:
-    """Return supports and collar, placed to touch the inflated beam."""
+    """Return supports and collar, placed to touch the inflated beam; straps hang on its axis."""
+    mesh, inflated, bent = beam
     if isinstance(model, BeamModel):
         z, size = model.supports.span, model.supports.diameter
-        strap = np.interp(0.5 * model.load_spacing, *_axis(beam))
+        rows, row = np.unique(np.round(mesh.points[:, 2], 3), return_inverse=True)
+        axis = np.bincount(row, (mesh.points + bent)[:, 1]) / np.bincount(row)
+        strap = np.interp(0.5 * model.load_spacing, rows, axis)
         spots = sorted({-0.5 * model.load_spacing, 0.5 * model.load_spacing})
         low = -max(model.roller_below, model.section.radius + 0.5 * size)
         return BeamBodies(
             ((-0.5 * z, low), (0.5 * z, low)), 0.5 * size, float(strap), model.section.radius,
             model.collar.length, tuple(spots),
         )  # fmt: skip
-    at = beam.mesh.points + beam.inflated
+    at = mesh.points + inflated
     radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
     beside = np.abs(np.abs(at[:, 2]) - half)
     near = beside < radius
@@ -108,28 +98,28 @@ def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -
 
 def draw_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path, title: str) -> None:
     """Draw the last frame."""
-    beam = whole_beam(model, run)
-    rest, sets = beam.mesh.points, beam.mesh.node_sets
+    mesh, *moves = beam = whole_beam(model, run)
+    rest, sets = mesh.points, mesh.node_sets
     nodes, top, bottom = (sets[name] for name in LINES)
     around = np.argsort(np.arctan2(rest[nodes, 0], rest[nodes, 1]))
     ring = np.append(nodes[around], nodes[around[0]])
     top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
-    inflated, bent = rest + beam.inflated, rest + beam.bent
-    strain = surface_strain(beam.mesh, beam.bent)[:, 0]
+    inflated, bent = (rest + moved for moved in moves)
+    strain = surface_strain(mesh, moves[1])[:, 0]
     lines = inflated[outline][:, [2, 1]], (inflated[ring, :2], bent[ring, :2])
     bodies = bodies_of(model, beam, float(run.deflection[-1]))
-    save(path, beam_charts(bent, beam.mesh.quads, strain, *lines, bodies, title))
+    save(path, beam_charts(bent, mesh.quads, strain, *lines, bodies, title))
 
 
 def write_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path) -> None:
     """Write the last frame for ParaView, with the inflated one as a further displacement."""
-    beam = whole_beam(model, run)
+    mesh, inflated, bent = whole_beam(model, run)
     strains = {
-        "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
-        "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
+        "log_strain_1_2_12": surface_strain(mesh, bent),
+        "inflated_log_strain_1_2_12": surface_strain(mesh, inflated),
     }
-    write_vtu(beam.mesh, beam.bent, path, {"inflated_displacement": beam.inflated}, strains)
+    write_vtu(mesh, bent, path, {"inflated_displacement": inflated}, strains)
 
 
 FIGURES, BEAMS = "figures", "beams"

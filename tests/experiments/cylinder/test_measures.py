@@ -358,22 +358,22 @@ def picture(quarter):
 def test_a_quarter_makes_the_whole_beam(quarter):
     part, run = quarter
     beam, same = whole_beam(part, run), whole_beam(*made("full"))
-    for one, other in ((beam.bent, same.bent), (beam.inflated, same.inflated)):
-        a, b = (np.round(m.mesh.points + u, 6) + 0.0 for m, u in ((beam, one), (same, other)))
+    for k in (1, 2):
+        a, b = (np.round(m[0].points + m[k], 6) + 0.0 for m in (beam, same))
         np.testing.assert_allclose(np.unique(a, axis=0), np.unique(b, axis=0), atol=1e-5)
-    assert len(beam.mesh.quads) == len(same.mesh.quads)
-    one, other = (enclosed_volume(b.mesh.points + b.bent, b.mesh.quads) for b in (beam, same))
+    assert len(beam[0].quads) == len(same[0].quads)
+    one, other = (enclosed_volume(m.points + bent, m.quads) for m, _, bent in (beam, same))
     assert one == pytest.approx(other)
     wanted = surface_strain(part.mesh, run.inflated)
-    for b in (beam, same):
-        found = surface_strain(b.mesh, b.inflated)[: len(part.mesh.quads)]
+    for mesh, inflated, _ in (beam, same):
+        found = surface_strain(mesh, inflated)[: len(part.mesh.quads)]
         assert found == pytest.approx(wanted, abs=1e-12)
 
 
 def test_bodies_touch_the_inflated_beam(quarter):
     beam = whole_beam(*quarter)
     bodies = bodies_of(quarter[0], beam, 30.0)
-    at = beam.mesh.points + beam.inflated
+    at = beam[0].points + beam[1]
     assert bodies.support_radius == 50.0 and bodies.collar_radius == 120.0
     for z, y in bodies.supports:
         gap = np.hypot(at[:, 2] - z, at[:, 1] - y).min() - 50.0
