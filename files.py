@@ -26,7 +26,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
-from .errors import NOTES, InputError, Note, OutputError, PlugInFailure, rows
+from .errors import NOTES, BubblefitError, InputError, Note, OutputError, PlugInFailure, rows
 
 if TYPE_CHECKING:
     import jinja2
@@ -302,7 +302,7 @@ class PlugIn:
     entry: EntryPoint
 
     def load(self, what: str = "", needs: Sequence[str] = ()) -> Any:
-        """Import the object of the entry point; PlugInFailure: it cannot be, or lacks `needs`."""
+        """Import the object; PlugInFailure: it cannot be, or lacks `needs`, its `name` included."""
         try:
             thing = self.entry.load()
         # A module may do anything when it is imported, sys.exit included.
@@ -311,8 +311,20 @@ class PlugIn:
         missing = [attribute for attribute in needs if not hasattr(thing, attribute)]
         if missing:
             lacks = f"{self.entry.value} has no {', '.join(missing)}"
-            raise self.failure(f"is no {what or 'plug-in of this kind'}: {lacks}")
+            raise self.failure(f"is no {what}: {lacks}")
+        if "name" in needs and thing.name != self.name:
+            raise self.failure(f"calls its {what} {thing.name!r}; both must have one name")
         return thing
+
+    @contextmanager
+    def calling(self, what: str) -> Iterator[None]:
+        """Turn what its code raises within the block, but our own errors, into its failure."""
+        try:
+            yield
+        except BubblefitError:
+            raise
+        except Exception as error:
+            raise self.failure(what, error) from error
 
     def failure(self, what: str, error: BaseException | None = None) -> PlugInFailure:
         """Return an error that names the distribution, `what` it does, and what it raised."""

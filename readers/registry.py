@@ -10,7 +10,7 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, Literal
 
-from ..errors import BubblefitError, InputError, PlugInFailure
+from ..errors import InputError, PlugInFailure
 from ..files import PlugIn, check_regular, names_with, plug_in_named, plug_ins
 
 #: What a file holds, and what the `read` of its formats is called with and gives:
@@ -115,16 +115,10 @@ def _working(content: Content) -> Iterator[Format]:
 
 def _format_of(plug_in: PlugIn) -> Format:
     one = plug_in.load("format", ("name", "content", "read", "recognises"))
-    if one.name != plug_in.name:
-        raise plug_in.failure(f"calls its format {one.name!r}; both must have one name")
 
     def read(path: Path, *options: Any) -> Any:
-        try:
+        with plug_in.calling(f"fails on {path}"):
             return one.read(path, *options)
-        except BubblefitError:
-            raise
-        except Exception as error:
-            raise plug_in.failure(f"fails on {path}", error) from error
 
     def recognises(path: Path, head: bytes) -> bool:
         try:

@@ -2,8 +2,8 @@
 
 import inspect
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -55,25 +55,25 @@ ANY = "solver-option"
 
 def _plug_in_named(name: str) -> PlugIn | None:
     """Return the plug-in of that name, or None; SolverFailure where two distributions offer it."""
-    try:
+    with _failing(name):
         return plug_in_named(GROUP, name)
+
+
+@contextmanager
+def _failing(name: str) -> Iterator[None]:
+    """Turn a failure of a plug-in within the block into one of an analysis."""
+    try:
+        yield
     except PlugInFailure as error:
-        raise SolverFailure(str(error).removeprefix(f"{name}: "), name) from None
-
-
-def _failed(plug_in: PlugIn, what: str, error: BaseException | None = None) -> SolverFailure:
-    """Return `PlugIn.failure` as an error of an analysis."""
-    return SolverFailure(str(plug_in.failure(what, error)), plug_in.name)
+        raise SolverFailure(str(error).removeprefix(f"{name}: "), name) from error.__cause__
 
 
 def _factory(plug_in: PlugIn) -> Callable[..., Any]:
     """Import the factory; SolverFailure where it cannot be imported or called."""
-    try:
+    with _failing(plug_in.name):
         factory = plug_in.load()
-    except PlugInFailure as error:
-        raise SolverFailure(str(error), plug_in.name) from error.__cause__
-    if not callable(factory):
-        raise _failed(plug_in, f"is no factory: {plug_in.entry.value} cannot be called")
+        if not callable(factory):
+            raise plug_in.failure(f"is no factory: {plug_in.entry.value} cannot be called")
     return cast(Callable[..., Any], factory)
 
 
@@ -87,16 +87,12 @@ def _made(plug_in: PlugIn, options: Mapping[str, Any]) -> Solver:
         raise InputError(None, f"solver.{plug_in.name}", problem) from None
     except ValueError:  # compiled code has no signature
         pass
-    try:
-        solver = factory(**options)
-    except BubblefitError:
-        raise
-    except Exception as error:
-        raise _failed(plug_in, "fails when it is made", error) from error
-    if not isinstance(solver, Solver):
-        missing = [name for name in NEEDED if not hasattr(solver, name)]
-        what = f"gives no solver: {type(solver).__name__} has no {', '.join(missing)}"
-        raise _failed(plug_in, what)
+    with _failing(plug_in.name):
+        with plug_in.calling("fails when it is made"):
+            solver = factory(**options)
+        if not isinstance(solver, Solver):
+            missing = ", ".join(name for name in NEEDED if not hasattr(solver, name))
+            raise plug_in.failure(f"gives no solver: {type(solver).__name__} has no {missing}")
     return solver
 
 
@@ -199,15 +195,11 @@ def usable_solver(
 
 def checked(name: str, solver: Solver) -> SolverCheck:
     """Return the solver's `check`; SolverFailure where that of a plug-in fails; InputError."""
-    try:
+    plug_in = None if name in SOLVERS else _plug_in_named(name)
+    if plug_in is None:
         return solver.check()
-    except BubblefitError:
-        raise
-    except Exception as error:
-        plug_in = None if name in SOLVERS else _plug_in_named(name)
-        if plug_in is None:
-            raise
-        raise _failed(plug_in, "fails its check", error) from error
+    with _failing(name), plug_in.calling("fails its check"):
+        return solver.check()
 
 
 def command_line() -> list[Override]:
@@ -294,7 +286,8 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
         # It may be for bubbles only, or have failed: the reader knows which.
         return found(check.version, f"its law was not tried: {str(error).splitlines()[0]}", True)
     except Exception as error:
-        return found(check.version, str(_failed(plug_in, "fails on a strip", error)))
+        failure = plug_in.failure("fails on a strip", error)
+        return found(check.version, f"{plug_in.name}: {failure}")
     off = difference(stresses)
     advice = "" if off < TOLERANCE else f"does not carry the law: {off:.2g} from Marc's end stress"
     return found(check.version, advice, off < TOLERANCE, stresses)

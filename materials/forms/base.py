@@ -23,7 +23,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import BubblefitError, InputError
+from ...errors import InputError
 from ...files import Group, PlugIn, names_with, plug_in_named
 
 Array = NDArray[np.float64]
@@ -49,7 +49,8 @@ GRID = 31
 class Form(Protocol):
     """A map from beta to the moduli: frozen, hashable, equal to another that says the same.
 
-    free : entries of beta that a fit may change; the others are zero. modulus_of : of each of them.
+    free : entries of beta that a fit may change, all unless said; the others are zero. modulus_of :
+    of each of them. What has a default here holds for moduli at control strains, in one piece.
     """
 
     @property
@@ -62,7 +63,8 @@ class Form(Protocol):
     def labels(self) -> tuple[str, ...]: ...
 
     @property
-    def free(self) -> tuple[int, ...]: ...
+    def free(self) -> tuple[int, ...]:
+        return tuple(range(self.size))
 
     @property
     def modulus_of(self) -> tuple[str, ...]: ...
@@ -73,7 +75,7 @@ class Form(Protocol):
 
     def uppers(self) -> Array:
         """Return (3, P) upper ends of the pieces, increasing; the last is UNLIMITED."""
-        ...
+        return np.full((3, 1), UNLIMITED)
 
     def grid(self, component: int, end: float) -> Array:
         """Return increasing strains from 0 to `end` at which positivity and bounds are checked."""
@@ -81,11 +83,11 @@ class Form(Protocol):
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return (free, free): free entries of beta by moduli at control strains."""
-        ...
+        return np.eye(len(self.free))
 
     def to_card(self) -> dict[str, Any]:
         """Return what a card says beside beta, as `form_named` reads it: knots, breaks."""
-        ...
+        return {}
 
     def describe(self) -> str:
         """Describe the entries of beta in one sentence, for a card's header and a report."""
@@ -247,7 +249,13 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
             raise InputError(None, key, f"a {name} law has no {key}")
     if plug_in is None:
         return offer.make(name, settings, strain_range)
-    return _made(plug_in, offer, settings, strain_range)
+    with plug_in.calling("fails when it is made"):
+        form = offer.make(name, settings, strain_range)
+    if not isinstance(form, Form):
+        known = [name for name in dir(Form) if not name.startswith("_")]
+        missing = ", ".join(name for name in known if not hasattr(form, name))
+        raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
+    return form
 
 
 def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
@@ -259,25 +267,7 @@ def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
     if plug_in is None:
         return None, None
     offer: Offer = plug_in.load("form", ("name", "make", "settings"))
-    if offer.name != name:
-        raise plug_in.failure(f"calls its form {offer.name!r}; both must have one name")
     return offer, plug_in
-
-
-def _made(
-    plug_in: PlugIn, offer: Offer, settings: Mapping[str, Any], strain_range: Sequence[float]
-) -> Form:
-    try:
-        form = offer.make(offer.name, settings, strain_range)
-    except BubblefitError:
-        raise
-    except Exception as error:
-        raise plug_in.failure("fails when it is made", error) from error
-    if not isinstance(form, Form):
-        known = [name for name in dir(Form) if not name.startswith("_")]
-        missing = ", ".join(name for name in known if not hasattr(form, name))
-        raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
-    return form
 
 
 @cache

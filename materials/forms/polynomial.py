@@ -11,17 +11,16 @@ Here they are tangent moduli: on a path on which stresses grow in proportion als
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from .base import COMPONENTS, EVEN, GRID, ORDER, UNLIMITED, Array, Offer, register_form
+from .base import COMPONENTS, EVEN, GRID, ORDER, Array, Form, Offer, register_form
 
 DEGREES = ("constant", "linear", "quadratic", "cubic")
 
 
 @dataclass(frozen=True)
-class Polynomial:
+class Polynomial(Form):
     """Four coefficients a modulus, highest power first and zero beyond the degree: G12, E2, E1."""
 
     degree: int
@@ -47,9 +46,6 @@ class Polynomial:
             whole[COMPONENTS[name], 0, :, 4 * block : 4 * block + 4] = np.eye(4)
         return whole
 
-    def uppers(self) -> Array:
-        return np.full((3, 1), UNLIMITED)
-
     def grid(self, component: int, end: float) -> Array:
         return np.linspace(0.0, end, GRID)
 
@@ -63,9 +59,6 @@ class Polynomial:
             points = strain_range[COMPONENTS[name]] * share
             whole[part, part] = np.linalg.inv(np.vander(points, n))
         return whole
-
-    def to_card(self) -> dict[str, Any]:
-        return {}
 
     def describe(self) -> str:
         return (
@@ -89,13 +82,12 @@ PLACES = {"G12": 0, "E2": 1, "E1": 3}
 
 
 @dataclass(frozen=True)
-class LoadRatio:
+class LoadRatio(Form):
     """G12, E2 at equal loads and its gain, E1 at equal loads and its gain; no strain matters."""
 
     name = "load-ratio"
     size = len(LABELS)
     labels = LABELS
-    free = tuple(range(len(LABELS)))
     modulus_of = ("G12", "E2", "E2", "E1", "E1")
 
     def piece_map(self) -> Array:
@@ -110,9 +102,6 @@ class LoadRatio:
             whole[COMPONENTS[name], PLACES[name] + 1] = 1.0
         return whole
 
-    def uppers(self) -> Array:
-        return np.full((3, 1), UNLIMITED)
-
     def grid(self, component: int, end: float) -> Array:
         return np.array([0.0, end])
 
@@ -123,9 +112,6 @@ class LoadRatio:
             own = slice(PLACES[name], PLACES[name] + 2)
             whole[own, own] = [[1.0 - EVEN, EVEN], [-1.0, 1.0]]
         return whole
-
-    def to_card(self) -> dict[str, Any]:
-        return {}
 
     def describe(self) -> str:
         return (

@@ -101,9 +101,6 @@ class SplineCrimp(_MoreThanSpline):
             return np.array([first, second])
         return np.array([bed, bed - first / STEEPEST, bed - second / STEEPEST])
 
-    def from_values(self, strain_range: Sequence[float]) -> Array:
-        return np.eye(self.size)
-
     def describe(self) -> str:
         return (
             f"{super().describe()} E2 and E1 are those without exchange of crimp; then T1 and "

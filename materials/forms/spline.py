@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
+from . import base
 from .base import (
     COMPONENTS,
     GRID,
@@ -30,7 +31,7 @@ MOST_KNOTS = 50
 
 
 @dataclass(frozen=True)
-class Spline:
+class Spline(base.Form):
     """Moduli (MPa) at knots: beta lists G12 at its knots, then E2, then E1.
     A line between two knots, a parabola through three, a cubic spline from four on, which contains
     every cubic; held beyond the last. knots : increasing strains from 0, of eps1, eps2, gamma12."""
@@ -53,10 +54,6 @@ class Spline:
     @property
     def size(self) -> int:
         return sum(len(row) for row in self.knots)
-
-    @property
-    def free(self) -> tuple[int, ...]:
-        return tuple(range(self.size))
 
     @property
     def modulus_of(self) -> tuple[str, ...]:
@@ -89,9 +86,6 @@ class Spline:
 
     def grid(self, component: int, end: float) -> Array:
         return _between([*(knot for knot in self.knots[component] if knot < end), end], PARTS)
-
-    def from_values(self, strain_range: Sequence[float]) -> Array:
-        return np.eye(self.size)
 
     def to_card(self) -> dict[str, Any]:
         return {"knots": dict(zip(STRAIN_NAMES, map(list, self.knots), strict=True))}
@@ -195,7 +189,7 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class TriLinear:
+class TriLinear(base.Form):
     """Three moduli up to the first break, between the breaks, and beyond the second.
     G12 is beta_3 to beta_1, E2 beta_7 to beta_5, E1 beta_11 to beta_9; a break belongs to the
     region below it. pairs : the two breaks of eps1, of eps2 and of gamma12."""
@@ -243,9 +237,6 @@ class TriLinear:
         knots = np.concatenate([[0.0], breaks[breaks < end], [end]])
         at = np.linspace(0.0, len(knots) - 1, GRID)
         return np.interp(at, np.arange(len(knots)), knots)
-
-    def from_values(self, strain_range: Sequence[float]) -> Array:
-        return np.eye(len(self.free))
 
     def to_card(self) -> dict[str, Any]:
         return {"breaks": dict(zip(STRAIN_NAMES, self.breaks.tolist(), strict=True))}
