@@ -9,7 +9,7 @@ Outline: the log, heights, offset of the clocks, choice of frames, numbers in na
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -46,27 +46,18 @@ class PressureLog:
     path: Path
 
 
-@dataclass(frozen=True)
-class LogOptions:
-    """Options of a log: volts become a pressure by scale, offset, unit; time is in s."""
-
-    pressure: Channel = AS_FOUND
-    time: Channel = AS_FOUND
-    format: str | None = None
-    comment: str = "#"
-    decimal: str | None = None
-
-
-def read_pressure_log(path: Path, options: LogOptions = LogOptions()) -> PressureLog:
-    """Read a log as a test machine's table."""
-    channels = {"time": options.time, "pressure": options.pressure}
+def read_pressure_log(
+    path: Path, of_pressure: Channel = AS_FOUND, of_time: Channel = AS_FOUND,
+    format: str | None = None, comment: str = "#", decimal: str | None = None,
+) -> PressureLog:  # fmt: skip
+    """Read a log as a test machine's table: volts become a pressure by their channel."""
+    channels = {"time": of_time, "pressure": of_pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
-    asked = TableOptions(named, ("time", "pressure"), options.comment, options.decimal)
-    found = read_machine_table(path, asked, options.format)
-    columns = {key: column_of(found, key, named, asked.quantities) for key in channels}
-    pressure = channel_values(found, columns["pressure"], options.pressure, tables.PRESSURE_UNITS)
-    column = columns["time"]
-    time = channel_values(found, column, options.time, tables.TIME_UNITS)
+    asked = TableOptions(named, ("time", "pressure"), comment, decimal)
+    found = read_machine_table(path, asked, format)
+    column, of_log = (column_of(found, key, named, asked.quantities) for key in channels)
+    pressure = channel_values(found, of_log, of_pressure, tables.PRESSURE_UNITS)
+    time = channel_values(found, column, of_time, tables.TIME_UNITS)
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         at = f"line {found.table.lines[back[0] + 1]}, column {column!r}"
@@ -277,20 +268,13 @@ OTHER = "of another inflation"
 SAME, TOLERANCE = 1e-6, 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class FrameChoice:
-    """Numbers of the chosen frames, by rising pressure, and counts of the others by reason."""
-
-    frames: tuple[int, ...]
-    left_out: dict[str, int] = field(default_factory=dict)
-
-
 def choose_frames(
     pressures: Array, asked: Sequence[float] | None = None, count: int | None = None,
     tolerance: float | None = None, inflation: Which | None = None,
-) -> FrameChoice:  # fmt: skip
+) -> tuple[tuple[int, ...], dict[str, int]]:  # fmt: skip
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
+    Returns their numbers, by rising pressure, and counts of the others by reason.
     asked, tolerance (2 % of the largest asked unless given) : MPa. inflation : of frames in order
     of time, without releases; "all": every inflation and release, `count` of each.
     """
@@ -322,7 +306,7 @@ def choose_frames(
         left_out[REPEATED], order = left_out[REPEATED] + int((~apart).sum()), order[apart]
         own = order.tolist() if count is None else _spread(pressures, order, count)
         frames += own[::-1] if k % 2 else own
-    return FrameChoice(tuple(frames), {why: n for why, n in left_out.items() if n})
+    return tuple(frames), {why: n for why, n in left_out.items() if n}
 
 
 def _nearest(

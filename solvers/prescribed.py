@@ -9,6 +9,7 @@ contact needs faces.
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,16 +79,21 @@ def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
 
 def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) -> Array:
     """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right."""
-    gauge, pull = np.insert(opened, 0, 0.0), np.insert(pulls, 0, 0.0)
-    if not (np.diff(gauge) > 0).all():
-        raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
-    levels = np.array(model.elongations)
+    spline = _over_gauge(opened, pulls, solver)
+    gauge, pull, levels = spline.x, np.insert(pulls, 0, 0.0), np.array(model.elongations)
     steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
+    inside = spline(np.minimum(levels, gauge[-1]))
+    return _onward(inside + steep * np.maximum(levels - gauge[-1], 0.0))
+
+
+def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
+    """Return values (increments, ...), zero at rest, over mm of the gauge; SolverFailure."""
     from scipy.interpolate import CubicSpline  # heavy: where it is used
 
-    inside = CubicSpline(gauge, pull)(np.minimum(levels, gauge[-1]))
-    found = inside + steep * np.maximum(levels - gauge[-1], 0.0)
-    return _onward(found)
+    gauge = np.insert(opened, 0, 0.0)
+    if not (np.diff(gauge) > 0).all():
+        raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
+    return CubicSpline(gauge, np.concatenate([np.zeros((1, *values.shape[1:])), values]))
 
 
 def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:
@@ -95,23 +101,18 @@ def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: s
 
     opened : (increments,) mm of the gauge. SolverFailure : it does not get there, or shrinks.
     """
-    levels, gauge = np.array(model.elongations), np.insert(opened, 0, 0.0)
+    levels = np.array(model.elongations)
     if len(opened) == len(levels) and (
         np.abs(opened - levels).max() <= AS_WANTED * model.gauge_length
     ):
         return values
-    if gauge[-1] < levels[-1]:
+    if opened[-1] < levels[-1]:
         problem = (
-            f"the gauge opened by {gauge[-1]:.5g} mm only and not by {levels[-1]:.5g}; "
+            f"the gauge opened by {opened[-1]:.5g} mm only and not by {levels[-1]:.5g}; "
             "refine the mesh, or see whether the law gets too soft between gauge and grips"
         )
         raise SolverFailure(problem, solver)
-    if not (np.diff(gauge) > 0).all():
-        raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
-    whole = np.concatenate([np.zeros((1, *values.shape[1:])), values])
-    from scipy.interpolate import CubicSpline  # heavy: where it is used
-
-    return np.asarray(CubicSpline(gauge, whole)(levels))
+    return np.asarray(_over_gauge(opened, values, solver)(levels))
 
 
 def gauge_opened(model: UniaxialModel, u: Array) -> Array:

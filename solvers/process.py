@@ -163,6 +163,16 @@ def log_tail(log: Path, lines: int = TAIL) -> str:
     return "\n".join(line.rstrip() for line in text.splitlines()[-lines:])
 
 
+@dataclass(frozen=True)
+class Increment:
+    """An increment of a program that converged: its step, its number in it, and total time."""
+
+    step: int
+    increment: int
+    iterations: int
+    time: float
+
+
 def number_rows(path: Path) -> list[list[float]]:
     """Read the whole lines of finite numbers in a file that a program may be writing."""
     rows: list[list[float]] = []

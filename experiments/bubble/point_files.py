@@ -39,9 +39,8 @@ def pressures_by_log(
     file = _beside(section.file, place, folder, f"{at}.file")
     kind = named_format(place, f"{at}.format", "machine table", section.format)
     pressure, time = section.pressure.channel, section.time.channel
-    log = pressure_log.read_pressure_log(
-        file, pressure_log.LogOptions(pressure, time, kind, section.comment, section.decimal)
-    )
+    options_of_log = kind, section.comment, section.decimal
+    log = pressure_log.read_pressure_log(file, pressure, time, *options_of_log)
     heights, names, own = [], [], []
     for one in files:
         # One file at a time: all frames of a test need not be in memory at once.
@@ -167,12 +166,12 @@ def recorded_frames(
     timed = several or inflation != 1 or clock is not None or source == LISTED
     try:
         how = section.frames, limit, inflation if timed else None
-        chosen = pressure_log.choose_frames(pressures, asked, *how)
+        chosen, left_out = pressure_log.choose_frames(pressures, asked, *how)
     except InputError as error:
         of_test = error.field.startswith(("pressures", "inflation"))
         field = error.field if of_test else f"{AT}.{error.field}"
         raise place.error(field.rstrip("."), error.problem) from None
-    taken, logs = list(chosen.frames), []
+    taken, logs = list(chosen), []
     if section.log is not None:
         named = {"file": section.log.file, "times": section.log.times}
         logs = [_beside(f, place, folder, f"{AT}.log.{k}") for k, f in named.items() if f]
@@ -183,9 +182,9 @@ def recorded_frames(
     single = len(names) == len(files)
     return RecordedFrames(
         files=tuple(files[i] for i in taken) if single else tuple(files),
-        frames=None if single else chosen.frames, names=tuple(names[i] for i in taken),
+        frames=None if single else chosen, names=tuple(names[i] for i in taken),
         pressure=pressures[taken], asked=None if asked is None else np.array(asked), source=source,
-        count=len(names), left_out=chosen.left_out,
+        count=len(names), left_out=left_out,
         doubt=None if clock is None else clock.doubt[taken], clock=clock, logs=tuple(logs),
         numbers=tuple(said), inflations=inflations,
     )  # fmt: skip

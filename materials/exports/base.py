@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError, Note, NoteKind, OutputError, one_line
 from ...files import __version__, write_text
 from ..card import LEVEL, MaterialCard, strains_of
-from ..forms.base import COMPONENTS, UNLIMITED, Array, ratios_of
+from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array, ratios_of
 from ..law import HypoelasticLaw
 from ..responses import (
     POINTS,
@@ -296,24 +296,32 @@ class FabricCurves:
         )
 
 
+def curve_of(law: HypoelasticLaw, name: str, strain: Array, measure: Measure) -> Array:
+    """Return strain and stress (n, 2) in a measure: of a strip, or of trellis shear for G12."""
+    if name == "G12":
+        angle = np.array([trellis_angle(gamma) for gamma in strain])
+        return np.column_stack(trellis_curve(law, angle, measure)[:2])
+    return np.column_stack(uniaxial_curve(law, COMPONENTS[name], strain, measure))
+
+
 def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -> FabricCurves:
     """Return the curves of a card, to the end of its range or `options.reach`."""
     strains = {
         name: modulus_table(card.law, name, options.points, options.reach).strain
         for name in COMPONENTS
     }
-    both = []
-    for pulled, name in enumerate(("E1", "E2")):
-        x, y = uniaxial_curve(card.law, pulled, strains[name], measure)
-        back, push = uniaxial_curve(card.law, pulled, np.array([COMPRESSION]), measure)
-        both.append(np.stack([np.concatenate([back, x]), np.concatenate([push, y])], axis=1))
+    pushed = np.array([COMPRESSION])
+    warp, fill = (
+        np.concatenate([curve_of(card.law, name, own, measure) for own in (pushed, strains[name])])
+        for name in ("E1", "E2")
+    )
     gamma = strains["G12"][strains["G12"] >= 0]
     angle = np.array([trellis_angle(g) for g in gamma])
     x, y, yarns = trellis_curve(card.law, angle, measure)
     largest = float(np.abs(yarns).max())
     equal = min(BIAXIAL, *(float(strains[name][-1]) for name in ("E1", "E2")))
     shear = np.stack([x, y], axis=1)
-    return FabricCurves(both[0], both[1], shear, largest, equal, _softer(card.law, equal))
+    return FabricCurves(warp, fill, shear, largest, equal, _softer(card.law, equal))
 
 
 #: What a total curve makes of a law's history, without a memory and with one.
@@ -334,14 +342,10 @@ def unloading_curves(
     law, found = card.law, {}
     if law.memory is None:
         return {}
-    for k, (name, modulus) in enumerate(zip(("warp", "fill", "shear"), COMPONENTS, strict=True)):
+    for k, (name, modulus) in enumerate(zip(STRAIN_NAMES, COMPONENTS, strict=True)):
         end = float(modulus_table(law, modulus, 2, options.reach).strain[-1])
         path = np.linspace(end, law.memory.kept(k, end), options.points)
-        if name == "shear":
-            x, y, _ = trellis_curve(law, np.array([trellis_angle(g) for g in path]), measure)
-        else:
-            x, y = uniaxial_curve(law, k, path, measure)
-        found[name] = np.stack([x, y], axis=1)[::-1]
+        found[name] = curve_of(law, modulus, path, measure)[::-1]
     return found
 
 
@@ -404,14 +408,8 @@ def csv(card: MaterialCard, options: TableOptions) -> Export:
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
     keep = table.strain >= 0
     strain, modulus = table.strain[keep], table.modulus[keep]
-    if table.name == "G12":
-        direction = "shear"
-        angles = np.array([trellis_angle(gamma) for gamma in strain])
-        x, y, _ = trellis_curve(card.law, angles, "nominal")
-    else:
-        direction, pulled = ("warp", 0) if table.name == "E1" else ("fill", 1)
-        x, y = uniaxial_curve(card.law, pulled, strain, "nominal")
-    columns = zip(strain, modulus, x, y, strict=True)
+    direction = STRAIN_NAMES[COMPONENTS[table.name]]
+    columns = np.column_stack([strain, modulus, curve_of(card.law, table.name, strain, "nominal")])
     return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]
 
 

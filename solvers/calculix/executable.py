@@ -15,7 +15,7 @@ from pydantic import Field
 from ...errors import SolverFailure
 from ...files import cache_folder
 from ...readers.sections import Positive
-from ..process import Outcome, disk_full, log_tail, number_rows, program_at
+from ..process import Increment, Outcome, disk_full, log_tail, number_rows, program_at
 from ..settings import ExternalSettings, Offer, Override
 
 VARIABLE = "BUBBLEFIT_CCX"
@@ -135,21 +135,10 @@ _GAVE_UP = re.compile(r"increment size smaller than minimum|too many cutbacks", 
 _TOO_SMALL = re.compile(rf"{_GAVE_UP.pattern}|max\. # of increments", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class Increment:
-    """A line of the .sta file: step and increment, its attempt, iterations, total time."""
-
-    step: int
-    increment: int
-    attempt: int
-    iterations: int
-    time: float
-
-
 def increments(sta: Path) -> list[Increment]:
-    """Read the increments that converged so far, without attempts given up or half a line."""
+    """Read the increments of a .sta file so far, without attempts given up or half a line."""
     rows = [row for row in number_rows(sta) if len(row) >= 5]
-    return [Increment(int(a), int(b), int(c), int(d), time) for a, b, c, d, time, *_ in rows]
+    return [Increment(int(a), int(b), int(d), time) for a, b, _, d, time, *_ in rows]
 
 
 def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> str | None:

@@ -51,33 +51,26 @@ APPROACH = 1
 TONNES = 1e-12  # t/mm^3 in a kg/m^3
 
 
-def inflation_deck(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings) -> str:
-    """Return the deck of inflation, the bottom held at the supports; InputError as `deck_text`."""
-    return _deck(model, law, settings, None)
-
-
-def bending_deck(
-    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, inflated: Array
-) -> str:
-    """Return the deck of a cavity's inflation and bending; inflated : (nodes, 3) mm; InputError."""
-    gas, density = model.gas, TONNES * model.gas.density
-    cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
-    return _deck(model, law, settings, {"gas": cavity, "bodies": contact_bodies(model, inflated)})
-
-
-def _deck(
+def cylinder_deck(
     model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings,
-    bending: dict[str, Any] | None,
+    shape: Array | None = None,
 ) -> str:  # fmt: skip
+    """Return the deck of inflation, the bottom held at the supports; InputError as `deck_text`.
+
+    shape : (nodes, 3) mm, inflated: then that of a cavity's inflation and bending.
+    """
     mesh, filling, steps = model.mesh, len(model.inflation), len(model.increments)
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [one["name"] for one in guided]
     held = [*guided, fixed("hold", HELD, (1,))]
-    load, tables = [0.0, *model.inflation], []
-    if bending is None:
+    load, tables, bending = [0.0, *model.inflation], [], dict[str, Any]()
+    if shape is None:
         cases = [("inflation", filling, [*names, "hold", "pressure"])]
     else:
+        gas, density = model.gas, TONNES * model.gas.density
+        cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
+        bending = {"gas": cavity, "bodies": contact_bodies(model, shape)}
         cases = [
             ("inflation", filling, [*names, "hold", "fill"]),
             ("approach", APPROACH, [*names, "hold", "closed"]),
@@ -90,7 +83,7 @@ def _deck(
     tables.insert(0, time_table(1, "load", load))
     sets = node_sets(mesh, [*model.guides, HELD])
     deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held
-    return deck_text(*deck, pressure=pressure_context(settings), **(bending or {}))
+    return deck_text(*deck, pressure=pressure_context(settings), **bending)
 
 
 #: Nodal vector of contact forces; its name is from memory.
@@ -184,10 +177,10 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings, r
     """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
     without_cords(model, "Marc")
     filling, bending = len(model.inflation), len(model.increments)
-    deck = inflation_deck(model, law, settings)
+    deck = cylinder_deck(model, law, settings)
     shape = run(deck, filling, lambda t19, _: inflated(t19, model))
     return run(
-        bending_deck(model, law, settings, shape), filling + APPROACH + bending,
+        cylinder_deck(model, law, settings, shape), filling + APPROACH + bending,
         lambda t19, n: cylinder_history(t19, model, n),
         lambda t19, n: cylinder_history(t19, model, n, ended=False),
     )  # fmt: skip

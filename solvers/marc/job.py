@@ -16,6 +16,7 @@ from ...errors import LicenceDenied, SolverFailure
 from ..base import Progress
 from ..process import (
     WORDS,
+    Increment,
     Outcome,
     Watch,
     disk_full,
@@ -101,18 +102,8 @@ _EXIT = re.compile(r"exit\s++number\s*+:?\s*+(\d{1,9})(?!\d)", re.IGNORECASE)
 COLUMNS = 13
 
 
-@dataclass(frozen=True)
-class Increment:
-    """A line of the .sts file: load case, increment, iterations, total time."""
-
-    case: int
-    increment: int
-    iterations: int
-    time: float
-
-
 def increments(sts: Path) -> list[Increment]:
-    """Read increments so far, repeated ones too; lines that are not of 13 numbers are none."""
+    """Read increments of a .sts file, repeated ones too; lines not of 13 numbers are none."""
     rows = [row for row in number_rows(sts) if len(row) == COLUMNS]
     return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
 

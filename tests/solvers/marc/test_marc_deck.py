@@ -18,9 +18,8 @@ from bubblefit.meshes.tube import Refinement, cylinder_mesh
 from bubblefit.solvers.marc.cylinder import (
     ABOVE,
     BELOW,
-    bending_deck,
     contact_bodies,
-    inflation_deck,
+    cylinder_deck,
     touching,
 )
 from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set, set_lines
@@ -267,7 +266,7 @@ def grown(model):
 
 
 def test_inflation_needs_no_contact_and_no_cavity(read, model):
-    content = read(inflation_deck(model, LINEAR, MarcSettings()))
+    content = read(cylinder_deck(model, LINEAR, MarcSettings()))
     assert not content.gas and not content.bodies
     names = {"fix_symmetry_x", "fix_symmetry_z", "hold", "pressure"}
     assert set(content.cases[-1].conditions) == names
@@ -282,7 +281,7 @@ def test_inflation_needs_no_contact_and_no_cavity(read, model):
 
 
 def test_bending_is_a_cavity_that_is_filled_and_closed(read, model, grown):
-    content = read(bending_deck(model, LINEAR, MarcSettings(increments=0), grown))
+    content = read(cylinder_deck(model, LINEAR, MarcSettings(increments=0), grown))
     guides = {"fix_symmetry_x", "fix_symmetry_z"}
     assert set(content.initial) == guides | {"hold"}
     cases = [set(case.conditions) for case in content.cases]
@@ -315,7 +314,7 @@ def test_bending_is_a_cavity_that_is_filled_and_closed(read, model, grown):
 def test_bodies_are_where_they_touch(model, grown):
     whole = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0], symmetry="full")
     with pytest.raises(InputError, match="quarter"):
-        bending_deck(whole, LINEAR, MarcSettings(), np.zeros_like(whole.mesh.points))
+        cylinder_deck(whole, LINEAR, MarcSettings(), np.zeros_like(whole.mesh.points))
     touch = touching(model)
     assert len(touch["collar"]) and len(touch["supports"])
     assert not np.intersect1d(touch["collar"], touch["supports"]).size
@@ -411,7 +410,7 @@ def strip(settings=SETTINGS, law=LINEAR):
 
 def bending(settings=SETTINGS, law=LINEAR):
     grown = CYLINDER.mesh.points * [0.05, 0.05, 0.0]
-    return bending_deck(CYLINDER, law, settings, grown)
+    return cylinder_deck(CYLINDER, law, settings, grown)
 
 
 DECKS = {"bubble": bubble_text(), "strip": strip(), "bending": bending()}
@@ -430,7 +429,7 @@ def test_every_deck_of_ours_is_taken(read, deck, law, element):
 def test_the_collar_touches_after_half_a_millimetre(read, diameter, size):
     model = inflated_cylinder(diameter, 0.08, 0.81, size, deflections=[20.0])
     grown = model.mesh.points * [0.04, 0.05, 0.0]
-    content = read(bending_deck(model, LINEAR, SETTINGS, grown))
+    content = read(cylinder_deck(model, LINEAR, SETTINGS, grown))
     support, collar = content.bodies[1:]
     assert first_touch(collar, content.coordinates + grown) == pytest.approx(0.5, abs=1e-9)
     assert content.tables[collar.table].y[-1] == pytest.approx(-20.5)

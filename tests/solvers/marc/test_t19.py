@@ -11,7 +11,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.solvers.marc.cylinder import bending_deck
+from bubblefit.solvers.marc.cylinder import cylinder_deck
 from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import MarcSettings
 from bubblefit.solvers.marc.sheets import bubble_deck
@@ -226,7 +226,7 @@ def test_decks_by_another_reader(tmp_path, other, kind):
     else:
         model = inflated_cylinder(200.0, 0.1, 0.81, 80.0, deflections=[20.0])
         mesh, names = model.mesh, ["symmetry_x", "symmetry_z", "support_bottom"]
-        deck = bending_deck(model, LAW, MarcSettings(), np.zeros_like(mesh.points))
+        deck = cylinder_deck(model, LAW, MarcSettings(), np.zeros_like(mesh.points))
     path = tmp_path / "job.dat"
     path.write_text(deck)
     found = other.read(str(path))
