@@ -13,7 +13,6 @@ from bubblefit.readers.frames import Frame, FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, in_unit
 from bubblefit.readers.pressure_log import (
     REPEATED,
-    LogOptions,
     apex_height,
     check_pattern,
     choose_frames,
@@ -135,8 +134,8 @@ def test_states_of_dice_that_are_failures(tmp_path):
 
 def test_which_frame_is_near_enough():
     seen = np.array([0.010, 0.020, 0.050])
-    assert choose_frames(seen, [0.011, 0.05]).frames == (0, 2)
-    assert choose_frames(seen, [0.013, 0.047], tolerance=0.003).frames == (0, 2)
+    assert choose_frames(seen, [0.011, 0.05])[0] == (0, 2)
+    assert choose_frames(seen, [0.013, 0.047], tolerance=0.003)[0] == (0, 2)
     for asked, tolerance, words in (
         ([0.01101, 0.05], None, "pressures[0]: no frame within 1 kPa of 11.01 kPa"),
         ([0.013], 0.00299, "pressures[0]: no frame within 2.99 kPa of 13 kPa"),
@@ -145,12 +144,12 @@ def test_which_frame_is_near_enough():
         assert complaint(choose_frames, seen, asked, None, tolerance).startswith(words)
     # A millionth of the largest apart is one; more is two.
     one = choose_frames(np.array([0.1, 0.1 - 0.9e-7, 0.05]))
-    assert one.frames == (2, 1) and one.left_out == {REPEATED: 1}
-    assert choose_frames(np.array([0.1, 0.1 - 1.1e-7, 0.05])).frames == (2, 1, 0)
+    assert one == ((2, 1), {REPEATED: 1})
+    assert choose_frames(np.array([0.1, 0.1 - 1.1e-7, 0.05]))[0] == (2, 1, 0)
     seen = np.array([0.010, 0.011, 0.012, 0.060])
-    assert choose_frames(seen, count=4).frames == (0, 1, 2, 3)
-    assert choose_frames(seen, count=3).frames == (1, 2, 3)
-    assert choose_frames(seen, count=1).frames == (3,)
+    assert choose_frames(seen, count=4)[0] == (0, 1, 2, 3)
+    assert choose_frames(seen, count=3)[0] == (1, 2, 3)
+    assert choose_frames(seen, count=1)[0] == (3,)
     assert "frames: expected at most the 4 frames at" in complaint(choose_frames, seen, None, 5)
 
 
@@ -315,7 +314,7 @@ def test_a_log_in_volts(tmp_path):
         (Channel("U_p", "kPa", 100.0), [0.0, 0.0355, 1.0]),
         (Channel("U_p", "bar", 1.0, -0.5), [-0.05, -0.0145, 0.95]),
     ):
-        log = read_pressure_log(path, LogOptions(channel))
+        log = read_pressure_log(path, channel)
         assert log.pressure == pytest.approx(pressure)
         assert log.time == pytest.approx([0.0, 60.0, 120.0])
 
@@ -335,7 +334,7 @@ def test_a_log_in_volts(tmp_path):
 )
 def test_logs_that_cannot_be_told(tmp_path, text, channel, words):
     path = written(tmp_path, text)
-    complaint_with([str(path), *words], read_pressure_log, path, LogOptions(Channel(**channel)))
+    complaint_with([str(path), *words], read_pressure_log, path, Channel(**channel))
 
 
 #: The log's clock, s, of a test that begins at 0; its pressures, MPa.
