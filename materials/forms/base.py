@@ -93,7 +93,8 @@ class Form(Protocol):
         """Describe the entries of beta in one sentence, for a card's header and a report."""
         ...
 
-    def __hash__(self) -> int: ...
+    def __hash__(self) -> int:
+        return object.__hash__(self)
 
 
 def ratio_map(form: Form) -> Array:
