@@ -16,12 +16,7 @@ from ...readers.frames import FrameSource
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Weighting
-from ..measured import (
-    PERCENT,
-    USUAL_NOISE,
-    PreparedParts,
-    StrainObjective,
-)
+from ..measured import PERCENT, USUAL_NOISE, PreparedParts, StrainObjective
 from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
 from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
 

@@ -188,11 +188,7 @@ class View:
         """Return what the fields alone say of the frame: turn of the yarns, tilts about x and y
         (degrees), shifts (mm), as they make up for it; what is not clear is left out."""
         found, axes, rim = {}, self.axes, self.clamp or self.rim
-        if (
-            axes is not None
-            and axes.error <= registration.UNSURE
-            and (axes.clear >= registration.CLEAR)
-        ):
+        if axes and axes.error <= registration.UNSURE and axes.clear >= registration.CLEAR:
             found["turn"] = axes.off
         motion = _motion(self)
         if motion is not None and motion[2] > 0:
@@ -449,9 +445,8 @@ def _motion(view: View) -> Array | None:
     """Return (3,) mm, the mean motion well within the rim; None without points there."""
     if not view.inner(view.last).any():
         return None
-    return _mean_motion(view, view.last) - _mean_motion(view, view.fields[0]) * (
-        len(view.fields) > 1
-    )
+    first = _mean_motion(view, view.fields[0]) * (len(view.fields) > 1)
+    return _mean_motion(view, view.last) - first
 
 
 def _mean_motion(view: View, field: DisplacementField) -> Array:

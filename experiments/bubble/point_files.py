@@ -54,10 +54,9 @@ def pressures_by_log(
     with place.naming(at):
         times, said = _frame_times(section, files, own, place, folder)
         seen = times, height, log.time, log.pressure
-        given = section.offset
-        if given is None:
+        if section.offset is None:
             return pressure_log.find_offset(*seen), names, said
-        return pressure_log.given_offset(given, *seen), names, said
+        return pressure_log.given_offset(section.offset, *seen), names, said
 
 
 def _frame_times(

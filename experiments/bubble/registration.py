@@ -515,14 +515,6 @@ def centre_strain(frame: Frame, radius: float) -> Array:
     return np.asarray(0.5 * (tangents @ tangents.T - np.eye(2)))
 
 
-def warp_of_points(first: Array, second: Array) -> float:
-    """Return the angle (degrees, -90 to 90) of the line through two marked points (2,)."""
-    x, y = np.asarray(second, dtype=float) - np.asarray(first, dtype=float)
-    if np.hypot(x, y) < 1e-9:
-        raise InputError(None, "warp", "expected two different points along the warp")
-    return line_angle(float(np.degrees(np.arctan2(y, x))))
-
-
 @dataclass(frozen=True)
 class RegistrationOptions:
     """The given steps of a registration; everything else is found.
@@ -667,7 +659,10 @@ def _given_warp(placement: Placement, options: RegistrationOptions) -> float | N
     """Return degrees from the plane's x to the warp, where it is given."""
     if options.warp_points is not None:
         first, second = placement.places(np.array(options.warp_points, dtype=float))[:, :2]
-        return warp_of_points(first, second)
+        x, y = second - first
+        if np.hypot(x, y) < 1e-9:
+            raise InputError(None, "warp", "expected two different points along the warp")
+        return line_angle(float(np.degrees(np.arctan2(y, x))))
     return options.warp
 
 

@@ -405,7 +405,6 @@ class Cycles:
 
     histories: tuple[EvaluatedHistory, ...]
     width: float | None = None
-    knots: int = KNOTS
 
     @property
     def notes(self) -> list[Note]:
@@ -469,7 +468,7 @@ class Cycles:
     @cached_property
     def fits(self) -> tuple[FittedCycles, ...]:
         """Return a fit to all cycles of each history."""
-        return tuple(fit_cycles(one, self.knots) for one in self.histories)
+        return tuple(fit_cycles(one) for one in self.histories)
 
     @property
     def memory(self) -> pd.DataFrame:
@@ -492,7 +491,7 @@ class Cycles:
         """Return each cycle beside its prediction by a fit to the others, see `left_out`."""
         import pandas as pd
 
-        return pd.concat([left_out(one, self.knots) for one in self.histories], ignore_index=True)
+        return pd.concat([left_out(one) for one in self.histories], ignore_index=True)
 
     def fit_lines(self) -> list[str]:
         """Return the fits, and the cycles that were left out, as lines for the terminal."""

@@ -309,9 +309,6 @@ def load_words(load: float | None, sigma: float | None, unit: str = "") -> str:
     return f"{load:.0f}{unit}" if sigma is None else f"{load:.0f} ± {sigma:.2g}{unit}"
 
 
-FINISHED = "finished"
-
-
 @dataclass(frozen=True, eq=False)
 class CylinderOutcome:
     """Results of runs of cylinders with cards, in the order given."""
@@ -400,7 +397,7 @@ class CylinderOutcome:
         if record.failure:
             return f"failed: {record.failure}"
         if not record.early:
-            return FINISHED
+            return "finished"
         whole, reached = self.runs[number].test.deflections[-1], self.bent[number].deflection[-1]
         return f"stopped at {reached:g} of {whole:g} mm: {record.early}"
 

@@ -1,5 +1,7 @@
 """Registration: a test anywhere in the camera's view comes back into its own coordinates."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bubblefit.errors import InputError
@@ -15,7 +17,6 @@ from bubblefit.experiments.bubble.registration import (
     rim_of_motion,
     symmetry_axes,
     turned,
-    warp_of_points,
     without,
 )
 from bubblefit.materials.law import HypoelasticLaw
@@ -152,8 +153,10 @@ def test_what_is_given_is_taken():
     expected = turned(30.0).places(FRAMES[0].points - (3.0, -2.0, 0.0))
     np.testing.assert_allclose(moved[0].points, expected, atol=1e-9)
     assert "not both" in complaint(RegistrationOptions, warp=1.0, warp_points=marks)
-    assert warp_of_points(np.array([1.0, 1.0]), np.array([0.0, 2.0])) == pytest.approx(-45.0)
-    assert "two different points" in complaint(warp_of_points, np.zeros(2), np.zeros(2))
+    back = replace(options, warp_points=((1.0, 1.0, 0.0), (0.0, 2.0, 0.0)))
+    assert register(FRAMES, (RADIUS, RADIUS), back)[1].warp_angle == pytest.approx(-45.0)
+    one = replace(options, warp_points=(marks[0], marks[0]))
+    assert "two different points" in complaint(register, FRAMES, (RADIUS, RADIUS), one)
 
 
 def test_noise_shows_in_the_errors_that_are_said():
