@@ -258,17 +258,12 @@ def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]
         if isinstance(part, Table) and isinstance(twin, Table):
             pairs = zip_longest(part.rows, twin.rows)
             rows = [[n, *row] for pair in pairs for n, row in zip(names, pair, strict=True) if row]
-            note = part.note
-            if twin.note != note:
-                note = f"{names[0]}: {part.note} {names[1]}: {twin.note}"
+            note = _both(names, part.note, twin.note)
             text = (1, *(k + 1 for k in part.text))
             yield Table(part.title, ["of", *part.header], rows, note, text)
         elif isinstance(part, Charts) and isinstance(twin, Charts):
             charts = [_chart(names, a, b) for a, b in zip(part.charts, twin.charts, strict=True)]
-            caption = part.caption
-            if twin.caption != caption:
-                caption = f"{names[0]}: {part.caption} {names[1]}: {twin.caption}"
-            yield Charts(part.name, charts, caption)
+            yield Charts(part.name, charts, _both(names, part.caption, twin.caption))
         elif part == twin:
             yield part
         else:
@@ -276,6 +271,10 @@ def _merged(names: tuple[str, str], ones: Sequence[Part], others: Sequence[Part]
             yield from _named(names[1], twin)
     for part in left:
         yield from _named(names[1], part)
+
+
+def _both(names: tuple[str, str], one: str, other: str) -> str:
+    return one if one == other else f"{names[0]}: {one} {names[1]}: {other}"
 
 
 def _alike(one: Part, other: Part) -> bool:

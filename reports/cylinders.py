@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .charts import Array, Chart, Charts, Series, band, dots, faces, line, shades_of
 
@@ -32,15 +32,15 @@ class BendLine:
 
     name: str
     rank: int
-    deflection: ArrayLike
-    load: ArrayLike
-    pressure: ArrayLike = ()
-    volume: ArrayLike = ()
+    deflection: Array
+    load: Array
+    pressure: Array | None = None
+    volume: Array | None = None
     knee: Point | None = None
     limit: Point | None = None
     rms: float | None = None
     other: tuple[ArrayLike, ArrayLike] | None = None
-    off: ArrayLike | None = None
+    off: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class BendReadings:
     """Measured loads: every repetition's readings, their mean and scatter on one grid (k,)."""
 
     readings: Sequence[tuple[ArrayLike, ArrayLike]]
-    deflection: ArrayLike
-    mean: ArrayLike
-    deviation: ArrayLike
+    deflection: Array
+    mean: Array
+    deviation: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +110,16 @@ def _loads(panel: BendPanel) -> Chart:
     series: list[Series] = []
     if panel.measured is not None:
         seen = panel.measured
-        mean, spread = np.asarray(seen.mean, float), np.asarray(seen.deviation, float)
-        grid, ends = seen.deflection, (mean - spread, mean + spread)
-        series.append(band("scatter of repetitions (±)", grid, *ends, colour=7))
-        series.append(line("mean", grid, mean, colour=7, wide=True))
+        ends = seen.mean - seen.deviation, seen.mean + seen.deviation
+        series.append(band("scatter of repetitions (±)", seen.deflection, *ends, colour=7))
+        series.append(line("mean", seen.deflection, seen.mean, colour=7, wide=True))
         for elongation, load in seen.readings:
             series.append(dots("measured", elongation, load, colour=7))
     known = [(own.name, own.rms) for own in panel.lines if own.rms is not None]
     for own in panel.lines:
-        load, look = np.asarray(own.load, dtype=float), 1 + own.rank % 6
-        sure = None if own.off is None else (load - np.asarray(own.off), load + np.asarray(own.off))
-        series.append(line(own.name, own.deflection, load, sure, colour=look))
+        look = 1 + own.rank % 6
+        sure = None if own.off is None else (own.load - own.off, own.load + own.off)
+        series.append(line(own.name, own.deflection, own.load, sure, colour=look))
         if own.other is not None:
             series.append(line(f"{own.name}, other end", *own.other, colour=look, dashes=1))
         for words, point, shape in (
@@ -131,7 +130,7 @@ def _loads(panel: BendPanel) -> Chart:
                 series.append(dots(words, *at, colour=look, shape=shape, hollow=True))
     sides = [panel.spread] if any(own.off is not None for own in panel.lines) else []
     series += [band(name, (), (), (), colour=1 + panel.lines[0].rank % 6) for name in sides if name]
-    highest = max((float(np.max(np.asarray(own.load))) for own in panel.lines), default=0.0)
+    highest = max((float(own.load.max()) for own in panel.lines), default=0.0)
     alt = f"{panel.title}: load over deflection, up to {highest:.4g} N"
     alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in known)
     title = panel.title
@@ -143,12 +142,10 @@ def _loads(panel: BendPanel) -> Chart:
 def _misses(panel: BendPanel) -> Chart:
     seen = panel.measured
     assert seen is not None
-    grid, mean = np.asarray(seen.deflection, float), np.asarray(seen.mean, float)
-    spread = np.asarray(seen.deviation, float)
+    grid, spread = seen.deflection, seen.deviation
     series = [band("scatter of repetitions (±)", grid, -spread, spread, colour=7)]
     for own in panel.lines:
-        x, y = np.asarray(own.deflection, float), np.asarray(own.load, float)
-        off = np.interp(grid, x, y, left=np.nan, right=np.nan) - mean
+        off = np.interp(grid, own.deflection, own.load, left=np.nan, right=np.nan) - seen.mean
         series.append(line(own.name, grid, off, colour=1 + own.rank % 6))
     known = [f"{own.name} {own.rms:.3g} N" for own in panel.lines if own.rms is not None]
     title = f"RMS error: {', '.join(known)}" if known else ""
@@ -161,8 +158,8 @@ def gas_charts(panel: BendPanel) -> Charts:
     by_volume: list[Series] = []
     by_way: list[Series] = []
     for own in panel.lines:
-        pressure = 1e3 * np.asarray(own.pressure, dtype=float)
-        volume = np.asarray(own.volume, dtype=float) / MM3_PER_LITRE
+        assert own.pressure is not None and own.volume is not None
+        pressure, volume = 1e3 * own.pressure, own.volume / MM3_PER_LITRE
         name, look = f"{own.name}, from {volume[0]:.4g} litres", 1 + own.rank % 6
         by_volume.append(line(name, volume - volume[0], pressure, colour=look))
         by_way.append(line(name, own.deflection, pressure, colour=look))
@@ -175,19 +172,17 @@ def gas_charts(panel: BendPanel) -> Charts:
 
 
 def beam_charts(
-    bent: ArrayLike, quads: ArrayLike, strain: ArrayLike, outline: ArrayLike,
-    section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies, title: str = "",
+    now: Array, cells: NDArray[np.intp], strain: Array, before: Array,
+    section: tuple[Array, Array], bodies: BeamBodies, title: str = "",
 ) -> Charts:  # fmt: skip
     """Return a whole beam true to scale, coloured by its strain along the axis.
-    bent : (n, 3) mm, positions; z along the axis, y up. quads : (m, 4). strain : (m,) log strain
-    along the axis when bent. outline : (k, 2) mm, the inflated beam from the side as a closed line
+    now : (n, 3) mm, positions; z along the axis, y up. cells : (m, 4). strain : (m,) log strain
+    along the axis when bent. before : (k, 2) mm, the inflated beam from the side as a closed line
     (z, y). section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
     bodies : supports and collar when bent."""
-    now, before = np.asarray(bent, dtype=float), np.asarray(outline, dtype=float)
-    cells, values = np.asarray(quads, dtype=int), np.asarray(strain, dtype=float)
     # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
-    most = max(float(values.max()), 1e-6)
-    values = np.clip(values, -most, most)
+    most = max(float(strain.max()), 1e-6)
+    values = np.clip(strain, -most, most)
     # Of the two halves the eye sees one; what is nearer hides what is behind.
     seen = np.flatnonzero(now[cells, 0].mean(axis=1) >= 0)
     seen = seen[np.argsort(now[cells[seen], 0].mean(axis=1))]
@@ -224,8 +219,8 @@ def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
     return x + radius * np.cos(turn), y + radius * np.sin(turn)
 
 
-def _cut(section: tuple[ArrayLike, ArrayLike], bodies: BeamBodies) -> Chart:
-    before, now = (np.asarray(ring, dtype=float) for ring in section)
+def _cut(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
+    before, now = section
     circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * WALL)
     series = [
         *([line("collar", *circle)] if 0.0 in bodies.collars else []),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from datetime import date
-from math import inf, isfinite, nan
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -174,11 +174,7 @@ def found_by(fit: Fit) -> list[tuple[str, object]]:
 
 def starts_table(fit: Fit) -> Table:
     """Return every start, best first."""
-
-    def value(objective: float | None) -> float:
-        return objective if objective is not None and isfinite(objective) else inf
-
-    records = sorted(fit.best.records, key=lambda record: value(record.objective))
+    records = sorted(fit.best.records, key=lambda r: inf if r.objective is None else r.objective)
     rows: list[list[object]] = [
         [k, r.number, r.objective, r.analyses, r.status] for k, r in enumerate(records, start=1)
     ]

@@ -53,9 +53,10 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
     if bounds is not None and (bounds.lower is not None or bounds.upper is not None):
         problem = "comparing forms needs bounds on the moduli themselves: E1, E2, G12"
         raise InputError(project.path, "law.bounds", problem)
-    own = project.law.model_extra or {}
+    own, able = project.law.model_extra or {}, carries_load_ratios(make_solver(project))
+    carried = [name for name in form_names() if able or not of_load_ratio(name)]
     chosen: dict[str, Project] = {}
-    for asked in names or _carried(project):
+    for asked in names or carried:
         form, _, knots = asked.partition(":")
         settings: dict[str, Any] = {}
         check_one_of(form, form_names(), "--form")
@@ -68,11 +69,6 @@ def candidates(project: Project, names: Sequence[str] = ()) -> dict[str, Project
             asked, settings = f"{form}:{KNOTS}", {"knots": KNOTS}
         chosen[asked] = project.with_law(form, settings)
     return chosen
-
-
-def _carried(project: Project) -> list[str]:
-    carries = carries_load_ratios(make_solver(project))
-    return [name for name in form_names() if carries or not of_load_ratio(name)]
 
 
 def plain(name: str) -> str:
@@ -250,7 +246,16 @@ class LawComparison(Presented):
             "units": {c.name: c.objective.unit for c in first.fit.problem.comparisons
                       if c.name in first.compared},
             "fold_starts": self.fold_starts,
-            "forms": known([_form(f) for f in forms]),
+            "forms": known([{
+                "form": form.name, **form.fit.law.form.to_card(),
+                "coefficients": form.coefficients, "objective": form.fit.objective,
+                "fitted": form.fitted, "rms": form.rms, "cross_validated": form.validated,
+                "cross_validated_by_part": {
+                    name: float(np.mean(form.left_out(name))) for name in form.compared
+                },
+                "folds": form.left_out(),
+                "starts_objective": [r.objective for r in form.fit.best.ranked],
+            } for form in forms]),
             "noise": sum(first.noise.values()),
             "noise_by_part": first.noise,
             "least_cross_validated": best.name if best else None,
@@ -347,16 +352,3 @@ def compare(
         errors = errors_of_folds(setups[name], folds, fold_starts, place, tell)
         done.append(FormFit(name, found, errors, compared))
     return finished(LawComparison(tuple(done), fold_starts), out)
-
-
-def _form(form: FormFit) -> dict[str, Any]:
-    return {
-        "form": form.name, **form.fit.law.form.to_card(), "coefficients": form.coefficients,
-        "objective": form.fit.objective, "fitted": form.fitted, "rms": form.rms,
-        "cross_validated": form.validated,
-        "cross_validated_by_part": {
-            name: float(np.mean(form.left_out(name))) for name in form.compared
-        },
-        "folds": form.left_out(),
-        "starts_objective": [r.objective for r in form.fit.best.ranked],
-    }  # fmt: skip

@@ -79,12 +79,10 @@ def distinct(
     without an optimum is a group of its own."""
     groups: list[list[StartRecord]] = []
     for record in sorted(records, key=lambda r: r.number):
-        for group in groups:
-            if _are_one(problem, group[0], record, tolerance):
-                group.append(record)
-                break
-        else:
-            groups.append([record])
+        alike = (own for own in groups if _are_one(problem, own[0], record, tolerance))
+        if (group := next(alike, None)) is None:
+            groups.append(group := [])
+        group.append(record)
     return groups
 
 
@@ -529,24 +527,18 @@ def check(
 
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return all that a fit's starts depend on, as `folder.Facts`; data : of `data_rows`."""
-    names = [test.test.name for test in setup.tests]
+    project, names = setup.project, [test.test.name for test in setup.tests]
     files = {name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
              for name in names}  # fmt: skip
-    return {
-        "version": __version__, "solver": solver_facts(setup.project.fit.solver, solver.identity),
-        **_of_project(setup.project, names), "files": files,
-    }  # fmt: skip
-
-
-def _of_project(project: Project, names: list[str]) -> dict[str, Any]:
-    written = project.written
-    if written is None:  # of no file
-        return {"settings": {}, "tests": {name: {} for name in names}}
-    whole = settings_of(project, names)
+    whole = {} if project.written is None else settings_of(project, names)
+    said = {} if project.written is None else project.written.whole
     others = {"fabric": NAMES, "units": (), "law": (), "fit": UNCOUNTED}
-    return {"settings": {f"{part}.{key}": value for part, left_out in others.items()
-                         for key, value in whole[part].items() if key not in left_out},
-            "tests": {name: _without(written.whole.get(name, {})) for name in names}}  # fmt: skip
+    return {
+        "version": __version__, "solver": solver_facts(project.fit.solver, solver.identity),
+        "settings": {f"{part}.{key}": value for part, left_out in others.items()
+                     for key, value in whole.get(part, {}).items() if key not in left_out},
+        "tests": {name: _without(said.get(name, {})) for name in names}, "files": files,
+    }  # fmt: skip
 
 
 def _without(section: Mapping[str, Any]) -> dict[str, Any]:

@@ -100,7 +100,12 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
         return Convergence(remark="an order needs three levels")
     order = observed_order(h[-3:], changes[-2:])
     if order is None:
-        return Convergence(remark=_no_order(changes[-2:]))
+        why = "the changes follow no power of the size"
+        if changes[-2] * changes[-1] < 0:
+            why = "the values go up and down"
+        elif abs(changes[-1]) >= abs(changes[-2]):
+            why = "the changes do not get smaller"
+        return Convergence(remark=f"{why}: no order, no limit")
     limit = richardson(h[-2:], f[-2:], order)
     if abs(limit - f[-1]) > abs(f[-1] - f[-3]):
         # An order below a half where sizes are halved: the limit is not determined.
@@ -117,14 +122,6 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
     elif abs(previous - order) > STEADY:
         remark = f"the order still moves (from {previous:.2g}): the limit is a guess"
     return Convergence(order, limit, previous, remark)
-
-
-def _no_order(changes: Array) -> str:
-    if changes[0] * changes[1] < 0:
-        return "the values go up and down: no order, no limit"
-    if abs(changes[1]) >= abs(changes[0]):
-        return "the changes do not get smaller: no order, no limit"
-    return "the changes follow no power of the size: no order, no limit"
 
 
 def _sizes(sizes: ArrayLike, count: int) -> Array:

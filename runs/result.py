@@ -19,7 +19,6 @@ from ..experiments.kinds import (
     FittedTest,
     Judgement,
     Output,
-    PreparedTest,
     by_strain,
     notes_beyond,
     notes_of_states,
@@ -137,7 +136,20 @@ class Fit(Reported):
 
     @cached_property
     def tests(self) -> dict[str, FittedTest]:
-        return {t.test.name: self._fitted(t) for t in self.setup.tests}
+        best, unknowns, fitted = self.best, self.problem.unknowns, {}
+        names = [c.name for c in self.problem.comparisons]
+        y = best.point.unknowns
+        for prepared in self.setup.tests:
+            own = self.setup.own(prepared)
+            mine = [names.index(c.name) for c in own]
+            histories = tuple(best.point.histories[k] for k in mine)
+            each = (unknowns.nuisance_values(names[k], y) for k in mine)
+            nuisance = {name: value for of_one in each for name, value in of_one.items()}
+            fitted[prepared.test.name] = FittedTest(
+                own, histories, nuisance, self.law, self.laws, best.reached, best.valid,
+                best.certainty,
+            )  # fmt: skip
+        return fitted
 
     @cached_property
     def findings(self) -> dict[str, Findings]:
@@ -336,19 +348,6 @@ class Fit(Reported):
     def output(self, folder: Path, test: str) -> Output:
         """Return where a test writes: files carry its name if there are several tests."""
         return Output.of(folder, test, len(self.setup.tests) > 1)
-
-    def _fitted(self, prepared: PreparedTest) -> FittedTest:
-        best = self.best
-        own = {c.name for c in self.setup.own(prepared)}
-        names = [c.name for c in self.problem.comparisons]
-        mine = [k for k, name in enumerate(names) if name in own]
-        unknowns, y = self.problem.unknowns, best.point.unknowns
-        histories = tuple(best.point.histories[k] for k in mine)
-        nuisance = {n: v for k in mine for n, v in unknowns.nuisance_values(names[k], y).items()}
-        return FittedTest(
-            self.setup.own(prepared), histories, nuisance, self.law, self.laws, best.reached,
-            best.valid, best.certainty,
-        )  # fmt: skip
 
 
 #: Logarithmic strains of `answers`, beside the end of the valid ones.

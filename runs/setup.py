@@ -263,16 +263,14 @@ def with_shared(
     several, unknowns = tuple(comparisons), tuple(shared)
     if not unknowns:
         return several
-    weight = float(np.median([_weight(c) for c in several]))
+    own_noise = [
+        (o.least_noise / np.median(o.scale), np.mean(o.sizes))
+        for o in (c.objective for c in several)
+    ]
+    weight = float(np.median([float(noise / np.sqrt(size)) for noise, size in own_noise]))
     unknowns = tuple(n if n.prior is None else replace(n, weight=weight) for n in unknowns)
     own = [tuple(n for n in c.nuisance if not n.shared) for c in several]
     return tuple(replace(c, nuisance=(*unknowns, *n)) for c, n in zip(several, own, strict=True))
-
-
-def _weight(comparison: Comparison) -> float:
-    objective = comparison.objective
-    noise = objective.least_noise / np.median(objective.scale)
-    return float(noise / np.sqrt(np.mean(objective.sizes)))
 
 
 #: Parts that an earlier fit must share, unlike data, seed and solver.

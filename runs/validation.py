@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -282,26 +282,17 @@ def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A row of the errors at a part, in plain values; notes : as `errors.rows` has them."""
+    """The errors at a part, without notes, and `errors.rows` of its notes: in plain values."""
 
     number: int
-    part: str
-    error: float | None
-    rms: Mapping[str, float]
-    units: Mapping[str, str]
+    errors: Mapping[str, Any]
     notes: Sequence[Mapping[str, str]]
-
-    @property
-    def judged(self) -> HeldOut:
-        """Return the errors of the part with their notes."""
-        notes = tuple(Note(NoteKind(n["kind"]), n["note"], n["of"]) for n in self.notes)
-        return HeldOut(self.part, self.error, self.rms, self.units, notes)
 
 
 def _task(setup: FitSetup, parts: Sequence[Part], starts: int) -> Task:
     def left_out(number: int, tell: Callable[[Any], None]) -> LeftOut:
         one = fit_without(setup, parts[number], starts)
-        return LeftOut(number, one.test, one.error, one.rms, one.units, rows(one.notes))
+        return LeftOut(number, asdict(replace(one, notes=())), rows(one.notes))
 
     return left_out
 
@@ -316,8 +307,12 @@ def errors_left_out(
     record = StudyRecord(folder, file, "parts", LeftOut, "number", of)
     prepare = functools.partial(_task, setup, parts, starts)
     for row in record.run(setup.project, prepare, range(len(parts)), "parts"):
-        tell(None if row is None else f"without {row.part}")
-    return [record.rows[k].judged for k in range(len(parts))]
+        tell(None if row is None else f"without {names[row.number]}")
+    return [
+        HeldOut(**row.errors | {"notes": tuple(Note(NoteKind(n["kind"]), n["note"], n["of"])
+                                               for n in row.notes)})
+        for row in (record.rows[k] for k in range(len(parts)))
+    ]  # fmt: skip
 
 
 @checked

@@ -186,7 +186,7 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
     assert warp.error == pytest.approx(rms / loads.max(), rel=1e-3)
     record = tmp_path / "out" / "constant-without-directions.json"
     content = json.loads(record.read_text())
-    content["parts"][0]["error"] = 0.5
+    content["parts"][0]["errors"]["error"] = 0.5
     for change, error in (({}, 0.5), ({"of": "another fit"}, warp.error)):
         record.write_text(json.dumps({**content, **change}))
         again = [one.error for one in judged(resume=True)]
