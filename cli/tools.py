@@ -8,7 +8,7 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from ..solvers.run_cache import OFF, VARIABLE, RunCache, run_cache
 from .options import AS_JSON, with_options
 from .terminal import FILE, WORSE, command, show
 
-BYTES = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+BYTES = {"": 1, "B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 SECONDS = {"h": 3600.0, "d": 86400.0, "w": 604800.0}
 
 
@@ -56,13 +56,17 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
     gone = []
     if limit is not None:
         before = cache.entries()
-        cache.set_limit(_bytes("--limit", limit))
+        cache.set_limit(int(_amount("--limit", limit, BYTES, "a size such as 500MB or 2GB")))
         left = {entry.path for entry in cache.entries()}
         gone += [entry for entry in before if entry.path not in left]
     clear, size, older = options["clear"], options["size"], options["older"]
     if clear or size is not None or older is not None:
-        least = 0 if clear else None if size is None else _bytes("--prune", size)
-        gone += cache.prune(least, None if older is None else _seconds(older))
+        least, age = 0 if clear else None, None
+        if size is not None and not clear:
+            least = int(_amount("--prune", size, BYTES, "a size such as 500MB or 2GB"))
+        if older is not None:
+            age = _amount("--older", older, SECONDS, "an age such as 12h, 30d or 8w")
+        gone += cache.prune(least, age)
     entries = cache.entries()
     state: dict[str, Any] = {
         "folder": str(cache.folder), "runs": len(entries),
@@ -82,8 +86,8 @@ def cache_command(folder: Path | None, limit: str | None, **options: Any) -> Non
 
 
 def _words(size: int) -> str:
-    unit = next((u for u in ("GB", "MB", "kB") if size >= BYTES[u.upper()]), "B")
-    return f"{size / BYTES[unit.upper()]:.3g} {unit}"
+    unit = next((u for u in ("GB", "MB", "kB") if size >= BYTES[u]), "B")
+    return f"{size / BYTES[unit]:.3g} {unit}"
 
 
 def _ago(used: float) -> str:
@@ -94,19 +98,11 @@ def _ago(used: float) -> str:
     return f"{seconds / 60:.0f} minutes"
 
 
-def _bytes(option: str, text: str) -> int:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([kKMGT]?B?)", text.strip())
-    unit = "" if found is None else found[2].upper()
-    if found is None or (unit and unit != "B" and not unit.endswith("B")):
-        raise InputError(None, option, f"expected a size such as 500MB or 2GB, got {text!r}")
-    return int(float(found[1]) * BYTES[unit])
-
-
-def _seconds(text: str) -> float:
-    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?([hdw])", text.strip())
-    if found is None:
-        raise InputError(None, "--older", f"expected an age such as 12h, 30d or 8w, got {text!r}")
-    return float(found[1]) * SECONDS[found[2]]
+def _amount(option: str, text: str, units: Mapping[str, float], such: str) -> float:
+    found = re.fullmatch(r"(\d+(?:\.\d+)?) ?(\w*)", text.strip())
+    if found is None or found[2] not in units:
+        raise InputError(None, option, f"expected {such}, got {text!r}")
+    return float(found[1]) * units[found[2]]
 
 
 #: An option for each solver that has a program, to test that program.

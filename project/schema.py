@@ -37,8 +37,6 @@ from ..readers.sections import (
 )
 from ..solvers.registry import solver_sections
 
-Count = Annotated[int, Field(ge=1, le=1_000_000)]
-
 
 class FabricSection(Section):
     """[fabric]: the one fabric that all tests are of."""
@@ -153,15 +151,6 @@ class FitSection(Section):
     cache: bool | Name = True
 
 
-class CommonSections(Section):
-    """Everything of a project file but its tests, its cards and the solvers' own sections."""
-
-    fabric: FabricSection
-    units: UnitsSection = UnitsSection()
-    law: LawSection = LawSection()
-    fit: FitSection = FitSection()
-
-
 #: Keys that a card's own file says.
 OF_THE_FILE = ("beta", "form", "nu12", "thickness", "thickness_change", "strain_range")
 NU12, FORM = 0.24, "cubic"
@@ -196,9 +185,13 @@ OLD = (
 )
 
 
-class ProjectFile(CommonSections):
+class ProjectFile(Section):
     """A whole project file; its subclass from `project_file` has a list of tests a kind."""
 
+    fabric: FabricSection
+    units: UnitsSection = UnitsSection()
+    law: LawSection = LawSection()
+    fit: FitSection = FitSection()
     card: Annotated[list[CardSection], Field(max_length=MANY, default_factory=list)]
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 

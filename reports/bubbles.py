@@ -141,23 +141,17 @@ def _below_one(value: float) -> str:
     return f"{value:.3f}" if not value > 0.999 else f"1 − {1.0 - value:.1e}"
 
 
-def rise_charts(pressures: ArrayLike, rises: ArrayLike) -> Charts:
-    """Return the rises (frames,) mm of the centre over pressures (frames,) MPa."""
-    kilos = 1e3 * np.asarray(pressures, dtype=float)
-    series = [line("", kilos, rises, marks=True)]
-    chart = Chart("", "pressure, kPa", "rise about the centre, mm", series, from_zero=True)
-    return Charts("rises", [chart], "")
-
-
-def inflation_charts(curves: Sequence[tuple[Array, Array]]) -> Charts:
-    """Return apex heights (mm) over pressures (MPa) of inflations and releases in turn."""
+def rise_charts(name: str, up: str, curves: Sequence[tuple[Array, Array]]) -> Charts:
+    """Return heights (mm, the axis `up`) over pressures (MPa), of inflations and releases in turn.
+    One curve alone has no name."""
+    names = [f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}" for k in range(len(curves))]
     series = [
-        line(f"{'release' if k % 2 else 'inflation'} {k // 2 + 1}", 1e3 * p, height, marks=True,
-             colour=k // 2, dashes=k % 2)
-        for k, (p, height) in enumerate(curves)
+        line(own if len(curves) > 1 else "", 1e3 * pressures, heights, marks=True, colour=k // 2,
+             dashes=k % 2)
+        for k, (own, (pressures, heights)) in enumerate(zip(names, curves, strict=True))
     ]  # fmt: skip
-    chart = Chart("", "pressure, kPa", "height of the apex, mm", series, from_zero=True)
-    return Charts("inflations", [chart], "")
+    chart = Chart("", "pressure, kPa", up, series, from_zero=True)
+    return Charts(name, [chart], "")
 
 
 def clock_charts(times: Array, pressures: Array, heights: Array, taken: Array) -> Charts:

@@ -29,21 +29,18 @@ MOST = 3.0
 
 
 def moduli_charts(
-    strains: ArrayLike, moduli: ArrayLike, known: ArrayLike | None = None,
-    band: ArrayLike | None = None, caption: str = "",
+    strains: Array, fits: Array, truth: Array | None = None, band: Array | None = None,
+    caption: str = "",
 ) -> Charts:  # fmt: skip
     """Return charts of E1, E2 and G12 (Fig. 4.9), with deviations from a known solution.
     strains : (3, k) logarithmic strain for E1, E2, G12, each from zero to the largest reached.
-    moduli : (fits, 3, k) MPa, best fit first, in the same order. known : (3, k) MPa; a second row
+    fits : (fits, 3, k) MPa, best fit first, in the same order. truth : (3, k) MPa; a second row
     of charts then shows the deviation from it in percent. band : (2, 3, k) MPa, ends of the band
     of the first fit; not drawn where it is not finite."""
-    fits, x = np.asarray(moduli, dtype=float), PERCENT * np.asarray(strains, dtype=float)
-    truth = None if known is None else np.asarray(known)
-    ends = None if band is None else np.asarray(band, dtype=float)
-    charts = []
+    x, charts = PERCENT * strains, []
     for m, (title, label) in enumerate(PANELS):
-        own = None if ends is None else (ends[0, m], ends[1, m])
-        dot = ends is not None and known is None
+        own = None if band is None else (band[0, m], band[1, m])
+        dot = band is not None and truth is None
         series = [line("best", x[m], fits[0, m], own, ends=dot)]
         series += [line(x=x[m], y=curve, **_next(fits)) for curve in fits[1:, m]]
         drawn = [fits[:, m].max()]

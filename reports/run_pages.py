@@ -137,9 +137,12 @@ def write_check(check: Check, folder: Path) -> Path:
         for name, exhibit in exhibits
         for label, value in exhibit.facts
     ]
+    summary = "The data are fit to be fitted." if check.sound else "A fit would not begin."
+    if check.sound and (count := sum(len(judgement.doubts) for judgement in check.judgements)):
+        summary = f"A fit would begin, and carry {count} of the doubts below with it."
     shown = _estimate(check, folder, several)
     report = Report(
-        title=f"{check.setup.project.title}: a look at the data", summary=_check_summary(check),
+        title=f"{check.setup.project.title}: a look at the data", summary=summary,
         about=about_of(check.setup.project, None),
         facts=facts,
         warnings=[
@@ -197,14 +200,6 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
         Table("Distance from equilibrium", ["test", "chi", ""], gaps, text=(2,)),
     ]
     return Exhibit(figures=figures, tables=tables).all_parts()
-
-
-def _check_summary(check: Check) -> str:
-    if not check.sound:
-        return "A fit would not begin."
-    if doubts := sum(len(judgement.doubts) for judgement in check.judgements):
-        return f"A fit would begin, and carry {doubts} of the doubts below with it."
-    return "The data are fit to be fitted."
 
 
 def write_constants(

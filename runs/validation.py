@@ -308,11 +308,11 @@ def errors_left_out(
     prepare = functools.partial(_task, setup, parts, starts)
     for row in record.run(setup.project, prepare, range(len(parts)), "parts"):
         tell(None if row is None else f"without {names[row.number]}")
-    return [
-        HeldOut(**row.errors | {"notes": tuple(Note(NoteKind(n["kind"]), n["note"], n["of"])
-                                               for n in row.notes)})
-        for row in (record.rows[k] for k in range(len(parts)))
-    ]  # fmt: skip
+    judged = []
+    for row in (record.rows[k] for k in range(len(parts))):
+        notes = tuple(Note(NoteKind(n["kind"]), n["note"], n["of"]) for n in row.notes)
+        judged.append(HeldOut(**{**row.errors, "notes": notes}))
+    return judged
 
 
 @checked

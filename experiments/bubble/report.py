@@ -357,7 +357,8 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     if view.apexes:
         tables.append(_equilibrium(view))
     maps = registration_picture(prepared.fields, prepared.test.outline, out)
-    rises = bubbles.rise_charts([field.pressure for field in prepared.fields], all_rises)
+    curve = np.array([field.pressure for field in prepared.fields]), np.asarray(all_rises)
+    rises = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
     figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
     if not (found := prepared.recorded and prepared.recorded.inflations):
         return Exhibit(facts=facts, figures=figures, tables=tables)
@@ -365,7 +366,7 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     file = out.write("inflations.csv", table, "apex of each inflation beside the first")
     tables.append(Table("Inflations", list(INFLATIONS.values()), table.to_numpy().tolist(),
                         found.line))  # fmt: skip
-    apexes = bubbles.inflation_charts(found.curves)
+    apexes = bubbles.rise_charts("inflations", "height of the apex, mm", found.curves)
     figures.append(saved(out, "inflations.png", apexes, "apex in each inflation and release"))
     return Exhibit(facts=facts, figures=figures, tables=tables, files=[file])
 

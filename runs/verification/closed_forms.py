@@ -224,11 +224,9 @@ def in_the_middle(
     return 0.5 * float(np.ptp(height)), float(axial), float(hoop)
 
 
-def sphere_model(
-    n: int, pressures: Sequence[float], warp: tuple[float, float, float] = (0.3, 0.2, 1.0)
-) -> InflatedModel:
+def sphere_model(n: int, pressures: Sequence[float]) -> InflatedModel:
     """Return an octant of a sphere, of 3 n^2 facets."""
-    mesh = sphere_octant(n, RADIUS_THIN_WALLS)
+    mesh, warp = sphere_octant(n, RADIUS_THIN_WALLS), (0.3, 0.2, 1.0)
     return InflatedModel(mesh, THICKNESS_THIN_WALLS, warp, list(pressures), OCTANT, copies=8)
 
 
