@@ -244,11 +244,15 @@ def measured_files(
         if first != name:
             problem = f"column {column!r} is named for {first} and for {name}"
             raise place.error(f"data.points.columns.{name}", problem)
-    files = _files(points, place)
+    folder = place.folder(points.folder)
+    reference = None if points.reference is None else folder / points.reference
+    if reference is not None:
+        place.has(reference, "data.points.reference")
+    files = tuple(file for file in _files(points, place, folder) if file != reference)
     scale = LENGTH_UNITS[points.length_unit or place.scales.length_unit]
     options = FrameOptions(
         FIELD, columns or None, points.flag_column, points.comment, scale, points.valid_column,
-        points.decimal, points.coordinates, points.camera_axes, reference=_reference(points, place),
+        points.decimal, points.coordinates, points.camera_axes, reference=reference,
     )  # fmt: skip
     kind = named_format(place, "data.points.format", "frame", points.format)
     registration = registration_options(points.registration, place, scale)
@@ -262,18 +266,9 @@ def measured_files(
     forward = pressures is not None and not place.need_data
     if not several and (points.pressure is None or forward):
         return measured
-    how = measured.files, measured.options, measured.format, place, place.folder(points.folder)
+    how = measured.files, measured.options, measured.format, place, folder
     recorded = recorded_frames(points.pressure, pressures, *how, section.inflation)
     return replace(measured, files=recorded.files, recorded=recorded)
-
-
-def _reference(points: PointsSection, place: Place) -> Path | None:
-    """Return the file of the undeformed state, None without one; raises InputError."""
-    if points.reference is None:
-        return None
-    path = place.folder(points.folder) / points.reference
-    place.has(path, "data.points.reference")
-    return path
 
 
 #: A name of files with {index} in it, which may have a width; other braces are doubled.
@@ -295,9 +290,9 @@ def _numbered(points: PointsSection, place: Place) -> list[str]:
     return names
 
 
-def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
+def _files(points: PointsSection, place: Place, folder: Path) -> Sequence[Path]:
     """Return the files, patterns in `files` put into the natural order of their matches."""
-    folder, advice = place.folder(points.folder), "--data DIR names another folder"
+    advice = "--data DIR names another folder"
     if (points.files is None) == (points.pattern is None):
         problem = "expected exactly one of 'files' and 'pattern' (with 'indices')"
         raise place.error("data.points", problem)
@@ -313,7 +308,6 @@ def _files(points: PointsSection, place: Place) -> tuple[Path, ...]:
                 return ()
             where = f"{error.path} " if error.path is not None else ""
             raise place.error(error.field, f"{where}{error.problem}; {advice}") from None
-    files = [file for file in files if file != _reference(points, place)]
     for file in files:
         place.has(file, "data.points")
-    return tuple(files)
+    return files
