@@ -333,14 +333,11 @@ class CylinderOutcome:
         """Return the ends of the band that the solver gives, first what is predicted; or none."""
         return band_of(self.runs)
 
-    def other_end(self, number: int) -> BendingRun | None:
-        """Return the run at the other end of the band of a run, if it did not fail."""
-        own = self.runs[number]
-        same = (
-            i for i, run in enumerate(self.runs)
-            if run.test is own.test and run.card == own.card and not run.predicted
-        )  # fmt: skip
-        return self.bent.get(next(same, -1))
+    def other_end(self, number: int) -> int | None:
+        """Return the number of the other end of the band of a run, if it did not fail."""
+        own = self.runs[number].test, self.runs[number].card, False
+        ended = ((i, self.runs[i]) for i in self.bent)
+        return next((i for i, run in ended if (run.test, run.card, run.predicted) == own), None)
 
     @cached_property
     def spreads(self) -> Mapping[int, Array]:
@@ -352,11 +349,13 @@ class CylinderOutcome:
                 found[i] = around.sigma(bent.load, [o.load if o else None for o in others])
         return found
 
-    def sigma(self, number: int) -> dict[str, float | None]:
-        """Return the standard deviation (N) of the load at each place; None if unknown."""
+    def sigma(
+        self, number: int, places: Mapping[str, float] | None = None
+    ) -> dict[str, float | None]:
+        """Return the standard deviation (N) of the load at places, the test's; None if unknown."""
         if number not in self.spreads:
-            return dict.fromkeys(self.measures[number].loads)
-        places = self.runs[number].test.reading.places
+            return dict.fromkeys(places or self.measures[number].loads)
+        places = places or self.runs[number].test.reading.places
         known = loads_at(self.bent[number].deflection, self.spreads[number], places)
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
 
@@ -371,15 +370,11 @@ class CylinderOutcome:
             return None
         over = self.runs[number].test.reading.slope_over
         at, size = (over, value) if name == "stiffness" else value
-        sigma = 0.0
-        if number in self.spreads:
-            known = loads_at(self.bent[number].deflection, self.spreads[number], {"": at})[""]
-            sigma = known if known is not None and np.isfinite(known) else 0.0
+        sigma = self.sigma(number, {"": at})[""] or 0.0
         off = BAND * sigma / (over if name == "stiffness" else 1.0)
         ends = [size - off, size + off]
         if (other := self.other_end(number)) is not None:
-            far = next(self.measures[i] for i, bent in self.bent.items() if bent is other)
-            if (beside := getattr(far, name)) is not None:
+            if (beside := getattr(self.measures[other], name)) is not None:
                 end = beside if name == "stiffness" else beside[1]
                 ends += [end - off, end + off]
         return size, min(ends), max(ends)

@@ -218,7 +218,7 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
         rms = None if m.error is None else m.error.rms
         curves = run.deflection, run.load, run.pressure, run.volume
         other = outcome.other_end(i)
-        band = None if other is None else (other.deflection, other.load)
+        band = None if other is None else (outcome.bent[other].deflection, outcome.bent[other].load)
         sure = outcome.spreads.get(i)
         off = None if sure is None or np.isnan(sure).all() else BAND * sure
         lines.append(BendLine(card, cards.index(card), *curves, m.knee, m.limit, rms, band, off))
