@@ -244,12 +244,6 @@ def moduli_html(
     return html_table(caption, ["", "strain", "MPa", level], rows)
 
 
-def _read_only(numbers: ArrayLike) -> Array:
-    array = np.array(numbers, dtype=float)
-    array.flags.writeable = False
-    return array
-
-
 @compiled()
 def _increments(pieces, coupling, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
-from .mesh import Array, Mesh, places_of
+from .mesh import Array, Mesh, keep_levels, places_of
 from .tube import cylinder_mesh
 
 #: Places around a wall at which its force is taken, and stiffness left to a slack wall.
@@ -246,12 +246,8 @@ class BeamModel:
     copies: ClassVar[int] = 4
 
     def __post_init__(self) -> None:
-        steps = np.array(self.increments if len(self.increments) else self.deflections, float)
-        for name, value in (("deflections", self.deflections), ("increments", steps)):
-            values = np.array(value, dtype=float)
-            if not len(values) or not (np.diff(values, prepend=0.0) > 0).all():
-                raise InputError(None, name, f"expected positive, increasing, got {values}")
-            object.__setattr__(self, name, tuple(values.tolist()))
+        steps = self.increments if len(self.increments) else self.deflections
+        keep_levels(self, deflections=self.deflections, increments=steps)
         if not self.load_spacing + self.load_width < self.span:
             problem = f"{self.load_spacing:g} mm does not fit into a span of {self.span:g} mm"
             raise InputError(None, "load_spacing", problem)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh, are_levels, places_of
+from .mesh import Array, Mesh, keep_levels, places_of
 
 THICKNESS = "thickness"
 
@@ -74,18 +74,14 @@ class BubbleModel:
     unloaded: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        steps = np.array(self.increments if len(self.increments) else self.pressures, float)
-        wanted = np.array(self.pressures, float)
-        for name, values in (("pressures", wanted), ("increments", steps)):
-            if not are_levels(values, self.unloaded):
-                raise InputError(None, name, f"expected positive, increasing, got {values} MPa")
-        near = np.abs(steps[self._places(steps, wanted)] - wanted) if len(steps) else wanted
+        steps = self.increments if len(self.increments) else self.pressures
+        keep_levels(self, " MPa", self.unloaded, pressures=self.pressures, increments=steps)
+        wanted = np.array(self.pressures)
+        near = np.abs(np.array(self.increments)[self.reported] - wanted)
         if (near > 1e-9 * wanted).any():
             raise InputError(None, "increments", "must contain every reported pressure")
         if not self.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
-        object.__setattr__(self, "pressures", tuple(wanted.tolist()))
-        object.__setattr__(self, "increments", tuple(steps.tolist()))
         if not min(self.slack) > -1:
             raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh, places_of
+from .mesh import Array, Mesh, keep_levels, places_of
 from .tube import Refinement, cylinder_mesh
 
 #: Inner diameter and length (mm) of the collar by the largest diameter of cylinder (thesis 6.2).
@@ -204,19 +204,11 @@ class CylinderModel:
         object.__setattr__(self, "thickness", np.array(self.thickness, float))
         if self.reading is None:
             object.__setattr__(self, "reading", curve_reading(self.diameter))
-        steps = np.array(self.increments if len(self.increments) else self.deflections, float)
-        levels = {
-            "inflation": np.array(self.inflation, float),
-            "deflections": np.array(self.deflections, float),
-            "increments": steps,
-        }
-        for name, values in levels.items():
-            good = len(values) and np.isfinite(values).all()
-            if not good or not (np.diff(values, prepend=0.0) > 0).all():
-                raise InputError(None, name, f"expected positive, increasing, got {values}")
-            object.__setattr__(self, name, tuple(values.tolist()))
-        near = np.abs(steps[:, None] - levels["deflections"]).min(axis=0)
-        if (near > 1e-9 * levels["deflections"]).any():
+        steps = self.increments if len(self.increments) else self.deflections
+        keep_levels(self, inflation=self.inflation, deflections=self.deflections, increments=steps)
+        wanted = np.array(self.deflections)
+        near = np.abs(np.array(self.increments)[:, None] - wanted).min(axis=0)
+        if (near > 1e-9 * wanted).any():
             raise InputError(None, "increments", "must contain every reported deflection")
         self._check_bodies()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -424,8 +424,17 @@ def places_of(wanted: Sequence[float], steps: Sequence[float]) -> NDArray[np.int
     return np.array([int(np.argmin(np.abs(np.array(steps) - one))) for one in wanted])
 
 
-def are_levels(levels: NDArray[np.float64], unloaded: bool) -> bool:
-    """Return whether levels (n,) of a load are positive and rise; `unloaded`: or only change."""
-    change = np.diff(levels, prepend=0.0)
-    moves = (change != 0).all() and (levels > 0).all() if unloaded else (change > 0).all()
-    return bool(len(levels) and moves)
+def keep_levels(
+    model: Any, unit: str = "", unloaded: bool = False, **given: Sequence[float]
+) -> None:
+    """Keep levels of a load, by name, in a frozen model; InputError unless positive and rising.
+
+    unloaded : they need only change.
+    """
+    for name, levels in given.items():
+        values = np.array(levels, dtype=float)
+        change = np.diff(values, prepend=0.0)
+        moves = (change != 0).all() and (values > 0).all() if unloaded else (change > 0).all()
+        if not (len(values) and np.isfinite(values).all() and moves):
+            raise InputError(None, name, f"expected positive, increasing, got {values}{unit}")
+        object.__setattr__(model, name, tuple(values.tolist()))

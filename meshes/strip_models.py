@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .bubble_model import OfThickness
-from .mesh import Array, Mesh, are_levels
+from .mesh import Array, Mesh, keep_levels
 
 
 def strip_mesh(
@@ -98,11 +98,8 @@ class UniaxialModel(OfThickness):
     unloaded: bool = False
 
     def __post_init__(self) -> None:
-        levels = np.array(self.elongations, float)
-        if not are_levels(levels, self.unloaded):
-            raise InputError(None, "elongations", f"expected positive, increasing, got {levels} mm")
+        keep_levels(self, " mm", self.unloaded, elongations=self.elongations)
         self.check_thickness()
-        object.__setattr__(self, "elongations", tuple(levels.tolist()))
         object.__setattr__(self, "warp", np.asarray(self.warp, float))
 
     @property

@@ -31,11 +31,6 @@ def angles(n: int, seam: float) -> Array:
     return angle
 
 
-def of_equal_area(angle: Array, radius: float) -> float:
-    """Return how far (mm) nodes at these angles are out to enclose the area of the circle."""
-    return radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))
-
-
 def tube_grid(angle: Array, z: Array, radius: float) -> tuple[Array, Numbers, Numbers]:
     """Return points, quads row by row, node numbers (along, around); radius : mm, of the nodes."""
     circle = radius * snapped(np.stack([np.sin(angle), -np.cos(angle)], axis=1), NEAR)
@@ -152,7 +147,9 @@ def cylinder_mesh(
         problem = f"{size:g} mm gives more than {MAX_ELEMENTS} elements a half; make them larger"
         raise InputError(None, "size", problem)
     angle = angles(n, 0.5 * seam_width / radius)
-    points, quads, grid = tube_grid(angle, z, of_equal_area(angle, radius))
+    # Nodes are so far out that they enclose the area of the circle.
+    out = radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))
+    points, quads, grid = tube_grid(angle, z, out)
     points, quads, tube = with_cap(points, quads, grid, angle, n)
 
     seam = np.zeros(len(quads), bool)

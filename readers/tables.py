@@ -61,7 +61,7 @@ class TextTable:
             first, more = int(np.argmax(bad)), int(bad.sum()) - 1
             cell = text.iloc[first].strip()
             problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
-            if _is_thousands(cell):
+            if _GROUPED.fullmatch(cell):
                 problem += "; write numbers without marks of thousands"
             if more:
                 problem += f"; so in {more} more row{'s' * (more > 1)}"
@@ -219,10 +219,6 @@ def is_grouped(cell: str, decimal: str) -> bool:
     )
 
 
-def _is_thousands(cell: str) -> bool:
-    return bool(_GROUPED.fullmatch(cell))
-
-
 def are_thousands(cells: Sequence[str], decimal: str) -> bool:
     """Return whether all are whole numbers, some with marks of thousands, some plain above 99."""
     other = "," if decimal == "." else "."
@@ -230,7 +226,7 @@ def are_thousands(cells: Sequence[str], decimal: str) -> bool:
     plain = [cell for cell in cells if other not in cell and cell.casefold() not in HOLES]
     return (
         bool(marked)
-        and all(map(_is_thousands, marked))
+        and all(map(_GROUPED.fullmatch, marked))
         and all(map(_BELOW_1000.fullmatch, plain))
         and any(len(cell.lstrip("+-")) == 3 for cell in plain)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -326,13 +326,18 @@ _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
 
 
 @contextmanager
-def hearing(listener: Listener) -> Iterator[None]:
-    """Pass everything that is announced within the block to `listener`."""
-    before = _listener.set(listener)
+def given(variable: ContextVar[T], value: T) -> Iterator[None]:
+    """Give a variable of the context a value within the block."""
+    before = variable.set(value)
     try:
         yield
     finally:
-        _listener.reset(before)
+        variable.reset(before)
+
+
+def hearing(listener: Listener) -> AbstractContextManager[None]:
+    """Pass everything that is announced within the block to `listener`."""
+    return given(_listener, listener)
 
 
 def announce(words: str, of: str = "") -> None:

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any, Generic, TypeVar
 import psutil
 
 from ..errors import InputError
+from .base import given
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.
@@ -68,24 +69,14 @@ class Unwanted(Exception):
     """A task that was cancelled while its program ran."""
 
 
-@contextmanager
-def kept_open(file: int) -> Iterator[None]:
+def kept_open(file: int) -> AbstractContextManager[None]:
     """Let programs that are run within inherit the open file: they hold its lock, too."""
-    before = _kept_open.set((*_kept_open.get(), file))
-    try:
-        yield
-    finally:
-        _kept_open.reset(before)
+    return given(_kept_open, (*_kept_open.get(), file))
 
 
-@contextmanager
-def unless(unwanted: Callable[[], bool]) -> Iterator[None]:
+def unless(unwanted: Callable[[], bool]) -> AbstractContextManager[None]:
     """Kill a program that is run within, and raise `Unwanted`, once `unwanted` returns true."""
-    before = _unwanted.set(unwanted)
-    try:
-        yield
-    finally:
-        _unwanted.reset(before)
+    return given(_unwanted, unwanted)
 
 
 def check_wanted() -> None:

@@ -177,12 +177,7 @@ def _row(own: Any, field: str, end: float) -> list[float]:
     return [float(x) for x in own]
 
 
-def spline_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Spline:
-    """Return the spline of `knots`."""
-    return Spline.at(knots_of(settings, strain_range))
-
-
-register_form(Offer("spline", spline_named, ("knots",)))
+register_form(Offer("spline", lambda _, own, ends: Spline.at(knots_of(own, ends)), ("knots",)))
 
 
 Pair = tuple[float, float]

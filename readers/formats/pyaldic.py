@@ -22,14 +22,11 @@ from numpy.lib import format as npy
 from ...errors import InputError
 from ...files import reading
 from ..frames import Frame, FrameOptions, FrameRows, frame_of
-from ..mat_files import is_mat, read_variables, variable_names
+from ..mat_files import LARGEST, RATIO, SMALL, is_mat, read_variables, variable_names
 from ..registry import Format, register_format
 from ..text_frames import read_text_rows
 
 SIGNATURE = b"PK\x03\x04"
-#: Bytes of one array: at most, always, and by what it has packed (numbers do not pack a
-#: hundredfold).
-LARGEST, SMALL, RATIO = 2**30, 2**26, 100
 
 
 def array_names(path: Path) -> list[str]:

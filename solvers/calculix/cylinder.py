@@ -155,16 +155,8 @@ def cylinder_decks(
     return deck_files("cylinder.inp.j2", "Cylinder", solids, ELEMENT, TOLERANCES, context, folder)
 
 
-@dataclass(frozen=True, eq=False)
-class GasCurve:
-    """Gauge pressure (n,) MPa over increasing deflection (n,) mm; constant beyond both ends."""
-
-    deflection: Array
-    pressure: Array
-
-    def at(self, deflection: Array) -> Array:
-        """Return the gauge pressure in MPa at deflections in mm."""
-        return np.interp(deflection, self.deflection, self.pressure)
+#: Increasing deflection (n,) mm, and gauge pressure (n,) MPa there; constant beyond both ends.
+GasCurve = tuple[Array, Array]
 
 
 def compliance(pressures: Array, volumes: Array) -> float:
@@ -210,9 +202,9 @@ def bending_context(
         )  # fmt: skip
         node, element = node + len(body.points), element + len(body.elements)
     way = ABOVE + model.deflections[-1]
-    gas = gas or GasCurve(np.zeros(1), np.full(1, model.pressure))
+    gas = gas or (np.zeros(1), np.full(1, model.pressure))
     pressures = [(0.0, model.pressure), (REST + ABOVE, model.pressure)]
-    for deflection, pressure in zip(gas.deflection, gas.pressure, strict=True):
+    for deflection, pressure in zip(*gas, strict=True):
         if deflection > 0:  # before, the collar is not on the cylinder
             pressures.append((REST + ABOVE + float(deflection), float(pressure)))
     return {
@@ -311,8 +303,9 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
     return History(
         -reactions["collar"][:, 1], at(bent.displacement),
         *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)), reactions,
-        cavity_pressure=gas.at(wanted), cavity_volume=at(bent.volume), iterations=bent.iterations,
-        path=bent.displacement, remarks=(Note(EARLY, early),) if early else (),
+        cavity_pressure=np.interp(wanted, *gas), cavity_volume=at(bent.volume),
+        iterations=bent.iterations, path=bent.displacement,
+        remarks=(Note(EARLY, early),) if early else (),
         early=early if len(wanted) <= len(model.deflections) else "",
     )  # fmt: skip
 
@@ -346,20 +339,20 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     start, filling = run(cylinder_decks(model, law, solids, folder=folder), blown)
     rest = volumes(model, np.zeros((1, *model.mesh.points.shape)))
     slope = compliance(np.array([0.0, *model.inflation]), np.concatenate([rest, filling]))
-    gas = GasCurve(np.zeros(1), np.full(1, model.pressure))
+    gas = np.zeros(1), np.full(1, model.pressure)
     for number in range(1, PASSES + 1):
         context = bending_context(model, solids, start, gas)
         found: BentCylinder = run(cylinder_decks(model, law, solids, context, folder), bent, bent)
-        given = gas.at(found.deflection)
+        given = np.interp(found.deflection, *gas)
         closed = model.gas.closed_in(model.pressure, float(found.volume[0]))
         gap = gas_pressure(closed, found.volume) - given
         left = float(np.abs(gap).max()) / (model.pressure + model.gas.ambient)
         log.info("pass %d to %.4g mm: p V within %.1e", number, found.deflection[-1], left)
         if left <= SETTLED or number == PASSES:
             break
-        gas = GasCurve(found.deflection, better_pressure(closed, found.volume, given, slope))
+        gas = found.deflection, better_pressure(closed, found.volume, given, slope)
     history = bending_history(model, found, gas)
-    rise = 1e3 * (float(gas.at(found.deflection)[-1]) - model.pressure)
+    rise = 1e3 * (float(np.interp(found.deflection, *gas)[-1]) - model.pressure)
     words = f"gas: pass {number}, p V constant within {left:.1e} (wanted: {SETTLED:g}), "
     words += f"pressure {rise:+.3g} kPa at the end"
     return replace(history, remarks=(*history.remarks, Note(GAS, words)))

@@ -234,8 +234,9 @@ class Loading:
     def reached(
         self, lower: float, u: Array, level: float, start: Array, cuts: int
     ) -> Array | None:
-        """Return the equilibrium at `level` from that at `lower`, which is u."""
-        return reach(self, lower, u, level, start, cuts)
+        """Return the equilibrium at `level` from `start`, else in steps from u, at `lower`."""
+        found = self.equilibrium(start, level)
+        return found if found is not None else halved(self, lower, u, level, cuts)
 
     def problem(self, before: float, level: float, place: str) -> str:
         """Return the message where `level` cannot be reached; place : "increment 3 of 7"."""
@@ -286,25 +287,17 @@ def _from_guess(loading: Loading, levels: Sequence[float] | Array, guess: Array)
     return None
 
 
-def reach(
-    loading: Loading, lower: float, u: Array, level: float, start: Array, cuts: int
-) -> Array | None:
-    """Return the equilibrium at `level` from `start`, else through halved steps from `lower`."""
-    found = loading.equilibrium(start, level)
-    return found if found is not None else halved(loading, lower, u, level, cuts)
-
-
 def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) -> Array | None:
     """Return the equilibrium at `level` in two steps from `lower`, each perhaps halved again."""
     if cuts == 0:
         return None
     middle = 0.5 * (lower + level)
     start = loading.onward(u, lower, middle, None)
-    halfway = reach(loading, lower, u, middle, start, cuts - 1)
+    halfway = Loading.reached(loading, lower, u, middle, start, cuts - 1)
     if halfway is None:
         return None
     start = loading.onward(halfway, middle, level, u)
-    return reach(loading, middle, halfway, level, start, cuts - 1)
+    return Loading.reached(loading, middle, halfway, level, start, cuts - 1)
 
 
 def last_way(levels: Sequence[float], level: float, most: int) -> int:

@@ -15,7 +15,6 @@ from bubblefit.solvers.base import History, extremes, log_strain
 from bubblefit.solvers.calculix import cylinder
 from bubblefit.solvers.calculix.cylinder import (
     ABOVE,
-    GasCurve,
     bending_context,
     bending_history,
     bent_cylinder,
@@ -229,7 +228,7 @@ def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path)
     model, history = bent
     solids, results = solid_mesh(model), last_run(scratch) / "job.frd"
     converged = {(i.step, i.increment) for i in increments(results.with_name("job.sta"))}
-    gas = GasCurve(np.array([0.0]), np.array([model.pressure]))
+    gas = np.array([0.0]), np.array([model.pressure])
     whole = bent_cylinder(results, model, solids, 0)
     np.testing.assert_array_equal(bending_history(model, whole, gas).load, history.load)
     assert whole.deflection[-1] == pytest.approx(8.0)
@@ -282,7 +281,7 @@ def test_bending_goes_in_increments_of_its_own():
     model = replace(case(30.0, 40.0), deflections=[10.0, 40.0], increments=())
     solids = solid_mesh(model)
     flat = np.zeros_like(solids.points)
-    gas = GasCurve(np.array([0.0, 20.0, 40.0]), np.array([0.14, 0.141, 0.142]))
+    gas = np.array([0.0, 20.0, 40.0]), np.array([0.14, 0.141, 0.142])
     context = bending_context(model, solids, flat, gas)
     deck = cylinder_decks(model, LINEAR, solids, context)["job.inp"]
     step = deck[deck.index("** Step 2") :].splitlines()
