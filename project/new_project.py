@@ -34,20 +34,6 @@ def write_project(
     """Write a project file that can be read.
     tests : how many of each kind. name, thickness : of the fabric, mm. said : `USUAL` values that
     are otherwise; mm and kPa. InputError: what is said makes no project. OutputError."""
-    text = project_text(tests, name, thickness, form, **said)
-    with tempfile.TemporaryDirectory() as folder:  # so that a wrong one leaves no folder
-        tried = Path(folder) / path.name
-        tried.write_text(text, encoding="utf-8")
-        try:
-            read_project(tried, need_data=False)
-        except InputError as error:
-            raise InputError(None, error.field, error.problem) from None
-    write_text(path, text)
-
-
-def project_text(
-    tests: Mapping[str, int], name: str, thickness: float, form: str, **said: Any
-) -> str:
     values = {**USUAL, **{key: value for key, value in said.items() if value is not None}}
     values["deflection"] = 1.6 * values["diameter"]
     asked = [kind for kind, count in tests.items() if count]
@@ -61,13 +47,21 @@ def project_text(
         for kind in asked
         for n in range(1, tests[kind] + 1)
     ]
-    return render(
+    text = render(
         "project/project.toml.j2", name=_quoted(name), version=__version__, thickness=thickness,
         form=_quoted(form), fitted=bool(fitted), predicted=len(fitted) < len(asked), tests=parts,
         methods=", ".join(f'"{name}"' for name in method_names()),
         # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
         strain_range="strips" not in asked,
     )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:  # so that a wrong one leaves no folder
+        tried = Path(folder) / path.name
+        tried.write_text(text, encoding="utf-8")
+        try:
+            read_project(tried, need_data=False)
+        except InputError as error:
+            raise InputError(None, error.field, error.problem) from None
+    write_text(path, text)
 
 
 def _quoted(text: str) -> str:

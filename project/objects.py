@@ -181,12 +181,8 @@ class Definition:
     @classmethod
     def of(cls, **section: Any) -> Self:
         """Return the test whose table says this, key by key."""
-        return cls._made(section)
-
-    @classmethod
-    def _made(cls, section: Mapping[str, Any], files: Mapping[str, Held] | None = None) -> Self:
         made = cls.__new__(cls)
-        Definition.__init__(made, cls.of_kind, section, files or {})
+        Definition.__init__(made, cls.of_kind, section)
         return made
 
     def with_keys(self, **keys: Any) -> Definition:
@@ -277,7 +273,7 @@ class Bubble(Definition):
         """
         if pressures is not None:
             keys["pressures"] = _pressures(pressures, None)
-        return cls._made(_sorted("bubble", {**keys, "files": file_names(files)}))
+        return cls.of(**_sorted("bubble", {**keys, "files": file_names(files)}))
 
 
 class Strips(Definition):
@@ -322,7 +318,7 @@ class Strips(Definition):
             known = dict.fromkeys(DIRECTIONS, gauge)
             every = [read_load_curves(one, gauge_length=known, **how) for one in listed]
             here = {curve.direction for own in every for curve in own}
-        return cls._made(_sorted("strips", {**keys, **_gauges(gauge, keys, here), "files": listed}))
+        return cls.of(**_sorted("strips", {**keys, **_gauges(gauge, keys, here), "files": listed}))
 
 
 class Biaxial(Definition):
@@ -360,7 +356,7 @@ class Biaxial(Definition):
     @classmethod
     def read(cls, files: Files | Mapping[str, Files], **keys: Any) -> Self:
         """Return the test of files, or of files by ratio; keys : as of `Biaxial`."""
-        return cls._made(_sorted("biaxial", {**keys, "files": _listed(files)}))
+        return cls.of(**_sorted("biaxial", {**keys, "files": _listed(files)}))
 
 
 class Cylinder(Definition):
@@ -391,7 +387,7 @@ class Cylinder(Definition):
     def read(cls, files: Files, **keys: Any) -> Self:
         """Return the test with measured repetitions in files; keys : as of `Cylinder`."""
         check_pressure("pressure", float(numbers("pressure", keys.get("pressure", 0))))
-        return cls._made(_sorted("cylinder", {**keys, "files": _listed(files)}))
+        return cls.of(**_sorted("cylinder", {**keys, "files": _listed(files)}))
 
 
 def _frames_of(table: Table, pressures: Numbers) -> tuple[list[Array], list[Array], Numbers]:

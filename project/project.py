@@ -469,11 +469,11 @@ def _project(
     fabric = Fabric(said.name, said.thickness * length, said.thickness_change, said.lab)
     scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
-    tests = _tests(file, place, data)
+    tests, written = _tests(file, place, text, data, made)
     return Project(
         path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
         cards=read_cards(place, file.card), solver_options=solver_settings(path, file.solver),
-        written=_written(file, path, text, data, made),
+        written=written,
     )  # fmt: skip
 
 
@@ -500,8 +500,13 @@ def _card_tables(
     return said
 
 
-def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, Test]:
+def _tests(
+    file: ProjectFile, place: Place, text: str, data: Folders | None, made: Sequence[Definition],
+) -> tuple[dict[str, Test], Written]:  # fmt: skip
+    """Return the tests of a file by name, and the words of the file."""
     tests: dict[str, Test] = {}
+    said, whole = dict[str, Settings](), dict[str, Settings]()
+    objects: dict[str, Definition] = {}
     names = [name for kind in kinds() for name in _names(kind, file.tests(kind))]
     if isinstance(data, Mapping):
         for name in data:
@@ -518,30 +523,17 @@ def _tests(file: ProjectFile, place: Place, data: Folders | None) -> dict[str, T
             tests[own] = kind.read(section, here, own)
             if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
                 raise here.error("data", NO_FILES)
+            key, keys = getattr(kind, "folder_key", None), section.model_dump(exclude_unset=True)
+            said[own] = section_as_run(keys, own, key, place.path.parent, folder)
+            whole[own] = section.model_dump(exclude_none=True)
+        given = [one for one in made if one.kind == name]
+        objects |= dict(zip(_names(name, sections), given, strict=bool(made)))
     if isinstance(data, Path) and not any(map(_reads, tests.values())):
         at = next((f"{k}[0].data" for k in kinds() if file.tests(k)), "data")
         raise InputError(place.path, at, NO_FILES)
-    return tests
-
-
-def _written(
-    file: ProjectFile, path: Path, text: str, data: Folders | None, made: Sequence[Definition],
-) -> Written:  # fmt: skip
-    sections, whole = {}, {}
-    objects: dict[str, Definition] = {}
-    for name, kind in kinds().items():
-        own = file.tests(name)
-        given = [one for one in made if one.kind == name]
-        for section, test in zip(own, _names(name, own), strict=True):
-            folder = data.get(test) if isinstance(data, Mapping) else data
-            key = getattr(kind, "folder_key", None)
-            said = section.model_dump(exclude_unset=True)
-            sections[test] = section_as_run(said, test, key, path.parent, folder)
-            whole[test] = section.model_dump(exclude_none=True)
-        objects |= dict(zip(_names(name, own), given, strict=bool(made)))
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]
-    return Written(text, common, sections, whole, cards, objects)
+    return tests, Written(text, common, said, whole, cards, objects)
 
 
 def _reads(test: Test) -> bool:

@@ -93,17 +93,11 @@ def _determined(fit: Fit) -> Sequence[Table]:
     return [Table(TITLE, header, rows, note)]
 
 
-def _said_by_tests(fit: Fit) -> str:
-    said = "; ".join(
-        f"{name}: {f.summary}" if len(fit.findings) > 1 else f.summary
-        for name, f in fit.findings.items()
-    )
-    return f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {said}."
-
-
 def _checked(fit: Fit) -> list[str]:
-    """Return the results of the checks of the data before the fit, and of stability."""
-    lines = []
+    """Return what the tests say of the best fit, and the checks of data and of stability."""
+    several = "{0}: {1}" if len(fit.findings) > 1 else "{1}"
+    said = "; ".join(several.format(name, f.summary) for name, f in fit.findings.items())
+    lines = [f"Best of {len(fit.best.ranked)} starts: objective {fit.objective:.3g}; {said}."]
     if fit.judgements:
         doubts = sum(len(judgement.doubts) for judgement in fit.judgements)
         seen = f"{doubts} doubts, listed below" if doubts else "nothing doubtful"
@@ -381,7 +375,7 @@ def _page(fit: Fit, folder: Path) -> Report:
         sections=[
             Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
             Section("Can it be trusted?", [
-                warnings_of(fit), Words([_said_by_tests(fit), *_checked(fit)]), misfit_table(fit),
+                warnings_of(fit), Words(_checked(fit)), misfit_table(fit),
                 *([Table("Errors of the moduli", header, rows, note)] if rows else []),
                 Facts(assumed(fit)), reached_table(fit),
             ]),
@@ -566,36 +560,30 @@ def record_tables(record: Record) -> list[Table]:
             ["machine", ", ".join(f"{value}" for value in machine.values())],
             ["versions", ", ".join(f"{k} {v}" for k, v in run.get("versions", {}).items())],
         ]
-    if record.solver:
-        rows.append(["solver", _solver(record.solver)])
+    if facts := record.solver:
+        settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
+        itself = facts.get("version") or facts.get("name", "")
+        rows.append(["solver", "; ".join([itself, *settings])])
     if not record.data:
         rows.append(["data files", NO_FILES])
     note = f"All of it, with the text of the project: {PROVENANCE}."
     if record.settings is not None:
         note += f" The project with the options of the command, to be run again: {AS_RUN}."
     tables = [Table(RECORD_TITLE, ["", ""], rows, note, text=(1,))]
-    if record.data:
-        tables.append(_data_table(record.data))
-    return tables
-
-
-def _solver(facts: Mapping[str, str]) -> str:
-    settings = [f"{k} = {v}" for k, v in facts.items() if v and k not in ("name", "version")]
-    return "; ".join([facts.get("version") or facts.get("name", ""), *settings])
-
-
-def _data_table(data: Sequence[Mapping[str, Any]]) -> Table:
+    if not record.data:
+        return tables
     header = ["test", "file", "sha256", "format", "columns", "rows used", "rows dropped"]
-    rows: list[list[object]] = [
+    files: list[list[object]] = [
         [
             row["test"], row["name"], row["sha256"][:DIGITS], row["format"],
             _columns(row["columns"], row["units"]), row["rows_used"],
             ", ".join(f"{n} {why}" for why, n in row["rows_dropped"].items()) or "none",
         ]
-        for row in data
+        for row in record.data
     ]  # fmt: skip
     note = f"The first {DIGITS} digits of each sha256; {PROVENANCE} has all, and what was chosen."
-    return Table(f"{RECORD_TITLE}: data files", header, rows, note, text=(1, 2, 3, 4, 6))
+    title = f"{RECORD_TITLE}: data files"
+    return [*tables, Table(title, header, files, note, text=(1, 2, 3, 4, 6))]
 
 
 def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:

@@ -518,7 +518,13 @@ def result_of(fit: Fit) -> dict[str, Any]:
     if len(fit.findings) == 1:
         result |= next(iter(fit.findings.values())).numbers
     else:
-        result |= _together(fit)
+        norms, errors = fit.problem.norms(fit.best.point.residual), {}
+        weights = {name: project.tests[name].weight for name in fit.tests}
+        for name, fitted in fit.tests.items():
+            own = np.concatenate([norms[c.name] for c in fitted.comparisons])
+            errors[name] = float(own.sum() / weights[name])
+        result |= {"mean_relative_error": errors, "weights": weights,
+                   "pinned": pinned_numbers(fit)}  # fmt: skip
     warnings = [note.line for note in fit.notes]
     return result | {"warnings": warnings, "notes": rows(fit.notes)}
 
@@ -536,18 +542,6 @@ def pinned_numbers(fit: Fit) -> dict[str, dict[str, dict[str, float]]]:
         }
         for source, sigmas in fit.pinned.items()
     }
-
-
-def _together(fit: Fit) -> dict[str, Any]:
-    """Return what a fit of several tests adds to the numbers of each."""
-    norms = fit.problem.norms(fit.best.point.residual)
-    errors = {}
-    for test, fitted in fit.tests.items():
-        own = np.concatenate([norms[c.name] for c in fitted.comparisons])
-        errors[test] = float(own.sum() / fit.project.tests[test].weight)
-    return {"mean_relative_error": errors,
-            "weights": {name: fit.project.tests[name].weight for name in fit.tests},
-            "pinned": pinned_numbers(fit)}  # fmt: skip
 
 
 def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[Note]:

@@ -156,7 +156,14 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
             name: _ordered(project, f"law.bounds.{name}", pair, unit)
             for name, pair in ranges.items()
         })  # fmt: skip
-    lower, upper = (_listed(project, form, name) for name in ("lower", "upper"))
+    for name, values in listed.items():
+        if len(values) != len(form.free):
+            problem = (
+                f"expected {len(form.free)} coefficients of {form.name} moduli "
+                f"({', '.join(form.labels[i] for i in form.free)}), got {len(values)}"
+            )
+            raise InputError(path, f"law.bounds.{name}", problem)
+    lower, upper = listed.values()
     for i, (place, low, high) in enumerate(zip(form.free, lower, upper, strict=True)):
         if low > high:
             problem = (
@@ -175,18 +182,6 @@ def _ordered(project: Project, key: str, pair: Sequence[float], unit: float) -> 
         problem = f"expected [least, largest], got [{low:g}, {high:g}]"
         raise InputError(project.path, key, problem)
     return low * unit, high * unit
-
-
-def _listed(project: Project, form: Form, name: str) -> list[float]:
-    assert project.law.bounds is not None
-    values: list[float] = getattr(project.law.bounds, name)
-    if len(values) != len(form.free):
-        problem = (
-            f"expected {len(form.free)} coefficients of {form.name} moduli "
-            f"({', '.join(form.labels[i] for i in form.free)}), got {len(values)}"
-        )
-        raise InputError(project.path, f"law.bounds.{name}", problem)
-    return values
 
 
 #: Default bounds; those of the thickness in shares of the fabric's.

@@ -95,28 +95,20 @@ def held_out(
     if nuisance is not None:
         norms = np.concatenate(list(problem.norms(point.residual).values()))
         return HeldOut(name, float(norms.sum()), rms, units, notes)
-    own = report_of(prepared.test.kind).findings(
-        prepared, _fitted(prepared, problem, point, law, make_solver)
-    )
+    # As after a fit, in the test's own objective.
+    reached, each = reached_by(point), nuisance_of(problem, point.unknowns).values()
+    fitted = FittedTest(
+        prepared.comparisons(make_solver, Weighting()), point.histories,
+        {name: value for of_one in each for name, value in of_one.items()}, law, [law], reached,
+        np.minimum(reached, law.strain_range), None,
+    )  # fmt: skip
+    own = report_of(prepared.test.kind).findings(prepared, fitted)
     return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
 
 
 def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
     """Return the errors of a test, or a part of it, without any."""
     return HeldOut(name, None, {}, units, (Note(FAILED, why, name),))
-
-
-def _fitted(
-    prepared: PreparedTest, problem: FitProblem, point: Evaluation, law: HypoelasticLaw,
-    make_solver: MakeSolver,
-) -> FittedTest:  # fmt: skip
-    """Return the test as after a fit, in its own objective."""
-    reached = reached_by(point)
-    own = prepared.comparisons(make_solver, Weighting())
-    values = nuisance_of(problem, point.unknowns).values()
-    nuisance = {name: value for of_one in values for name, value in of_one.items()}
-    valid = np.minimum(reached, law.strain_range)
-    return FittedTest(own, point.histories, nuisance, law, [law], reached, valid, None)
 
 
 UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus held there"
