@@ -19,6 +19,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from importlib import import_module
@@ -148,6 +149,16 @@ def one_blas_thread() -> Iterator[None]:
     said = any(os.environ.get(name) for name in THREADS)
     with threadpool_limits(None if said else 1, user_api="blas"):
         yield
+
+
+@contextmanager
+def given(variable: ContextVar[V], value: V) -> Iterator[None]:
+    """Give a variable of the context a value within the block."""
+    before = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(before)
 
 
 def ends(call: Callable[[], object], seconds: float) -> bool:

@@ -1,5 +1,7 @@
 """Formats of data files: each a module of `formats`, or a plug-in (`bubblefit.readers`)."""
 
+from __future__ import annotations
+
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import suppress

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, cast, runtime
 import numpy as np
 
 from ..errors import InputError, Note, NoteKind, SolverFailure
+from ..files import given
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..materials.wrinkles import relaxed_increments
@@ -323,16 +324,6 @@ def _log(said: Announcement) -> None:
 
 
 _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
-
-
-@contextmanager
-def given(variable: ContextVar[T], value: T) -> Iterator[None]:
-    """Give a variable of the context a value within the block."""
-    before = variable.set(value)
-    try:
-        yield
-    finally:
-        variable.reset(before)
 
 
 def hearing(listener: Listener) -> AbstractContextManager[None]:

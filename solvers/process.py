@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 import psutil
 
 from ..errors import InputError
-from .base import given
+from ..files import given
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.
