@@ -93,8 +93,9 @@ class DesignersConstants:
 
 
 Minimise = Literal["strain", "load"]
-#: Points of a line whose squares are added.
+#: Points of a line whose squares are added, and their shares of it.
 POINTS = 10
+SHARES = np.arange(1, POINTS + 1) / POINTS
 #: Of the larger load's change: a yarn whose load changes by less is unloaded.
 UNLOADED = 0.1
 
@@ -178,7 +179,7 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
         constants = DesignersConstants.of_compliance(whole)
     squares, rms, count = 0.0, {}, 0
     for path in paths:
-        off = 100.0 * np.outer(_shares(), path.strain - constants.strain(path.load))
+        off = 100.0 * np.outer(SHARES, path.strain - constants.strain(path.load))
         which = np.array(options.counts(path))
         squares += float((off[:, which] ** 2).sum())
         count += int(which.sum())
@@ -214,14 +215,10 @@ def every_option(paths: Sequence[LinearPath]) -> list[Options]:
     return found
 
 
-def _shares() -> Array:
-    return np.arange(1, POINTS + 1) / POINTS
-
-
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
     rows, right = [], []
     # All points of a straight line say the same: one row with the root of their squares' sum.
-    weight = float(np.sqrt((_shares() ** 2).sum()))
+    weight = float(np.sqrt((SHARES**2).sum()))
     for path in paths:
         given, wanted = path.load, path.strain
         if options.minimise == "load":

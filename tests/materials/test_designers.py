@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.designers import (
-    POINTS,
     RATIOS,
+    SHARES,
     DesignersConstants,
     Options,
     constants_of_law,
@@ -86,19 +86,18 @@ def test_which_paths_count_and_their_squares():
         (False, ()): 8, (True, ()): 10, (False, ("1:1", "1:2")): 4, (False, ("1:1", "2:1")): 4,
         (False, ("1:1", "2:1", "1:2")): 6,
     }  # fmt: skip
-    share = np.arange(1, POINTS + 1) / POINTS
 
     def squares(constants):
         total = 0.0
         for path in lines:
             own = 100 * (path.strain - constants.strain(path.load))
-            total += float((share**2).sum()) * (own[~np.array(path.unloaded)] ** 2).sum()
+            total += float((SHARES**2).sum()) * (own[~np.array(path.unloaded)] ** 2).sum()
         return total
 
     # Least squares: nothing near by leaves less; and the sum is that of its definition.
     best, free = evaluate(lines, Options()), evaluate(lines, Options(reciprocal=False))
     for path in lines:
-        off = np.outer(share, 100 * (path.strain - best.constants.strain(path.load)))
+        off = np.outer(SHARES, 100 * (path.strain - best.constants.strain(path.load)))
         assert best.rms[path.ratio] == pytest.approx(np.sqrt(np.mean(off**2)))
     assert best.squares == pytest.approx(squares(best.constants))
     for step in (np.diag([1e-6, 0]), np.diag([0, 1e-6]), np.array([[0, 1e-6], [1e-6, 0]])):
