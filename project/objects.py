@@ -477,7 +477,9 @@ def _curve_rows(curves: Any) -> list[tuple[Any, ...]]:
     _check_names(curves, DIRECTIONS, "curves.")
     rows: list[tuple[Any, ...]] = []
     for group, given in curves.items():
-        for k, curve in enumerate(_specimens(given)):
+        frame = hasattr(given, "columns") or isinstance(given, tuple)
+        one = frame or getattr(given, "ndim", 0) == 2  # else a list of curves
+        for k, curve in enumerate([given] if one else given):
             at = f"curves.{group}[{k}]"
             found = _values(at, curve, names).T.tolist()
             rows += [(group, f"{group} {k + 1}", *values) for values in found]
@@ -501,12 +503,6 @@ def _check_columns(at: str, table: Table, names: Iterable[str]) -> None:
     if lost := [name for name in names if name not in table.columns]:
         there = ", ".join(map(str, table.columns))
         raise InputError(None, at, f"expected a column {lost[0]}; the table has: {there}")
-
-
-def _specimens(given: Any) -> list[Any]:
-    """Return the curves of one direction: a list of them, or the one."""
-    one = hasattr(given, "columns") or isinstance(given, tuple) or getattr(given, "ndim", 0) == 2
-    return [given] if one else list(given)
 
 
 def _gauges(

@@ -449,10 +449,9 @@ def of_kind(fit: Fit, what: str, test: str | None) -> Charts:
     """Return what the kind of a test calls by this name: of the first test that has it, or one."""
     names = [name for name in fit.tests if test in (None, name)]
     for prepared in fit.setup.tests:
-        own = getattr(report_of(prepared.test.kind), "CHARTS", {})
+        own: Mapping[str, Any] = getattr(report_of(prepared.test.kind), "CHARTS", {})
         if prepared.test.name in names and what in own:
-            charts: Charts = own[what](prepared, fit.tests[prepared.test.name])
-            return charts
+            return own[what](prepared, fit.tests[prepared.test.name])
     problem = f"expected one of {', '.join(fit.tests)}, with {what}; got {test or 'none of them'}"
     raise InputError(fit.project.path, "test", problem)
 

@@ -81,15 +81,15 @@ def _deviation(m: int, strain: Array, fits: Array, truth: Array) -> Chart:
     return Chart(f"{PANELS[m][0]}: {said}", PANELS[m][1], label, series, said, log_y=True)
 
 
-def moduli_together(strains: ArrayLike, moduli: ArrayLike) -> Charts:
+def moduli_together(strains: Array, moduli: Array) -> Charts:
     """Return one chart of all three moduli, each up to its failure strain (Fig. 3.8).
     strains, moduli : (3, k) logarithmic strain from zero to failure, MPa, of E1, E2, G12. The axis
     is logarithmic where the moduli are positive and span more than a decade."""
-    x, curves = PERCENT * np.asarray(strains, dtype=float), np.asarray(moduli, dtype=float)
+    x = PERCENT * strains
     names = ("E1(ε1), warp", "E2(ε2), fill", "G12(γ12), shear")
-    series = [line(name, x[m], curves[m], colour=m, ends=True) for m, name in enumerate(names)]
-    log, high = spans_a_decade(curves), float(curves.max())
-    alt = f"moduli from {float(curves.min()):.3g} to {high:.3g} MPa"
+    series = [line(name, x[m], moduli[m], colour=m, ends=True) for m, name in enumerate(names)]
+    log, high = spans_a_decade(moduli), float(moduli.max())
+    alt = f"moduli from {float(moduli.min()):.3g} to {high:.3g} MPa"
     top = None if log else 1.08 * high
     chart = Chart("", "logarithmic strain, %", MODULUS, series, alt, log, not log, top)
     return Charts("moduli together", [chart], "")

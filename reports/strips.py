@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .charts import (
     TITLES,
@@ -23,6 +23,7 @@ from .charts import (
 )
 
 Curve = tuple[ArrayLike, ArrayLike]
+Cells = NDArray[np.intp]
 
 ALONG = "gauge elongation, mm"
 YARNS = ("warp", "fill")
@@ -152,19 +153,17 @@ def order_chart(
 
 
 def strip_charts(
-    points: ArrayLike, quads: ArrayLike, displacement: ArrayLike, shear: ArrayLike,
-    gauge: ArrayLike,
-) -> Charts:  # fmt: skip
+    points: Array, cells: Cells, displacement: Array, gamma: Array, ends: Cells
+) -> Charts:
     """Return a strip pulled along y: true to scale, coloured by shear, over its outline at rest.
-    points : (n, 3) or (n, 2) mm, at rest. quads : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
-    shear : (m,) gamma12 of each quad, signed or its magnitude. gauge : (2,) nodes of the virtual
+    points : (n, 3) or (n, 2) mm, at rest. cells : (m, 4) nodes. displacement : (n, 3) or (n, 2) mm.
+    gamma : (m,) gamma12 of each quad, signed or its magnitude. ends : (2,) nodes of the virtual
     strain gauge."""
-    rest = np.asarray(points, dtype=float)[:, :2]
-    now = rest + np.asarray(displacement, dtype=float)[:, :2]
-    cells, gamma = np.asarray(quads, dtype=int), np.asarray(shear, dtype=float)
+    rest = points[:, :2]
+    now = rest + displacement[:, :2]
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
-    outline, ends = unique[count == 1], np.asarray(gauge, dtype=int)
+    outline = unique[count == 1]
     series = [
         faces("", now[cells], gamma),
         line("at rest", *_segments(rest[outline]), colour=7, dashes=1),
@@ -214,24 +213,21 @@ def cycle_charts(
             up, down = slice(start, peak + 1), slice(peak, end + 1)
             colour, label = number % 6, f"cycle {number + 1}"
             series.append(line(label, 100 * strain[up], load[up], colour=colour))
-            below = line("", 100 * strain[down], load[down], colour=colour, dashes=1)
-            series.append(below)
+            series.append(line("", 100 * strain[down], load[down], colour=colour, dashes=1))
         alt = f"{name}: load over strain, cycle by cycle; unloading dashed"
         charts.append(Chart(name, "strain, %", "load, N", series, alt, from_zero=True))
     return Charts("cycles", charts, "Load over strain; unloading dashed")
 
 
 def ratio_chart(
-    ratio: str, load: ArrayLike, strain: ArrayLike,
-    models: Sequence[tuple[str, ArrayLike, ArrayLike]] = (),
-) -> Chart:  # fmt: skip
+    ratio: str, load: Array, strain: Array, models: Sequence[tuple[str, Array, Array]] = ()
+) -> Chart:
     """Return the strains (n, 2) % along warp and fill over the larger load (n,) kN/m of a ratio.
     models : by name, with loads and strains of their own, best first."""
-    measured = np.asarray(strain)
-    series = [dots(f"{yarn}, measured", load, measured[:, k], colour=k)
+    series = [dots(f"{yarn}, measured", load, strain[:, k], colour=k)
               for k, yarn in enumerate(YARNS)]  # fmt: skip
     series += [
-        line(f"{yarn}, {model}", at, np.asarray(own)[:, k], colour=k, dashes=rank)
+        line(f"{yarn}, {model}", at, own[:, k], colour=k, dashes=rank)
         for rank, (model, at, own) in enumerate(models)
         for k, yarn in enumerate(YARNS)
     ]

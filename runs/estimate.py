@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -76,9 +76,9 @@ class Estimate:
     setup: FitSetup
     problem: FitProblem
     best: BestFit
-    gaps: tuple[Gap, ...]
+    gaps: Sequence[Gap]
     seconds: float
-    notes: tuple[Note, ...]
+    notes: Sequence[Note]
 
     @property
     def project(self) -> Project:
@@ -142,12 +142,18 @@ def estimate_of(setup: FitSetup) -> Estimate:
         law = problem.unknowns.law(problem.law, point.unknowns)
         best = BestFit(point, point, law, (), (), reached_by(point))
         sure = certainty(problem, point, law, best.valid)
-    gaps = tuple(_gaps(problem, best))
-    for gap in gaps:
+    gaps, free = [], 1.0 - problem.unknowns.count / len(point.residual)
+    every = misfits(problem, point.residual)
+    for comparison, history in zip(problem.comparisons, point.histories, strict=True):
+        m, model = every[comparison.name], comparison.model
+        gap = Gap(comparison.name, m.ratio / max(free, 0.1) ** 0.5, m.rms, m.unit)
+        if isinstance(model, MeasuredShape):
+            gap = replace(gap, places=model.mesh.points[:, :2], field=history.displacement[-1])
+        gaps.append(gap)
         if gap.chi > LARGE and gap.field is not None:
             notes.append(Note(GAP, UNBALANCED.format(gap.chi), gap.name))
     seconds = time.process_time() - begun
-    return Estimate(setup, problem, replace(best, certainty=sure), gaps, seconds, tuple(notes))
+    return Estimate(setup, problem, replace(best, certainty=sure), gaps, seconds, notes)
 
 
 def with_start(setup: FitSetup) -> FitSetup:
@@ -181,14 +187,3 @@ def _fitted(
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
     best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, negligible=NEGLIGIBLE)
     return problem, best
-
-
-def _gaps(problem: FitProblem, best: BestFit) -> Iterator[Gap]:
-    free = 1.0 - problem.unknowns.count / len(best.point.residual)
-    every = misfits(problem, best.point.residual)
-    for comparison, history in zip(problem.comparisons, best.point.histories, strict=True):
-        m, model = every[comparison.name], comparison.model
-        gap = Gap(comparison.name, m.ratio / max(free, 0.1) ** 0.5, m.rms, m.unit)
-        if isinstance(model, MeasuredShape):
-            gap = replace(gap, places=model.mesh.points[:, :2], field=history.displacement[-1])
-        yield gap

@@ -238,10 +238,16 @@ def profile(
             sides[record[0]] = record[1]
         now = f"{record[0]} at {record[1]:.3g}" if isinstance(record, list) else ""
         tell(len(sides), len(numbers), now)
-    each = tuple(
-        _profile(found, name, strain, sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1])
-        for k, (name, strain) in enumerate(places)
-    )
+    each, unknowns = [], found.problem.unknowns
+    for k, (name, strain) in enumerate(places):
+        row = modulus_row(unknowns, name, strain)
+        band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]
+        each.append(Profile(
+            name, strain, float(row @ found.point.unknowns),
+            float(np.sqrt(row @ found.posterior.covariance @ row)),
+            (float(band[0]), float(band[1])), sides[len(SIGNS) * k], sides[len(SIGNS) * k + 1],
+            (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
+        ))  # fmt: skip
     # Every process runs the optimum once more.
     analyses = found.analyses + min(project.fit.jobs or cores(), len(numbers))
     analyses += sum(p.analyses for p in each)
@@ -270,14 +276,3 @@ def _task(found: Optimum, places: Sequence[tuple[str, float]]) -> Task:
         return number, profile_side(own, own.seen(point), row, sign, sigma, step)
 
     return side
-
-
-def _profile(found: Optimum, name: str, strain: float, below: Side, above: Side) -> Profile:
-    unknowns = found.problem.unknowns
-    row = modulus_row(unknowns, name, strain)
-    band = bands_of(found.posterior, found.best.law, {name: np.array([strain])})[name][:, 0]
-    return Profile(
-        name, strain, float(row @ found.point.unknowns),
-        float(np.sqrt(row @ found.posterior.covariance @ row)), (float(band[0]), float(band[1])),
-        below, above, (extreme(unknowns, row, -1.0), extreme(unknowns, row, 1.0)),
-    )  # fmt: skip

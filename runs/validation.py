@@ -42,7 +42,6 @@ from .fit import stored_fit
 from .folder import Presented, check_asked, check_unused, finished
 from .predictions import predict
 from .progress import Listener, listener
-from .result import Fit
 from .setup import FitSetup, fingerprints, prepare_fit
 from .simulation import FAILED, StudyRecord, begin_study
 
@@ -247,13 +246,6 @@ def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
     return {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
 
 
-def errors_of_fit(found: Fit, part: Part) -> HeldOut:
-    """Return the errors of the fit to all of the data at a part of them."""
-    setup, nuisance = found.setup, nuisance_of(found.problem, found.best.point.unknowns)
-    test, name = setup.tests[part.test], name_of(setup, part)
-    return held_out(test, found.card.law, setup.make_solver, part.alone, nuisance, name)
-
-
 def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
     name, test = name_of(setup, part), setup.tests[part.test]
@@ -360,8 +352,12 @@ def validate(
             file = f"{plain(form)}-without-{leave}.json"
             tell(f"{form}: without each of {len(parts[form])} {leave}")
             alone = errors_left_out(setups[form], parts[form], starts, folder, file, tell)
-            pairs = zip(parts[form], alone, strict=True)
-            judged += [Judged(form, one, errors_of_fit(together, part)) for part, one in pairs]
+            whole, law = together.setup, together.card.law
+            nuisance = nuisance_of(together.problem, together.best.point.unknowns)
+            for part, one in zip(parts[form], alone, strict=True):
+                test, name = whole.tests[part.test], name_of(whole, part)
+                by_all = held_out(test, law, whole.make_solver, part.alone, nuisance, name)
+                judged.append(Judged(form, one, by_all))
             continue
         for k, test in enumerate(together.setup.tests):
             others = [name for name in names if name != test.test.name]

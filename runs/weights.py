@@ -118,9 +118,8 @@ class WeightStudy(Presented):
             "change": {name: list(self.change(name)) for name in COMPONENTS},
             "rows": [
                 {
-                    "weight_times": run.count, "relative": dict(run.relative), "rms": dict(run.rms),
-                    "moduli_MPa": {name: list(values) for name, values in run.moduli.items()},
-                    "analyses": run.analyses,
+                    "weight_times": run.count, "relative": run.relative, "rms": run.rms,
+                    "moduli_MPa": run.moduli, "analyses": run.analyses,
                 }
                 for run in self.ended
             ],

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -21,7 +21,7 @@ from ...errors import check_one_of, checked
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import disk_mesh
-from ...meshes.strip_models import WIDTH, UniaxialModel, bias_strip, straight_strip
+from ...meshes.strip_models import WIDTH, bias_strip, straight_strip
 from ...readers.curves import fit_load_polynomial, read_load_curves
 from ...solvers.bars import BARS, TOLERANCE, strip_stresses
 from ...solvers.base import Solver
@@ -165,7 +165,10 @@ FILE = "valmex7318_load_gauge.csv"
 def strips() -> Iterator[Number]:
     """Compare strains of the gauge, and end loads with the integral of the modulus."""
     for direction, (first, last, strain, _) in TABLE_3_1.items():
-        model = strip(direction)
+        model = bias_strip(first, last, THICKNESS)
+        if direction != "bias":
+            yarn: Literal["warp", "fill"] = "warp" if direction == "warp" else "fill"
+            model = straight_strip(yarn, first, last, THICKNESS)
         history = MembraneSolver(1e-10).run(model, known_law())
         lower, upper = (model.mesh.points + history.displacement[-1])[model.mesh.node_sets["gauge"]]
         ours = float(np.linalg.norm(upper - lower)) / first - 1
@@ -184,14 +187,6 @@ def measured_strips(folder: Path) -> Iterator[Number]:
         theirs = TABLE_3_1[str(curve.direction)][3]
         what = f"R^2 of the {curve.direction} polynomial"
         yield Number(what, ours, theirs, "", DIGITISED_STRIPS, "thesis Table 3.1", absolute=True)
-
-
-def strip(direction: str) -> UniaxialModel:
-    """Return a strip of Table 3.1, 25 mm wide."""
-    first, last, *_ = TABLE_3_1[direction]
-    if direction == "bias":
-        return bias_strip(first, last, THICKNESS)
-    return straight_strip("warp" if direction == "warp" else "fill", first, last, THICKNESS)
 
 
 def end_load(direction: str, strain: float) -> float:
