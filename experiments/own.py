@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..inference.comparison import Comparison, NoiseIs
-from ..materials.law import HypoelasticLaw, law_slopes
+from ..materials.law import HypoelasticLaw, law_beside, usual_step
 from ..solvers.base import History, SolverCheck
 from . import kinds
 from .kinds import Array, MakeSolver, Masks, Weighting
@@ -104,16 +104,9 @@ def _slope(test: OwnTest, law: HypoelasticLaw, name: str) -> Array:
     def at(change: float) -> Array:
         if name == "thickness":
             return test.with_parameters({name: change}).values(law)
-        if name == "nu12":
-            return test.values(replace(law, nu12=abs(law.nu12 + change)))
-        beta = law.beta.copy()
-        beta[int(name.removeprefix("beta_"))] += change
-        return test.values(law.with_beta(beta))
+        return test.values(law_beside(law, name, change))
 
-    powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
-    rows = law_slopes(law, [name], test.thickness)[0][..., 0] * powers
-    size = np.abs((law.pieces[..., 1:] * powers).sum(axis=-1)).max()
-    step = STEP * (size / np.abs(rows).max() if rows.any() else 1.0)
+    step = usual_step(law, name, test.thickness, STEP)
     return np.asarray((at(step) - at(-step)) / (2 * step))
 
 

@@ -304,6 +304,23 @@ def law_slopes(
     return rows, coupling
 
 
+def law_beside(law: HypoelasticLaw, name: str, change: float) -> HypoelasticLaw:
+    """Return a law with another value of an entry of beta ("beta_i", MPa) or of "nu12"."""
+    if name == "nu12":
+        return replace(law, nu12=abs(law.nu12 + change))
+    beta = law.beta.copy()
+    beta[int(name.removeprefix("beta_"))] += change
+    return law.with_beta(beta)
+
+
+def usual_step(law: HypoelasticLaw, name: str, thickness: float, share: float) -> float:
+    """Return a step of a parameter of `law_slopes` that changes moduli by this share at most."""
+    powers = law.pieces[..., :1] ** np.arange(3.0, -1.0, -1.0)
+    rows = law_slopes(law, [name], thickness)[0][..., 0] * powers
+    size = np.abs((law.pieces[..., 1:] * powers).sum(axis=-1)).max()
+    return float(share * (size / np.abs(rows).max() if rows.any() else 1.0))
+
+
 #: How far E1 stays above nu12^2 E2, where the law ceases to be positive definite.
 DEFINITE = 1.02
 

@@ -1,15 +1,16 @@
 """The embedded membrane solver: it picks the analysis of a model."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from ...errors import InputError
+from ...errors import InputError, SolverFailure
 from ...files import __version__
-from ...materials.law import HypoelasticLaw
+from ...materials.law import HypoelasticLaw, law_beside, usual_step
 from ...materials.responses import bar
 from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
@@ -45,6 +46,8 @@ ANALYSES: dict[type, Analysis] = {
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
 BLAS = ThreadpoolController()
+#: Largest change of a modulus in a step of the differences of closed membranes.
+SHARE = 1e-3
 
 
 class MembraneSolver:
@@ -96,7 +99,8 @@ class MembraneSolver:
         """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
 
         The parameters are every entry of the law's beta (per MPa) unless given; those of the model
-        are per unit of theirs. Derivatives of a strip's load are in the history (`load_slope`).
+        are per unit of theirs. Derivatives of a load are in the history (`load_slope`). Those of
+        closed membranes, whose walls wrinkle and touch, are differences; none by thickness.
         """
         known = parameters_of(law, model)
         if parameters is None:
@@ -104,7 +108,23 @@ class MembraneSolver:
         unknown = [name for name in parameters if name not in known]
         if unknown:
             raise InputError(None, "parameters", f"{unknown} not among {known}")
+        if isinstance(model, (CylinderModel, InflatedModel)):
+            return self._differences(model, law, parameters)
         return self._analyse(model, law, parameters, guess)
+
+    def _differences(
+        self, model: CylinderModel | InflatedModel, law: HypoelasticLaw, parameters: Sequence[str]
+    ) -> tuple[History, Array]:
+        """Return the history of a closed membrane and its slopes, by differences of whole runs."""
+        here, slopes, loads = self.run(model, law), [], []
+        for name in parameters:
+            step = usual_step(law, name, 1.0, SHARE)
+            there = self.run(model, law_beside(law, name, step))
+            if len(there.load) < len(here.load):
+                raise SolverFailure(there.early, self.name)
+            slopes.append((there.displacement[: len(here.load)] - here.displacement) / step)
+            loads.append((there.load[: len(here.load)] - here.load) / step)
+        return replace(here, load_slope=np.stack(loads, axis=-1)), np.stack(slopes, axis=-1)
 
     @property
     def stress(self) -> Array:

@@ -51,12 +51,12 @@ def test_a_strain_beyond_its_end_is_not_printed_as_the_end(reached, said):
 
 
 def test_ours_are_the_folders_fitted_ones_first():
-    assert list(kinds())[:5] == ["biaxial", "bubble", "cycles", "strips", "tube"]
+    assert list(kinds())[:6] == ["bending", "biaxial", "bubble", "cycles", "strips", "tube"]
     for name, kind in kinds().items():
         assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED[:-1])
         assert callable(report_of(name).simulate)
         assert kind_named(name) is kind
-    assert "'bubbel' is not one of: biaxial, bubble, cycles, cylinder, strips, tube" in complaint(
+    assert "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, strips, tube" in complaint(
         kind_named, "bubbel"
     )
 

@@ -242,6 +242,7 @@ LEAST = {
     "strips": {"warp": {"gauge_length": 0.02, "final_length": 0.023}, "data": {"files": ["c"]}},
     "biaxial": {"data": {"files": ["d"]}},
     "cylinder": {"diameter": 0.15, "pressure": 100.0},
+    "bending": {"diameter": 0.15, "pressure": 100.0, "measured": {"files": ["g"]}},
     "cycles": {"files": {"warp": ["e"]}},
     "tube": {"diameter": 0.2, "file": "f"},
 }

@@ -1,0 +1,151 @@
+"""Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison.
+
+The model is that of [[cylinder]] in `experiments/cylinder`: the card that is fitted predicts the
+measured loads best. Its derivatives are differences of whole bendings (`solvers/membrane`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from ...errors import SolverFailure
+from ...inference.comparison import Comparison
+from ...meshes.beam_model import BeamModel
+from ...meshes.cylinder_model import CylinderModel
+from ...readers.sections import Positive
+from ...solvers.base import History
+from .. import kinds
+from ..cylinder.test import PART, CylinderSection, CylinderTest
+from ..cylinder.test import read as read_cylinder
+from ..kinds import Array, Kind, MakeSolver, Masks, Place, Reach, Weighting
+from ..measured import MeasuredKind
+from ..strips.prepared import LoadObjective
+
+#: Frames of a bending, unless the section says otherwise: each costs an analysis an unknown.
+FRAMES = 12
+#: Noise of one load: of the largest, unless given; values that are taken to be independent.
+NOISE, INDEPENDENT = 0.02, 5.0
+
+
+class BendingSection(CylinderSection):
+    """Section [[bending]]: a [[cylinder]] whose measured loads are fitted; noise of one, in N."""
+
+    model: Literal["membrane"] = "membrane"
+    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    noise: Positive | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BendingTest(CylinderTest):
+    """A cylinder with measured loads; noise : of one load, N."""
+
+    kind: str = "bending"
+    noise: float | None = None
+
+    @property
+    def points(self) -> tuple[Array, Array]:
+        """Return deflection (n,) mm and load (n,) N of all repetitions, up to the last frame."""
+        every = [(c.deflection, c.load) for c in self.measured] or [(np.empty(0), np.empty(0))]
+        way, load = (np.concatenate(own) for own in zip(*every, strict=True))
+        inside = (way > 0) & (way <= self.deflections[-1] * (1 + 1e-9))
+        return way[inside], load[inside]
+
+    def settings(self) -> Mapping[str, object]:
+        return {**super().settings(), "weight": self.weight, "noise": self.noise}
+
+
+def read(section: BendingSection, place: Place, name: str) -> BendingTest:
+    """Read the section of a test, and its loads; refuse one without any."""
+    if not section.measured.files:
+        problem = (
+            "this key is missing; without measured loads a cylinder is predicted: [[cylinder]]"
+        )
+        raise place.error("measured.files", problem)
+    cylinder = read_cylinder(section, place, name)
+    ends = [float(curve.deflection[-1]) for curve in cylinder.measured]
+    if section.deflection is None and section.deflections is None and ends:
+        end, frames = max(ends), section.frames or FRAMES
+        cylinder = replace(cylinder, deflections=tuple(np.linspace(0.0, end, frames + 1)[1:]))
+    known = {key: value for key, value in vars(cylinder).items() if key != "kind"}
+    test = BendingTest(**{**known, "weight": section.weight}, noise=section.noise)
+    largest = float(np.abs(test.points[1]).max(initial=0.0))
+    if cylinder.measured and not (len(test.points[0]) > 1 and largest > 0):
+        end = test.deflections[-1] / place.scales.length
+        problem = f"expected two or more loads between 0 and the last deflection, {end:g}"
+        raise place.error("measured.files", problem)
+    return test
+
+
+class BendingObjective(LoadObjective):
+    """Residuals of the collar's loads; frame 0 is the inflated cylinder."""
+
+    def __init__(self, test: BendingTest, weighting: Weighting) -> None:
+        way, load = test.points
+        largest = float(np.abs(load).max(initial=0.0))
+        noise = (NOISE * largest, "assumed") if test.noise is None else (test.noise, "given")
+        alike = 1.0 if test.noise is not None else len(load) / INDEPENDENT
+        scale = largest if weighting.relative else 1.0
+        super().__init__(test.deflections, way, load, scale, weighting.weight, *noise, alike)
+
+    def modelled(self, history: History) -> Array:
+        if len(history.load) <= self.sample.shape[1]:
+            raise SolverFailure(history.early or "the bending ended early", "membrane")
+        return np.asarray(self.sample @ history.load[1:])
+
+    def jacobian(self, history: History, slope: Array) -> Array:
+        assert history.load_slope is not None
+        return super().jacobian(replace(history, load_slope=history.load_slope[1:]), slope)
+
+    def shifted(self, here: History, there: History) -> "BendingObjective":
+        other = super().shifted(
+            replace(here, load=here.load[1:]), replace(there, load=there.load[1:])
+        )
+        return other
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedBending:
+    """A bent cylinder with its loads."""
+
+    test: BendingTest
+    known = None
+    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
+    objective_is = "RMS error of the collar's load, N"
+
+    def reach(self, masks: Masks) -> Reach:
+        return self.test.reach
+
+    def comparisons(
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,
+        models: Mapping[str, CylinderModel | BeamModel] | None = None,
+    ) -> tuple[Comparison, ...]:  # fmt: skip
+        model = (self.test.models() if models is None else models)[PART]
+        objective = BendingObjective(self.test, weighting)
+        # Wrinkles come and go, and tubes snap: an unstable frame is no reason to refuse a law.
+        return (Comparison(self.test.name, model, make_solver(), objective, must_be_stable=False),)
+
+    def finer(
+        self, make_solver: MakeSolver, weighting: Weighting, factor: float
+    ) -> tuple[Comparison, ...]:
+        models = self.test.models(what="elements", factor=factor)
+        return self.comparisons(make_solver, weighting, models=models)
+
+    def data_files(self) -> Sequence[kinds.DataFile]:
+        return self.test.data_files()
+
+
+class Bending(MeasuredKind):
+    """An inflated cylinder in bending whose loads are fitted."""
+
+    name: str = "bending"
+    title: str = "an inflated cylinder in bending, with measured loads that a fit matches"
+    section: type[BaseModel] = BendingSection
+    folder_key: str = "measured.folder"
+    prepared = PreparedBending
+    read = staticmethod(read)
+
+
+KIND: Kind = Bending()

@@ -1,0 +1,85 @@
+"""Results of bent cylinders in a fit as numbers, a table, a figure and a file."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from ...errors import SolverFailure
+from ...materials.card import MaterialCard
+from ...reports.charts import Chart, Charts, dots, line
+from ...reports.content import Exhibit, Table
+from ...reports.vega import saved
+from ...solvers.base import History
+from ..cylinder.test import PART
+from ..kinds import CardRun, Findings, FittedTest, Output, Simulation, Weighting
+from . import BendingObjective, BendingTest, PreparedBending
+
+FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measured and modelled"
+
+
+def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:
+    """Return a table of every matched load, N."""
+    own = BendingObjective(prepared.test, Weighting())
+    modelled = own.modelled(fitted.histories[0])
+    columns = {"deflection_mm": own.elongation, "quantity": "load", "measured": own.measured}
+    table = pd.DataFrame({"part": PART, **columns, "modelled": modelled})
+    return table.assign(difference=table["modelled"] - table["measured"], unit="N")
+
+
+def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
+    """Return the RMS error of the best fit."""
+    numbers = _errors(prepared.test, fitted.histories[0])
+    words = _words(numbers)
+    return Findings(numbers, (), (words,), words, words)
+
+
+def show(prepared: PreparedBending, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+    """Write bending.csv and the figure."""
+    charts = _drawn(prepared.test, {"model": fitted.histories[0]})
+    loads = out.write("bending.csv", residuals(prepared, fitted), "loads, measured and modelled")
+    files = [loads, saved(out, FIGURE, charts, CAPTION)]
+    row: list[object] = [prepared.test.name, *found.numbers.values()]
+    tables = [Table("Misfit of the bending", ["test", "RMS error, N", "largest load, N"], [row])]
+    return Exhibit(tables=tables, files=files, parts=[charts])
+
+
+def simulate(
+    test: BendingTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
+    out: Output, within_range: bool = False,
+) -> Simulation:  # fmt: skip
+    """Draw the loads with every card; return the RMS errors."""
+    numbers, lines, good = dict[str, Any](), list[str](), dict[str, History]()
+    for name in cards:
+        ended = runs[name, PART].outcome
+        try:
+            if isinstance(ended, SolverFailure):
+                raise ended
+            numbers[name] = _errors(test, ended) if test.measured else {}
+            lines += [f"{name}: {_words(numbers[name])}"] if test.measured else []
+            good[name] = ended
+        except SolverFailure as failure:
+            numbers[name] = {"failed": failure.reason}
+            lines.append(f"{name}: failed: {failure.reason}")
+    figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
+    return Simulation({"cards": numbers}, lines, figures)
+
+
+def _errors(test: BendingTest, history: History) -> dict[str, float]:
+    own = BendingObjective(test, Weighting())
+    return {"rms_N": own.rms(history), "largest_N": float(abs(own.measured).max())}
+
+
+def _words(numbers: Mapping[str, float]) -> str:
+    share = 100 * numbers["rms_N"] / numbers["largest_N"]
+    return f"RMS error of the load {numbers['rms_N']:.3g} N ({share:.2g} % of the largest)"
+
+
+def _drawn(test: BendingTest, curves: Mapping[str, History]) -> Charts:
+    """Return measured and modelled loads in one chart."""
+    series = [dots(c.repetition, c.deflection, c.load, colour=7) for c in test.measured]
+    for rank, (name, history) in enumerate(curves.items()):
+        way = [0.0, *test.deflections][: len(history.load)]
+        series.append(line(name, way, history.load, colour=1 + rank))
+    chart = Chart(test.name, "deflection of the collar, mm", "load, N", series, CAPTION)
+    return Charts(f"{test.name} bending", [chart], CAPTION, columns=1)

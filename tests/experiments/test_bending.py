@@ -1,0 +1,83 @@
+"""Measured loads of bent cylinders in a fit: known solution, slopes, what is refused."""
+
+import bubblefit as bf
+import numpy as np
+import pytest
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.solvers.membrane.solver import MembraneSolver
+
+from ..complaints import complaint
+
+PROJECT = """
+units = {{ modulus = "MPa", pressure = "kPa", length = "mm" }}
+[fabric]
+thickness = 0.8
+[law]
+form = "constant"
+nu12 = 0.2
+strain_range = [0.1, 0.1, 0.1]
+bounds = {{ E1 = [50.0, 2000.0], E2 = [199.999, 200.001], G12 = [19.9999, 20.0001] }}
+[fit]
+starts = 1
+mesh_error = "told"
+[[bending]]
+diameter = 150.0
+pressure = 60.0
+length = 800.0
+span = 600.0
+support_diameter = 100.0
+element_size = 75.0
+{more}
+"""
+LAW = HypoelasticLaw.linear(300.0, 200.0, 20.0, 0.2)
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    """A project with the loads that a known law gives, of two repetitions."""
+    file = tmp_path_factory.mktemp("bending") / "project.toml"
+    (file.parent / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,1\n4,2\n12,3\n")
+    more = 'deflections = [2.0, 5.0, 8.0]\nmeasured.files = ["loads.csv"]'
+    file.write_text(PROJECT.format(more=more))
+    (test,) = bf.read_project(file).tests.values()
+    assert test.points[0].tolist() == [2.0, 4.0]  # beyond the last deflection nothing is matched
+    history = bf.simulate(test, bf.MaterialCard(LAW, 0.8, "known"))["cylinder"]
+    rows = zip([0.0, *test.deflections], history.load, strict=True)
+    lines = [f"{way},{load:.10g}" for way, load in rows]
+    (file.parent / "loads.csv").write_text("\n".join(["deflection_mm,load_N", *lines]))
+    return bf.read_project(file)
+
+
+@pytest.mark.slow
+def test_a_modulus_of_a_known_law_is_found(project, tmp_path):
+    found = bf.fit(project, out=tmp_path / "out")
+    assert found.card.law.modulus("E1", 0.0) == pytest.approx(300.0, rel=1e-3)
+    table = found.residuals()
+    assert len(table) == 3 and (table["difference"].abs() < 1e-3 * table["measured"]).all()
+    assert (tmp_path / "out" / "bending.png").exists()
+
+
+@pytest.mark.slow
+def test_slopes_are_those_of_other_differences(project):
+    (model,) = next(iter(project.tests.values())).models().values()
+    parameter = int(np.flatnonzero(LAW.beta == 300.0)[0])
+    slope = MembraneSolver().run_with_sensitivity(model, LAW, [f"beta_{parameter}"])[0].load_slope
+    beta = [LAW.beta + step * np.eye(len(LAW.beta))[parameter] for step in (3.0, -3.0)]
+    above, below = (MembraneSolver().run(model, LAW.with_beta(own)).load for own in beta)
+    assert slope[1:, 0] == pytest.approx((above - below)[1:] / 6.0, rel=0.02)
+    assert (slope[1:, 0] > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("more", "field"),
+    [
+        ("", "bending[0].measured.files"),
+        ('measured.files = ["none.csv"]', "none.csv"),
+        ('deflections = [0.5]\nmeasured.files = ["loads.csv"]', "bending[0].measured.files"),
+        ('model = "beam"\nmeasured.files = ["loads.csv"]', "bending[0].model"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(tmp_path, more, field):
+    (tmp_path / "loads.csv").write_text("deflection_mm,load_N\n0,0\n2,1\n4,2\n")
+    (tmp_path / "project.toml").write_text(PROJECT.format(more=more))
+    assert field in complaint(bf.read_project, tmp_path / "project.toml")
