@@ -6,19 +6,19 @@ measured loads best. Its derivatives are differences of whole bendings (`solvers
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, cast
 
 import numpy as np
 from pydantic import BaseModel, Field
 
 from ...errors import SolverFailure
-from ...inference.comparison import Comparison
+from ...inference.comparison import Comparison, NoiseIs
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...readers.sections import Positive
 from ...solvers.base import History
 from .. import kinds
-from ..cylinder.test import PART, CylinderSection, CylinderTest
+from ..cylinder.test import PART, BentSection, CylinderTest
 from ..cylinder.test import read as read_cylinder
 from ..kinds import Array, Kind, MakeSolver, Masks, Place, Reach, Weighting
 from ..measured import MeasuredKind
@@ -30,10 +30,9 @@ FRAMES = 12
 NOISE, INDEPENDENT = 0.02, 5.0
 
 
-class BendingSection(CylinderSection):
+class BendingSection(BentSection):
     """Section [[bending]]: a [[cylinder]] whose measured loads are fitted; noise of one, in N."""
 
-    model: Literal["membrane"] = "membrane"
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
     noise: Positive | None = None
 
@@ -85,10 +84,13 @@ class BendingObjective(LoadObjective):
     def __init__(self, test: BendingTest, weighting: Weighting) -> None:
         way, load = test.points
         largest = float(np.abs(load).max(initial=0.0))
-        noise = (NOISE * largest, "assumed") if test.noise is None else (test.noise, "given")
-        alike = 1.0 if test.noise is not None else len(load) / INDEPENDENT
+        noise, noise_is, alike = test.noise, cast(NoiseIs, "given"), 1.0
+        if noise is None:
+            noise, noise_is, alike = NOISE * largest, "assumed", len(load) / INDEPENDENT
         scale = largest if weighting.relative else 1.0
-        super().__init__(test.deflections, way, load, scale, weighting.weight, *noise, alike)
+        super().__init__(
+            test.deflections, way, load, scale, weighting.weight, noise, noise_is, alike
+        )
 
     def modelled(self, history: History) -> Array:
         if len(history.load) <= self.sample.shape[1]:
@@ -99,11 +101,9 @@ class BendingObjective(LoadObjective):
         assert history.load_slope is not None
         return super().jacobian(replace(history, load_slope=history.load_slope[1:]), slope)
 
-    def shifted(self, here: History, there: History) -> "BendingObjective":
-        other = super().shifted(
-            replace(here, load=here.load[1:]), replace(there, load=there.load[1:])
-        )
-        return other
+    def shifted(self, here: History, there: History) -> LoadObjective:
+        loads = (replace(one, load=one.load[1:]) for one in (here, there))
+        return super().shifted(*loads)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ import pandas as pd
 from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
-from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
 from ..cylinder.test import PART
@@ -32,16 +31,6 @@ def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
     numbers = _errors(prepared.test, fitted.histories[0])
     words = _words(numbers)
     return Findings(numbers, (), (words,), words, words)
-
-
-def show(prepared: PreparedBending, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
-    """Write bending.csv and the figure."""
-    charts = _drawn(prepared.test, {"model": fitted.histories[0]})
-    loads = out.write("bending.csv", residuals(prepared, fitted), "loads, measured and modelled")
-    files = [loads, saved(out, FIGURE, charts, CAPTION)]
-    row: list[object] = [prepared.test.name, *found.numbers.values()]
-    tables = [Table("Misfit of the bending", ["test", "RMS error, N", "largest load, N"], [row])]
-    return Exhibit(tables=tables, files=files, parts=[charts])
 
 
 def simulate(

@@ -126,18 +126,11 @@ class MeasuredSection(Section):
     decimal: Literal[".", ","] | None = None
 
 
-class CylinderSection(Section):
-    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar or two loads."""
+class BentSection(Section):
+    """Keys of a membrane that is inflated, laid on two supports and bent."""
 
     name: Name | None = None
-    model: Literal["membrane", "beam"] = "membrane"
     cord: list[CordSection] = Field(default_factory=list)
-    wall: WallSection | None = None
-    load_spacing: NotNegative | None = None
-    load_width: NotNegative | None = None
-    roller_below_axis: NotNegative | None = None
-    mass_per_length: NoUnit | None = None
-    friction: NoUnit | None = None
     diameter: Length
     pressure: Pressure
     length: Length | None = None
@@ -155,6 +148,18 @@ class CylinderSection(Section):
     cap_warp: Literal["x", "y"] = "x"
     gas: GasSection = GasSection()
     measured: MeasuredSection = MeasuredSection()
+
+
+class CylinderSection(BentSection):
+    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar or two loads."""
+
+    model: Literal["membrane", "beam"] = "membrane"
+    wall: WallSection | None = None
+    load_spacing: NotNegative | None = None
+    load_width: NotNegative | None = None
+    roller_below_axis: NotNegative | None = None
+    mass_per_length: NoUnit | None = None
+    friction: NoUnit | None = None
 
 
 #: The one part of the test.
@@ -263,12 +268,12 @@ class CylinderTest:
         return {**{name: getattr(self, name) for name in names}, **bodies, **of_cords, **of_beam}
 
 
-def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
+def read(section: BentSection, place: Place, name: str) -> CylinderTest:
     """Read the section of a test; refuse a cylinder that makes no model."""
-    others = OF_BEAM if section.model == "membrane" else OF_MEMBRANE
-    for key in others:
+    beam = isinstance(section, CylinderSection) and section.model == "beam"
+    for key in OF_MEMBRANE if beam else OF_BEAM:
         if key in section.model_fields_set:
-            other = "beam" if section.model == "membrane" else "membrane"
+            other = "membrane" if beam else "beam"
             raise place.error(key, f'is a key of model = "{other}"; take it out or change model')
 
     own = whole_in_base_units(section, place.scales)
@@ -281,8 +286,8 @@ def read(section: CylinderSection, place: Place, name: str) -> CylinderTest:
         "reads_files": bool(section.measured.files),
         "cords": tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(own.cord)),
     }  # fmt: skip
-    if own.model == "beam":
-        return _beam(section, own, shared)
+    if isinstance(section, CylinderSection) and beam:
+        return _beam(section, shared)
     usual = RigidSupports()
     with place.naming(keys=KEYS):
         collar = usual_collar(own.diameter)
@@ -353,9 +358,10 @@ def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedW
         return PlainWall(**values, wrinkles=section.wrinkles)
 
 
-def _beam(section: CylinderSection, own: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
-    """Read the section of a beam; own : in base units. shared : by fields of any test."""
+def _beam(section: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
+    """Read the section of a beam; shared : by fields of any test."""
     place = shared["place"]
+    own = whole_in_base_units(section, place.scales)
     if section.wall is None:
         raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
     wall = _wall(section.wall, section.pressure, place)

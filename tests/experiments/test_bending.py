@@ -6,6 +6,7 @@ import pytest
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
+from ..commands import in_process
 from ..complaints import complaint
 
 PROJECT = """
@@ -50,11 +51,14 @@ def project(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_modulus_of_a_known_law_is_found(project, tmp_path):
-    found = bf.fit(project, out=tmp_path / "out")
+    found = bf.fit(project)
     assert found.card.law.modulus("E1", 0.0) == pytest.approx(300.0, rel=1e-3)
     table = found.residuals()
     assert len(table) == 3 and (table["difference"].abs() < 1e-3 * table["measured"]).all()
-    assert (tmp_path / "out" / "bending.png").exists()
+    found.card.write(card := tmp_path / "card.toml")
+    typed = ("simulate", "bending", project.path, "--card", card, "--out", tmp_path / "out")
+    done = in_process(*typed, cwd=tmp_path)
+    assert "RMS error of the load" in done.stdout and (tmp_path / "out" / "bending.png").exists()
 
 
 @pytest.mark.slow

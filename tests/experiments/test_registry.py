@@ -56,8 +56,9 @@ def test_ours_are_the_folders_fitted_ones_first():
         assert kind.name == name and all(hasattr(kind, attribute) for attribute in NEEDED[:-1])
         assert callable(report_of(name).simulate)
         assert kind_named(name) is kind
-    assert "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, strips, tube" in complaint(
-        kind_named, "bubbel"
+    assert (
+        "'bubbel' is not one of: bending, biaxial, bubble, cycles, cylinder, strips, tube"
+        in complaint(kind_named, "bubbel")
     )
 
 

@@ -359,6 +359,7 @@ COMPANIONS = {
 
 def companion(path):
     """Return what belongs to a key, else to the table that it is in."""
+    path = ("cylinder", *path[1:]) if path[0] == "bending" else path
     whole = next((".".join(path[:k]) for k in range(len(path), 0, -1)
                   if ".".join(path[:k]) in COMPANIONS), "")  # fmt: skip
     return COMPANIONS.get(whole, {})
