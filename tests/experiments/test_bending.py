@@ -56,7 +56,7 @@ def test_a_modulus_of_a_known_law_is_found(project, tmp_path):
     table = found.residuals()
     assert len(table) == 3 and (table["difference"].abs() < 1e-3 * table["measured"]).all()
     found.card.write(card := tmp_path / "card.toml")
-    typed = ("simulate", "bending", project.path, "--card", card, "--out", tmp_path / "out")
+    typed = ("simulate", "test", project.path, "--card", card, "--out", tmp_path / "out")
     done = in_process(*typed, cwd=tmp_path)
     assert "RMS error of the load" in done.stdout and (tmp_path / "out" / "bending.png").exists()
 
