@@ -17,25 +17,46 @@ COLLARS = {200.0: (240.0, 145.0), 250.0: (295.0, 147.0)}
 
 
 @dataclass(frozen=True)
-class RigidSupports:
-    """Two frictionless cylinders along x under the tube, at z = span / 2 and -span / 2, mm."""
-
-    span: float = 2000.0
-    diameter: float = 100.0
-
-
-@dataclass(frozen=True)
 class Collar:
-    """A frictionless ring (mm) around the tube, pulled down; fillet : of its inner edges."""
+    """A frictionless ring (mm) around the tube, pulled down; fillet : of its inner edges.
+
+    spacing : between the middles of two such rings, which go down together; 0: one.
+    """
 
     inner_diameter: float
     length: float
     fillet: float = 10.0
+    spacing: float = 0.0
 
     def __post_init__(self) -> None:
         if self.fillet > 0.5 * self.length:
-            problem = f"{self.fillet:g} mm is more than half the collar's length, {self.length:g}"
+            problem = f"{self.fillet:g} mm is more than half the length, {self.length:g}"
             raise InputError(None, "collar.fillet", problem)
+        if 0 < self.spacing < self.length:
+            problem = f"rings of {self.length:g} mm at {self.spacing:g} mm overlap"
+            raise InputError(None, "collar.spacing", problem)
+
+    @property
+    def end(self) -> float:
+        """Return how far from the middle of the tube it reaches, mm."""
+        return 0.5 * (self.spacing + self.length)
+
+
+@dataclass(frozen=True)
+class RigidSupports:
+    """Two frictionless cylinders along x under the tube, at z = span / 2 and -span / 2, mm.
+
+    saddle : a shell around the tube in place of each, which holds it as the ring does.
+    """
+
+    span: float = 2000.0
+    diameter: float = 100.0
+    saddle: Collar | None = None
+
+    @property
+    def width(self) -> float:
+        """Return that of a support along the tube, mm."""
+        return self.diameter if self.saddle is None else self.saddle.length
 
 
 def usual_collar(diameter: float) -> Collar:
@@ -64,11 +85,15 @@ class ClosedGas:
 
 @dataclass(frozen=True)
 class Gas:
-    """Air as the thesis has it; gauge pressures are above `ambient` (MPa), density kg/m^3 there."""
+    """Air as the thesis has it; gauge pressures are above `ambient` (MPa), density kg/m^3 there.
+
+    constant : while the cylinder is bent; the pressure, where a pump or a valve keeps it.
+    """
 
     ambient: float = 0.101
     temperature: float = 300.0
     density: float = 1.2041
+    constant: Literal["mass", "pressure"] = "mass"
 
     def closed_in(self, gauge: float, volume: float) -> ClosedGas:
         """Return the gas that fills a volume (mm^3) at a gauge pressure (MPa), and stays in it."""
@@ -186,7 +211,8 @@ class CylinderModel:
 
     mesh : as `cylinder_mesh` makes it: z along the axis, y up, seam at the bottom, `warp` in each
     quad, rows `support` and `support_bottom` at z = span / 2. thickness : (quads,) mm. increments :
-    mm, containing every deflection: the steps of the law. reading : changes no result.
+    mm, containing every deflection: the steps of the law. reading : changes no result. weight :
+    N/mm^2 of one layer, which pulls the tube down once it is inflated.
     """
 
     mesh: Mesh
@@ -199,6 +225,7 @@ class CylinderModel:
     increments: Sequence[float] = ()
     reading: CurveReading = None  # type: ignore[assignment]
     cords: Sequence[Cord] = ()
+    weight: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "thickness", np.array(self.thickness, float))
@@ -219,14 +246,15 @@ class CylinderModel:
         if not np.allclose(row, 0.5 * self.supports.span, rtol=NEAR):
             problem = f"{self.supports.span:g} mm, but the mesh has its row at {row[0]:g} mm"
             raise InputError(None, "supports.span", problem)
-        if not 0.5 * (self.supports.span + self.supports.diameter) < half:
+        if not 0.5 * (self.supports.span + self.supports.width) < half:
             problem = f"{self.supports.span:g} mm does not fit under {2 * half:g} mm of cylinder"
             raise InputError(None, "supports.span", problem)
-        if not self.collar.inner_diameter > diameter * (1 + NEAR):
-            problem = f"expected more than the cylinder's {diameter:g} mm"
-            raise InputError(None, "collar.inner_diameter", problem)
-        if not self.collar.length < self.supports.span - self.supports.diameter:
-            problem = f"{self.collar.length:g} mm reaches the supports"
+        for key, ring in (("collar", self.collar), ("saddle", self.supports.saddle)):
+            if ring is not None and not ring.inner_diameter > diameter * (1 + NEAR):
+                problem = f"expected more than the cylinder's {diameter:g} mm"
+                raise InputError(None, f"{key}.inner_diameter", problem)
+        if not 2 * self.collar.end < self.supports.span - self.supports.width:
+            problem = f"{2 * self.collar.end:g} mm reaches the supports"
             raise InputError(None, "collar.length", problem)
 
     @property
@@ -293,19 +321,21 @@ class RigidCylinder:
 class Bending:
     """Rigid cylinders that bend an inflated membrane with a constant mass of gas in it.
 
-    supports : at rest, brought to touch. collar : moves along `direction` from touching by
+    supports : at rest, brought to touch. collars : move along `direction` from touching by
     `displacements` (mm): the increments. reported : index of each that is a frame. released : node
-    set held only while inflating. penalty : MPa/mm of contact.
+    set held only while inflating. penalty : MPa/mm of contact. weight : N/mm^2 of the thinnest
+    wall, along `direction`.
     """
 
     supports: Sequence[RigidCylinder]
-    collar: RigidCylinder
+    collars: Sequence[RigidCylinder]
     displacements: Sequence[float]
     direction: Vector = (0.0, -1.0, 0.0)
     released: str | None = None
     penalty: float = 5.0
     gas: Gas = field(default_factory=Gas)
     reported: Sequence[int] | None = None
+    weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +383,8 @@ def inflated_cylinder(
     seam_width: float = SEAM_WIDTH, supports: RigidSupports | None = None,
     collar: Collar | None = None, deflections: Sequence[float] | None = None,
     symmetry: Literal["quarter", "full"] = "quarter", cap_warp: Literal["x", "y"] = "x",
-    gas: Gas | None = None, reading: CurveReading | None = None, cords: Sequence[Cord] = ()
+    gas: Gas | None = None, reading: CurveReading | None = None, cords: Sequence[Cord] = (),
+    weight: float = 0.0,
 ) -> CylinderModel:  # fmt: skip
     """Return a cylinder that is inflated and bent; lengths in mm before inflation, pressure in MPa.
 
@@ -364,13 +395,15 @@ def inflated_cylinder(
     supports = supports or RigidSupports()
     collar = collar or usual_collar(diameter)
     # Before the mesh is made, which would complain of rows where the supports are.
-    if not supports.span + supports.diameter < length:
+    if not supports.span + supports.width < length:
         problem = f"{supports.span:g} mm does not fit under {length:g} mm of cylinder"
         raise InputError(None, "supports.span", problem)
-    fine = FINER * size
+    fine, beside = FINER * size, BESIDE_SUPPORT
+    if supports.saddle is not None:
+        beside = 0.5 * supports.saddle.length + BESIDE_COLLAR
     zones = (
-        Refinement("collar", 0.0, 0.5 * collar.length + BESIDE_COLLAR, fine),
-        Refinement("support", 0.5 * supports.span, BESIDE_SUPPORT, fine),
+        Refinement("collar", 0.5 * collar.spacing, 0.5 * collar.length + BESIDE_COLLAR, fine),
+        Refinement("support", 0.5 * supports.span, beside, fine),
     )
     mesh = cylinder_mesh(length, diameter, size, seam_width, symmetry, zones, cap_warp, AROUND)
     layers = np.ones(len(mesh.quads))
@@ -381,5 +414,5 @@ def inflated_cylinder(
     steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
     return CylinderModel(
         mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas(),
-        reading=reading or curve_reading(diameter), cords=cords
+        reading=reading or curve_reading(diameter), cords=cords, weight=weight
     )  # fmt: skip

@@ -215,7 +215,13 @@ def bodies(
 
 
 def without_cords(model: CylinderModel, program: str) -> None:
-    """Raise InputError for a cylinder with cords."""
+    """Raise InputError for a cylinder with cords, or loads and supports of the membrane alone."""
+    pumped = model.gas.constant == "pressure"
+    own = {"saddle": model.supports.saddle, "collar.spacing": model.collar.spacing,
+           "mass_per_area": model.weight, "gas.constant": pumped}  # fmt: skip
+    for key, said in own.items():
+        if said:
+            raise InputError(None, key, f"is for the solver membrane, {program}'s deck has none")
     if model.cords:
         problem = f"cords are for the solver membrane: {program}'s deck has no tension-only members"
         raise InputError(None, "cord", problem)

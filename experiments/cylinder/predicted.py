@@ -540,7 +540,7 @@ class CylinderPredicted:
         return (
             model.thickness, model.inflation, model.deflections, model.increments, model.collar,
             model.supports, model.gas, mesh.points, mesh.quads, mesh.warp, mesh.node_sets,
-            *model.cords,
+            *model.cords, model.weight,
         )  # fmt: skip
 
     def measured(self, test: CylinderTest) -> bool:

@@ -84,16 +84,18 @@ def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -
             model.collar.length, tuple(spots),
         )  # fmt: skip
     at = mesh.points + inflated
-    radius, half = 0.5 * model.supports.diameter, 0.5 * model.supports.span
+    radius, half = 0.5 * model.supports.width, 0.5 * model.supports.span
     beside = np.abs(np.abs(at[:, 2]) - half)
     near = beside < radius
     height = float((at[near, 1] - np.sqrt(radius**2 - beside[near] ** 2)).min())
-    inner = 0.5 * model.collar.inner_diameter
-    inside = (np.abs(at[:, 2]) <= 0.5 * model.collar.length) & (np.abs(at[:, 0]) < inner)
+    inner, middle = 0.5 * model.collar.inner_diameter, 0.5 * model.collar.spacing
+    along = np.abs(np.abs(at[:, 2]) - middle) <= 0.5 * model.collar.length
+    inside = along & (np.abs(at[:, 0]) < inner)
     top = float((at[inside, 1] - np.sqrt(inner**2 - at[inside, 0] ** 2)).max())
     return BeamBodies(
-        ((-half, height), (half, height)), radius, top - deflection, inner, model.collar.length
-    )
+        ((-half, height), (half, height)), radius, top - deflection, inner, model.collar.length,
+        tuple(sorted({-middle, middle})),
+    )  # fmt: skip
 
 
 def draw_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path, title: str) -> None:

@@ -61,7 +61,16 @@ NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
 
 
 class CollarSection(Section):
-    """The ring that bends the cylinder; by its diameter unless given."""
+    """The ring that bends the cylinder, or two of them; by its diameter unless given."""
+
+    inner_diameter: Length
+    length: Length
+    fillet: Length | None = None
+    spacing: NotNegative | None = None
+
+
+class SaddleSection(Section):
+    """A shell around the cylinder in which it lies, in place of a round support."""
 
     inner_diameter: Length
     length: Length
@@ -74,6 +83,7 @@ class GasSection(Section):
     ambient: Pressure | None = None
     temperature: Positive | None = None
     density: Positive | None = None
+    constant: Literal["mass", "pressure"] = "mass"
 
 
 NoUnit = Annotated[float, Field(ge=0, le=1e18)]
@@ -139,6 +149,8 @@ class BentSection(Section):
     symmetry: Literal["full", "quarter"] = "quarter"
     span: Length | None = None
     support_diameter: Length | None = None
+    saddle: SaddleSection | None = None
+    mass_per_area: NoUnit | None = None
     collar: CollarSection | None = None
     deflection: Length | None = None
     frames: Frames | None = None
@@ -174,7 +186,8 @@ USUAL = {
 }  # fmt: skip
 KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
 #: Keys of a membrane alone, and of a beam alone.
-OF_MEMBRANE = ("length", "seam_width", "symmetry", "support_diameter", "collar", "cap_warp", "gas")
+OF_MEMBRANE = ("length", "seam_width", "symmetry", "support_diameter", "saddle", "mass_per_area",
+               "collar", "cap_warp", "gas")  # fmt: skip
 OF_BEAM = ("wall", "load_spacing", "load_width", "roller_below_axis", "mass_per_length", "friction")
 #: Keys of both kinds of walls of a beam.
 PLAIN, BRAID = ("axial", "hoop", "shear"), (
@@ -207,6 +220,7 @@ class CylinderTest:
     gas: Gas
     reading: CurveReading
     cords: tuple[Cord, ...] = ()
+    mass_per_area: float = 0.0
     beam: BeamModel | None = None
     measured: tuple[BendingCurve, ...] = ()
     reads_files: bool = False
@@ -242,7 +256,7 @@ class CylinderTest:
         return inflated_cylinder(
             self.diameter, self.pressure, thick, self.size, self.length, self.seam_width,
             self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp, self.gas,
-            self.reading, self.cords,
+            self.reading, self.cords, 1e-6 * GRAVITY * self.mass_per_area,
         )  # fmt: skip
 
     def models(
@@ -261,7 +275,7 @@ class CylinderTest:
     def settings(self) -> Mapping[str, object]:
         """Return everything but names, measurements and where the curve is read."""
         names = ("diameter", "pressure", "length", "seam_width", "size", "symmetry", "cap_warp",
-                 "deflections")  # fmt: skip
+                 "deflections", "mass_per_area")  # fmt: skip
         bodies = {name: asdict(getattr(self, name)) for name in ("supports", "collar", "gas")}
         of_beam = {} if self.beam is None else {"beam": repr(self.beam)}
         of_cords = {"cords": repr(self.cords)} if self.cords else {}
@@ -293,6 +307,9 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
         collar = usual_collar(own.diameter)
         if own.collar is not None:
             collar = Collar(**own.collar.model_dump(exclude_none=True))
+        saddle = None
+        if own.saddle is not None:
+            saddle = Collar(**own.saddle.model_dump(exclude_none=True))
         test = CylinderTest(
             **shared,
             pressure=own.pressure,
@@ -301,7 +318,12 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
             size=own.element_size or SIZE,
             symmetry=own.symmetry,
             cap_warp=own.cap_warp,
-            supports=RigidSupports(own.span or usual.span, own.support_diameter or usual.diameter),
+            supports=RigidSupports(
+                own.span or usual.span,
+                own.support_diameter or usual.diameter,
+                saddle,
+            ),
+            mass_per_area=own.mass_per_area or 0.0,
             collar=collar,
             gas=Gas(**own.gas.model_dump(exclude_none=True)),
             reading=curve_reading(own.diameter, own.places, own.slope_over),

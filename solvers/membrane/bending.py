@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
-from ...meshes.cylinder_model import Bending, ClosedGas, CylinderModel, InflatedModel, RigidCylinder
+from ...meshes.cylinder_model import (
+    Bending,
+    ClosedGas,
+    Collar,
+    CylinderModel,
+    InflatedModel,
+    RigidCylinder,
+)
 from ..base import EARLY, SNAP, History
 from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall
@@ -95,20 +102,33 @@ def analyse(
     way = np.asarray(plan.direction, dtype=float)
     position = membrane.reference + inflated
     posts = [brought_to_touch(body, position, -way, BITE) for body in plan.supports]
-    collar = brought_to_touch(plan.collar, position, way, 0.0)
-    volume, _ = membrane.cavity.measure(position)
-    membrane.gas = plan.gas.closed_in(pressure, volume)
     membrane.penalty = plan.penalty
+    resting = np.zeros((len(posts) + len(plan.collars), 3))
+    if plan.weight:
+        membrane.dead = np.outer(membrane.node_weight(plan.weight), -way).reshape(-1)
+        membrane.bodies = posts
+        found = membrane.equilibrium(inflated, pressure)
+        found = settled(membrane, inflated) if found is None else found
+        if found is None:
+            raise SolverFailure("no equilibrium of the inflated tube under its weight")
+        membrane.accept()
+        inflated, position = found, membrane.reference + found
+        resting[: len(posts)] = [push.sum(axis=0) for push in membrane.contact]
+    collars = [brought_to_touch(body, position, way, 0.0) for body in plan.collars]
+    volume, _ = membrane.cavity.measure(position)
+    membrane.gas = plan.gas.closed_in(pressure, volume) if plan.gas.constant == "mass" else None
+    membrane.pressure = pressure
     membrane.keep_tangent = True
 
     def bodies(moved: float) -> tuple[RigidCylinder, ...]:
-        centre = np.asarray(collar.centre) + moved * way
-        return (*posts, replace(collar, centre=tuple(centre.tolist())))
+        at = [np.asarray(body.centre) + moved * way for body in collars]
+        moves = zip(collars, at, strict=True)
+        return (*posts, *(replace(body, centre=tuple(to.tolist())) for body, to in moves))
 
     low, high = (extreme.copy() for extreme in extremes)
     path, moves = [inflated], [0.0]
     wrinkle = membrane.wrinkle.copy()
-    gas, pushes = [(pressure, volume)], [np.zeros((len(posts) + 1, 3))]
+    gas, pushes = [(pressure, volume)], [resting]
     remarks: list[Note] = []
     snaps: list[float] = []
     early = ""
@@ -147,7 +167,7 @@ def analyse(
         remarks.append(Note(SNAP, f"snaps, or nearly, before {where} mm of deflection"))
     words = f"rigid bodies penetrate {deepest:.3g} mm at most"
     remarks.append(Note(PENETRATION, words))
-    most = float(np.abs(np.array(pushes)[:, -1] @ way).max())
+    most = float(np.abs(np.array(pushes)[:, len(posts) :].sum(axis=1) @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
         words = (
             f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
@@ -157,10 +177,10 @@ def analyse(
     # The other half takes up forces normal to a symmetry plane.
     force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
     reactions: dict[str, Array] = {}
-    for i, body in enumerate((*posts, collar)):
+    for i, body in enumerate((*posts, *collars)):
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
     return History(
-        force[:, -1] @ way, np.array(path)[frames], low, high, reactions,
+        reactions[collars[0].name] @ way, np.array(path)[frames], low, high, reactions,
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
@@ -345,21 +365,32 @@ def analyse_cylinder(
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:
     """Return the cylinder with its posts, whose forces are reported as one, and its ring."""
-    half, radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
     sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
-    size = model.collar
-    across, along, middle = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    supports, collar = model.supports, model.collar
+    posts = [
+        RigidCylinder("supports", (1.0, 0.0, 0.0), (0.0, 0.0, side * 0.5 * supports.span),
+                      0.5 * supports.diameter)
+        if supports.saddle is None
+        else _ring("supports", supports.saddle, side * 0.5 * supports.span)
+        for side in sides
+    ]  # fmt: skip
+    places = [side * 0.5 * collar.spacing for side in sides] if collar.spacing else [0.0]
     bending = Bending(
-        [RigidCylinder("supports", across, (0.0, 0.0, side * half), radius) for side in sides],
-        RigidCylinder(
-            "collar", along, middle, 0.5 * size.inner_diameter, True, size.length, size.fillet
-        ),
+        posts,
+        [_ring("collar", collar, place) for place in places],
         model.increments,
         released="support_bottom",
         gas=model.gas,
         reported=model.reported.tolist(),
+        weight=model.weight,
     )
     return InflatedModel(
         model.mesh, model.thickness, np.asarray(model.mesh.warp), model.inflation,
         {**model.guides, "support_bottom": (1,)}, model.copies, bending, model.cords,
     )  # fmt: skip
+
+
+def _ring(name: str, size: Collar, place: float) -> RigidCylinder:
+    """Return a ring around the tube at z = place."""
+    centre, radius = (0.0, 0.0, place), 0.5 * size.inner_diameter
+    return RigidCylinder(name, (0.0, 0.0, 1.0), centre, radius, True, size.length, size.fillet)

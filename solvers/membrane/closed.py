@@ -292,10 +292,11 @@ class ClosedMembrane(Membrane):
     """A membrane with a cavity; `tangent` is a `BorderedTangent`.
 
     gas : sets the pressure by the volume. penalty : MPa/mm, of `bodies` at their present place.
-    slack : MPa of artificial isotropic stress in the next tangent, in no residual; it fades with
-    every tangent. line_slot : (lines, 144) places of the flexure's stiffness in the tangent, each a
-    quad of before, node, after, node. full : MPa at which cords have their initial force. pressure,
-    volume : at the last evaluation.
+    slack : MPa of artificial isotropic stress in the next tangent, in no residual; it fades
+    with every tangent. dead : (3 n,) N, minus dead loads on the nodes. line_slot : (lines, 144)
+    places of the flexure's stiffness in the tangent, each a quad of before, node, after, node.
+    full : MPa at which cords have their initial force. pressure, volume : at the last
+    evaluation.
     """
 
     cavity: Cavity
@@ -310,6 +311,7 @@ class ClosedMembrane(Membrane):
     slack: float = 0.0
     viscosity: float = 0.0
     anchor: Array = field(init=False)
+    dead: Array | None = None
     pressure: float = 0.0
     volume: float = 0.0
     contact: list[Array] = field(default_factory=list)
@@ -384,6 +386,8 @@ class ClosedMembrane(Membrane):
             self.residual += (drag * (u - self.anchor)).reshape(-1)
             if with_tangent:
                 self._add(self.node_slot, drag[:, None] * np.eye(3))
+        if self.dead is not None:
+            self.residual += self.dead
         self.contact = []
         for body in self.bodies:
             push, stiffness, touched = contact_forces(
@@ -393,6 +397,12 @@ class ClosedMembrane(Membrane):
             self.contact.append(push)
             if with_tangent:
                 self._add(self.node_slot[touched], stiffness)
+
+    def node_weight(self, weight: float) -> Array:
+        """Return (n,) N of the nodes; weight : N/mm^2 of the thinnest part of the wall."""
+        each = weight * self.elements.area * (self.section / self.section.min())[:, None]
+        shares = np.einsum("mp,pn->mn", each, self.elements.values)
+        return np.asarray(np.bincount(self.quads.ravel(), shares.ravel()), dtype=float)
 
     def drag(self, viscosity: float, anchor: Array) -> None:
         """Resist (MPa/mm times distance) motion away from the displacement `anchor` (n, 3)."""

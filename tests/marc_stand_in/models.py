@@ -130,7 +130,7 @@ def _bent(content, schedule, law, slack):
         raise DeckError("stand-in: what is let go after inflation is held in one way")
     mesh, supports = supported(content, late, released=np.array(released))
     gas = Gas(content.gas[0], content.gas[1], content.gas[2] * 1e12)
-    bending = Bending([post], ring, moves[moves > 0].tolist(), released="released", gas=gas)
+    bending = Bending([post], [ring], moves[moves > 0].tolist(), released="released", gas=gas)
     supports = {**supports, "released": ways.pop()}
     rests = np.concatenate([np.zeros(len(slack.pressures), dtype=bool), moves <= 0])
     model = InflatedModel(mesh, slack.thickness, slack.warp, slack.pressures, supports, 1, bending)

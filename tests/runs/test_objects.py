@@ -353,6 +353,7 @@ COMPANIONS = {
     **{f"cylinder.wall.{key}": PLAIN for key in ("axial", "hoop", "shear", "poisson", "wrinkles")},
     **{f"cylinder.{key}": PLAIN for key in ("model", "load_spacing", "load_width", "friction",
                                             "roller_below_axis", "mass_per_length")},
+    "cylinder.saddle": {"saddle": {"inner_diameter": 0.24, "length": 0.15, "fillet": 0.01}},
     "cylinder.collar": {"collar": {"inner_diameter": 0.24, "length": 0.15, "fillet": 0.01}},
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES
+from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES, Collar
 from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.validation import validate
@@ -35,6 +35,12 @@ TABLES = {
                  -4.03842e0, 1.81033e-1, -2.89436e2, 9.75725e1, -9.87010e0, 5.63206e-1],
 }  # fmt: skip
 TABLE_6_1 = {150.0: (90, 110, 140), 200.0: (60, 80, 100), 250.0: (50, 65, 85)}
+
+
+PLAIN_MEMBRANE = (
+    '[fabric]\nname = "f"\nthickness = 0.8\n[[cylinder]]\ndiameter = 150.0\npressure = 90.0\n'
+    "element_size = 60.0\ndeflections = [2.0]\n"
+)
 
 
 def cylinders(path) -> list[CylinderTest]:
@@ -230,15 +236,37 @@ def test_mistakes_in_a_beam_name_its_key(tmp_path, before, after, field, words):
     assert raised.field == field and words in raised.problem
 
 
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("saddle", "saddle = { inner_diameter = 170.0, length = 60.0 }"),
+        ("collar.spacing", "collar = { inner_diameter = 180.0, length = 60.0, spacing = 90.0 }"),
+        ("mass_per_area", "mass_per_area = 0.9"),
+        ("gas.constant", 'gas = { constant = "pressure" }'),
+    ],
+)
+def test_loads_and_supports_of_the_membrane_alone(tmp_path, key, said):
+    path = tmp_path / "project.toml"
+    path.write_text(PLAIN_MEMBRANE + said)
+    model = cylinders(path)[0].model()
+    saddle, weight = model.supports.saddle, 0.9 * 9.80665e-6
+    values = [("saddle", saddle, Collar(170.0, 60.0), None),
+              ("collar.spacing", model.collar.spacing, 90.0, 0.0),
+              ("mass_per_area", round(model.weight, 15), round(weight, 15), 0.0),
+              ("gas.constant", model.gas.constant, "pressure", "mass")]  # fmt: skip
+    for name, value, own, usual in values:
+        assert value == (own if name == key else usual)
+    law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
+    for analyse in (calculix_cylinder.analyse, marc_cylinder.analyse):
+        assert refused(analyse, model, law, None, None).field == key
+
+
 def test_a_membrane_takes_cords_and_other_programs_refuse_them(tmp_path):
     cords = "".join(
         f"\n[[cylinder.cord]]\nangle = {angle}\nstiffness = 4e4" for angle in (60.0, 300.0)
     )
     path = tmp_path / "cords.toml"
-    path.write_text(
-        '[fabric]\nname = "f"\nthickness = 0.8\n[[cylinder]]\ndiameter = 150.0\npressure = 90.0\n'
-        "element_size = 60.0\ndeflections = [2.0]" + cords
-    )
+    path.write_text(PLAIN_MEMBRANE + cords)
     (test,) = cylinders(path)
     assert [c.angle for c in test.model().cords] == [60.0, 300.0]
     law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
