@@ -141,7 +141,7 @@ class ForceTable:
 
 @dataclass(frozen=True, eq=False)
 class Cord:
-    """A cord that is bonded along a cylinder, from end to end.
+    """A cord along a cylinder, from end to end: bonded, or sliding in loops, one force all along.
 
     angle : degrees from the top. initial_force : N once the cylinder is inflated (it rises with the
     pressure, and strain counts from there); None: the cord is stretched by the inflation, with
@@ -153,6 +153,7 @@ class Cord:
     initial_force: float | None = None
     prestrain: float = 0.0
     tension_only: bool = True
+    bonded: bool = True
 
     def __post_init__(self) -> None:
         if not 0 <= self.angle < 360:

@@ -341,14 +341,17 @@ def _cord(section: CordSection, place: Place, at: str) -> Cord:
     listed = section.strain, section.force
     if (section.stiffness is None) == (None in listed) or (None in listed and any(listed)):
         raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
-    if not section.bonded:
-        raise place.error(f"{at}.bonded", "a cord that slides is not modelled; take bonded = true")
     with place.naming(at):
         table = axial_table(section.stiffness or 1.0)
         if section.strain and section.force:
             table = ForceTable(np.array(section.strain), np.array(section.force))
         return Cord(
-            section.angle, table, section.initial_force, section.prestrain, section.tension_only
+            section.angle,
+            table,
+            section.initial_force,
+            section.prestrain,
+            section.tension_only,
+            section.bonded,
         )
 
 
@@ -387,6 +390,10 @@ def _beam(section: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
     if section.wall is None:
         raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
     wall = _wall(section.wall, section.pressure, place)
+    for i, cord in enumerate(shared["cords"]):
+        if not cord.bonded:
+            problem = "one that slides is for a membrane; a beam takes bonded = true"
+            raise place.error(f"cord[{i}].bonded", problem)
     with place.naming(keys={**KEYS, "angle": "wall.angle"}):
         beam = BeamModel(
             TubeSection(0.5 * own.diameter, own.pressure, wall, shared["cords"]),

@@ -13,7 +13,7 @@ from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import Array, Numbers, volume_and_gradient
 from .bubble import STIFF, Wall
 from .cords import Cords, cords_on
-from .factorisation import BorderedTangent, tangent_for
+from .factorisation import BorderedTangent, Tangent, tangent_for
 from .kernel import reference_elements
 from .newton import Membrane, forgets, initial_stiffness, searched_equilibrium
 
@@ -378,6 +378,10 @@ class ClosedMembrane(Membrane):
             np.add.at(self.residual.reshape(-1, 3), self.cords.nodes, pull)
             if with_tangent:
                 self._add(self.tangent.slot[self.cords.quads], stiff.reshape(-1, 144))
+                tangent = self.tangent
+                for opens, steep in self.cords.sliding:
+                    tangent = tangent.inner  # type: ignore[attr-defined]
+                    tangent.border, tangent.stiffness = opens[self.free], steep
         if with_tangent and self.slack > 0:
             self._add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= FADE
@@ -470,8 +474,10 @@ def closed_membrane(
         flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)
         before, node, after = flexure.nodes.T
         coupled = np.concatenate([quads, np.stack([before, node, after, node], axis=1)])
-    tangent = tangent_for(coupled, points.size, free, points)
+    tangent: Tangent = tangent_for(coupled, points.size, free, points)
     tangent.slot, line_slot = tangent.slot[: len(quads)], tangent.slot[len(quads) :]
+    for _ in range(sum(not cord.bonded for cord in model.cords)):
+        tangent = BorderedTangent(tangent)
     return ClosedMembrane(
         points,
         quads,

@@ -1,8 +1,9 @@
-"""Cords bonded to a membrane: axial members whose ends are places on the edges of its quads.
+"""Cords along a membrane: axial members whose ends are places on the edges of its quads.
 
 A member crosses one quad from edge to edge. Its vector d = sum of b_n x_n over the quad's nodes (b
 adds up to zero), so that with l = |d|, t = d / l and the force N(l) its forces on the nodes are
-b_n N t, and their derivatives b_n b_m [dN/dl t t' + N/l (1 - t t')].
+b_n N t, and their derivatives b_n b_m [dN/dl t t' + N/l (1 - t t')]. A cord that slides has one
+force, of the length of all its members: dN/dl couples all of them, by one vector (`sliding`).
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,8 @@ class Cords:
 
     quads (m,): the quad of each; shares (m, 4): b_n; cord (m,): its number; part (m,): 1/2 where it
     lies in a plane of symmetry. level : share of the full pressure, by which initial forces rise.
-    force (m,) N: of whole cords at the last evaluation.
+    force (m,) N: of whole cords at the last evaluation. sliding : of each cord that slides, the
+    derivative (3 n,) of its length by the positions, and that of its force by it, N/mm.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class Cords:
         self.start = np.array([c.prestrain for c in cords])[cord]
         self.rest = np.linalg.norm(self._vectors(points), axis=1)
         self.bent = False
+        self.sliding: list[tuple[Array, float]] = []
 
     def _vectors(self, position: Array) -> Array:
         return np.asarray(np.einsum("mn,mnk->mk", self.shares, position[self.nodes]))
@@ -55,12 +58,21 @@ class Cords:
         length = np.linalg.norm(d, axis=1)
         t = d / length[:, None]
         strain = length / self.rest - 1.0 + self.start
-        force, slope = np.empty(len(d)), np.empty(len(d))
+        force, slope, self.sliding = np.empty(len(d)), np.empty(len(d)), []
         for i, cord in enumerate(self.cords):
             own = self.cord == i
+            rest = float(self.part[own] @ self.rest[own])
+            if not cord.bonded and rest > 0:
+                strain[own] = self.part[own] @ length[own] / rest - 1.0 + self.start[own]
             force[own], slope[own] = cord.table.pull(strain[own], cord.tension_only)
             if cord.initial_force is not None and not self.bent:
                 force[own], slope[own] = self.level * cord.initial_force, 0.0
+            if not cord.bonded and rest > 0:
+                opens = np.zeros(position.shape)
+                pulls = (self.part[own, None] * self.shares[own])[..., None] * t[own, None]
+                np.add.at(opens, self.nodes[own], pulls)
+                self.sliding.append((opens.reshape(-1), float(slope[own][0]) / rest))
+                slope[own] = 0.0
         self.force = force
         pull, steep = self.part * force, self.part * slope / self.rest
         tt = np.einsum("mi,mj->mij", t, t)
@@ -104,9 +116,8 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
 
 
 def _mirrored(cord: Cord, other: Cord) -> bool:
-    same = (cord.initial_force, cord.prestrain, cord.tension_only) == (
-        other.initial_force, other.prestrain, other.tension_only
-    )  # fmt: skip
+    names = ("initial_force", "prestrain", "tension_only", "bonded")
+    same = all(getattr(cord, name) == getattr(other, name) for name in names)
     turned = abs((cord.angle + other.angle) % 360) < NEAR
     one, two = ([own.table.strain, own.table.force] for own in (cord, other))
     return turned and same and np.array_equal(one, two)
