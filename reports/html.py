@@ -53,7 +53,7 @@ def write_page(folder: Path, report: Report, path: Path | None = None) -> Path:
     html.filters |= {
         "number": number, "percent": percent, "chart_views": chart_views, "drawn": vega.figure,
         "map_views": maps.map_views, "maps_data": maps.maps_data, "as_script": as_script,
-        "solid_svg": maps.solid_svg, "solid_data": maps.solid_data, "data_link": data_link,
+        "solid_view": maps.solid_view, "solid_data": maps.solid_data, "data_link": data_link,
         "data_uri": lambda file: data_uri(folder, file), "folds": folds, "long": long,
         "tied": lambda text: TIED.sub("\u00a0", text),
     }  # fmt: skip

@@ -1,7 +1,7 @@
 """Draw values at places and surfaces over several loads: maps, a body to turn, ParaView's files.
 
-Arrays are kept packed (`Packed`); maps are charts of coloured dots that Vega draws; the surface is
-drawn here for paper, and moved by a script of the page."""
+Arrays are kept packed (`Packed`); Vega draws maps as coloured dots, and the surface for paper; a
+script of the page draws that anew and turns it."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from typing import Any, Literal
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from markupsafe import Markup, escape
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..files import replacing, write_text
 from ..meshes.mesh import Mesh, meshio_of
 from ..solvers.base import History
-from .charts import Array, Chart, Charts, Shades, dots, ends_of, faces, shades_of
-from .vega import COLOURS, PALETTE, view
+from .charts import Array, Chart, Charts, Series, Shades, dots, ends_of, faces, line, shades_of
+from .vega import COLOURS, WIDE, view
 
 #: Steps between the least and the largest value; one more stands for what is not there.
 STEPS = 65534
@@ -212,11 +211,7 @@ def maps_data(maps: Maps) -> dict[str, Any]:
 
 def solid_data(solid: Solid) -> dict[str, Any]:
     """Return values and first view of a surface, for the page's script."""
-    every = solid.points.values
-    return asdict(solid) | {
-        "colours": COLOURS, "scale": scale_of(every, solid.warp),
-        "middle": middle_of(every).tolist(), "centre": CENTRE, "turn": TURN, "raise": RAISE,
-    }  # fmt: skip
+    return asdict(solid) | {"colours": COLOURS, "turn": TURN, "raise": RAISE}
 
 
 #: What a history is drawn of, with its unit and a factor, and the names of the components.
@@ -244,73 +239,38 @@ def history(name: str, history: History, quantity: str, component: int, frame: i
     if size[2] > FLAT * size[across]:  # a tube, along its longest side
         flat, depth, axes = now[:, [across, up]], now[:, least], (labels[across], labels[up])
     elif np.ptp(now[:, 2]) > 0:  # a sheet that is inflated
-        (flat, depth), axes = seen(now, TURN, RAISE), ("seen from above and aside, mm", "mm")
+        (flat, depth), axes = seen(now, TURN, RAISE), SEEN
     else:
         flat, depth, axes = now[:, :2], now[:, 2], (labels[0], labels[1])
-    order = np.argsort(depth[history.mesh.quads].mean(axis=1))
-    body = faces("", flat[history.mesh.quads[order]], values[order])
+    body = painted(flat, depth, history.mesh.quads, values)
     said = f"{what} {WAYS[component]}, {unit}"
     chart = Chart(name, *axes, [body], f"{name}: {said}", equal=True, scale=said,
                   shades=shades_of(values))  # fmt: skip
     return Charts(name, [chart], f"{name}: {said}, frame {frame % count + 1} of {count}")
 
 
-#: Classes of a surface's values.
-CLASSES = len(COLOURS["from least"])
-WIDTH, HEIGHT, MARGIN = 570.0, 430.0, 12.0
-#: Of the width, for the colour bar and its numbers; the surface stands in the rest.
-BAR, BAR_HEIGHT = 112.0, 152.0
 #: From where it is seen at first, degrees: turned about z, and raised over the horizon.
 TURN, RAISE = 35.0, 28.0
-#: Where the middle of the surface stands.
-CENTRE = (0.5 * (WIDTH - BAR), 0.5 * HEIGHT)
+SEEN = "seen from above and aside, mm", "mm"
 
 
-def solid_svg(solid: Solid, load: int) -> Markup:
-    """Draw the surface at a load, coloured by the first of its shades."""
-    every = solid.points.values
-    faces = np.rint(solid.faces.values).astype(int)
-    flat, depth = seen(every[load] - middle_of(every), TURN, RAISE)
-    scale = scale_of(every, solid.warp)
-    flat = flat * scale * (1.0, -1.0) + CENTRE
-    own = solid.shades[0]
-    low, high = ends_of(own.values.values, own.shades)
-    number = classes(own.values.values[load], low, high)
-    colours = COLOURS[own.shades]
-    parts = [
-        f'<svg class="solid" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
-        f'aria-label="{escape(solid.alt or solid.caption)}"><g class="faces">'
-    ]
-    for k in np.argsort(depth[faces].mean(axis=1)):
-        d = "L".join(f"{x:.1f} {y:.1f}" for x, y in flat[faces[k]])
-        fill = colours[number[k]] if number[k] >= 0 else "#999"
-        parts.append(f'<path fill="{fill}" d="M{d}Z"/>')
-    parts.append("</g>")
-    if solid.warp is not None:
-        arrow, _ = seen(solid.warp.values - middle_of(every), TURN, RAISE)
-        line = [f"{x:.1f} {y:.1f}" for x, y in arrow * scale * (1.0, -1.0) + CENTRE]
-        x, y = line[1].split()
-        parts.append(
-            f'<g class="warp"><path d="M{"L".join(line)}" fill="none" stroke="{PALETTE[1]}" '
-            f'stroke-width="2"/><text x="{x}" y="{y}" dx="6" dy="4">warp</text></g>'
-        )
-    parts.append(f'<g class="scale" transform="translate({WIDTH - BAR + 8:g} {2 * MARGIN:g})">')
-    parts.append(scale_bar(own.shades, own.unit, low, high) + "</g></svg>")
-    return Markup("".join(parts))  # noqa: S704 - titles and units are escaped
+def painted(flat: Array, depth: Array, quads: NDArray[np.intp], values: Array) -> Series:
+    """Return quads of points (n, 2), coloured by values (m,), the nearest (n,) drawn last."""
+    order = np.argsort(depth[quads].mean(axis=1))
+    return faces("", flat[quads[order]], values[order])
 
 
-def middle_of(points: Array) -> Array:
-    """Return the middle (3,) of the box around all loads, about which the surface is turned."""
-    flat = points.reshape(-1, 3)
-    return np.asarray(0.5 * (flat.min(axis=0) + flat.max(axis=0)))
-
-
-def scale_of(points: Array, warp: Packed | None = None) -> float:
-    """Return the scale at which surface and arrow fit however they are turned."""
-    flat = points.reshape(-1, 3)
-    flat = flat if warp is None else np.concatenate([flat, warp.values])
-    radius = float(np.linalg.norm(flat - middle_of(points), axis=1).max()) or 1.0
-    return (min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / radius
+def solid_view(solid: Solid) -> dict[str, Any]:
+    """Return Vega's specification of the surface at the last load, in the first of its shades."""
+    own, quads = solid.shades[0], np.rint(solid.faces.values).astype(int)
+    values, arrow = own.values.values, solid.warp
+    drawn = [painted(*seen(solid.points.values[-1], TURN, RAISE), quads, values[-1])]
+    if arrow is not None:
+        drawn.append(line("warp", *seen(arrow.values, TURN, RAISE)[0].T, colour=1))
+    chart = Chart("", *SEEN, drawn, solid.alt or solid.caption, equal=True,
+                  scale=f"{own.name}, {own.unit}", shades=own.shades,
+                  ends=ends_of(values, own.shades))  # fmt: skip
+    return view(chart, WIDE)
 
 
 def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
@@ -321,35 +281,6 @@ def seen(points: Array, turn: float, height: float) -> tuple[Array, Array]:
     up = points[:, 2] * np.cos(b) + away * np.sin(b)
     near = points[:, 2] * np.sin(b) - away * np.cos(b)
     return np.column_stack([right, up]), near
-
-
-def scale_bar(shades: Shades, unit: str, low: float, high: float) -> str:
-    """Draw the colours from low to high, upwards, with three values and the unit."""
-    colours = COLOURS[shades]
-    each = BAR_HEIGHT / len(colours)
-    bars = "".join(
-        f'<rect y="{each * (len(colours) - 1 - k):.1f}" width="12" height="{each + 0.5:.1f}" '
-        f'fill="{shade}"/>'
-        for k, shade in enumerate(colours)
-    )
-    tall = each * len(colours)
-    words = "".join(
-        f'<text class="end" x="16" y="{at:.1f}">{short(value)}</text>'
-        for value, at in ((high, 9.0), (0.5 * (low + high), 0.5 * tall + 4), (low, tall))
-    )
-    return f'{bars}{words}<text class="unit" x="0" y="{tall + 16:.1f}">{escape(unit)}</text>'
-
-
-def short(value: float) -> str:
-    """Return a number with three digits."""
-    return f"{float(f'{value:.3g}'):g}".replace("-", "\u2212")
-
-
-def classes(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.intp]:
-    """Return the number of each value's colour, -1 where there is no value."""
-    share = (values - low) / (high - low)
-    number = np.clip(np.floor(np.nan_to_num(share) * CLASSES), 0, CLASSES - 1).astype(np.intp)
-    return np.where(np.isfinite(values), number, -1)
 
 
 def write_vtu(

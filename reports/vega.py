@@ -437,7 +437,8 @@ def _marks(data: str, s: Series, chart: Chart, dot: float | None) -> list[tuple[
         path = "'M' + " + " + 'L' + ".join(
             f"scale('x', datum.x[{k}]) + ' ' + scale('y', datum.y[{k}])" for k in range(corners)
         )
-        shape = {"path": {"signal": f"{path} + 'Z'"}, "fill": shaded, "stroke": shaded}
+        known = [{"test": "!isValid(datum.values)", "value": "#999"}, shaded]
+        shape = {"path": {"signal": f"{path} + 'Z'"}, "fill": known, "stroke": known}
         return [(0, _mark("path", data, {**shape, "strokeWidth": {"value": 0.4}}))]
     if s.lower and s.look == "dots":
         ends = {"x": x, "y": _at("y", "lower"), "y2": _at("y", "upper"), "stroke": own}

@@ -208,8 +208,9 @@ def test_the_bubble_shows_its_warp(opened, tmp_path):
     assert opened.run(at) == first
     x, y, wide, tall = opened.box("svg.solid")
     for _ in range(2):
-        left, top, across, up = opened.box(".warp path")
-        assert x < left and left + across < x + wide and y < top and top + up < y + tall
+        for part in (".warp path", ".faces", ".scale"):
+            left, top, across, up = opened.box(part)
+            assert x < left and left + across < x + wide and y < top and top + up < y + tall
         opened.press("svg.solid", "ArrowRight")
 
 

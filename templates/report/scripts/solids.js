@@ -1,17 +1,56 @@
+// The drawing in which a surface is turned: its faces, an arrow, and the bar of colours.
+const WIDTH = 570, HEIGHT = 430, MARGIN = 12, BAR = 112, BAR_HEIGHT = 152;
+const surfaceIn = (box, data, count) => {
+  const svg = make("svg", { class: "solid", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img",
+    "aria-label": data.alt || data.caption, tabindex: 0 });
+  const faces = make("g", { class: "faces" }), warp = make("g", { class: "warp" });
+  faces.append(...Array.from({ length: count }, () => make("path")));
+  warp.append(make("path", { fill: "none", stroke: "#d55e00", "stroke-width": 2 }),
+    make("text", { dx: 6, dy: 4 }, "warp"));
+  const at = `translate(${WIDTH - BAR + 8} ${2 * MARGIN})`;
+  const bar = make("g", { class: "scale", transform: at });
+  const steps = data.colours[data.shades[0].shades].length, each = BAR_HEIGHT / steps;
+  for (let k = 0; k < steps; k++) {
+    bar.append(make("rect", { y: each * (steps - 1 - k), width: 12, height: each + 0.5 }));
+  }
+  for (const y of [9, 0.5 * BAR_HEIGHT + 4, BAR_HEIGHT]) bar.append(make("text", { class: "end", x: 16, y }));
+  bar.append(make("text", { class: "unit", x: 0, y: BAR_HEIGHT + 16 }));
+  svg.append(faces, ...data.warp ? [warp] : [], bar);
+  box.replaceChildren(svg);
+  return svg;
+};
+
+// The middle of the box around all loads, and the scale at which all fits however it is turned.
+const fitted = (points, arrow) => {
+  const axes = [0, 1, 2].map((i) => points.filter((_, k) => k % 3 === i));
+  const middle = axes.map((own) => {
+    const [low, high] = [Math.min, Math.max].map((end) => own.reduce((a, b) => end(a, b)));
+    return 0.5 * (low + high);
+  });
+  let radius = 0;
+  for (const every of [points, arrow]) {
+    for (let k = 0; k < every.length; k += 3) {
+      radius = Math.max(radius, Math.hypot(...middle.map((own, i) => every[k + i] - own)));
+    }
+  }
+  return { middle, scale: (Math.min(HEIGHT, WIDTH - BAR) / 2 - MARGIN) / (radius || 1) };
+};
+
 // A surface to turn, with mouse, finger or arrow keys.
 const enlivenSolid = async (figure, data) => {
   const points = await unpack(data.points);
   const corners = (await unpack(data.faces)).map(Math.round);
   const shades = await Promise.all(data.shades.map((shade) => unpack(shade.values)));
-  const svg = figure.querySelector("svg.solid"), group = svg.querySelector(".faces");
+  const [loads, nodes] = data.points.shape, faces = data.faces.shape[0];
+  const arrow = data.warp ? await unpack(data.warp) : [];
+  const { middle, scale } = fitted(points, arrow), centre = [0.5 * (WIDTH - BAR), 0.5 * HEIGHT];
+  const svg = surfaceIn(figure.querySelector(".one"), data, faces);
+  const group = svg.querySelector(".faces"), warp = svg.querySelector(".warp");
   const slider = figure.querySelector("input"), label = figure.querySelector(".slider output");
   const choice = figure.querySelector("select");
   const { said, button } = toolbar(figure.querySelector(".one"));
-  svg.setAttribute("tabindex", "0");
-  const [loads, nodes] = data.points.shape, faces = data.faces.shape[0];
-  const arrow = data.warp ? await unpack(data.warp) : [], warp = svg.querySelector(".warp");
   const paths = [...group.children], order = Array.from({ length: faces }, (_, k) => k);
-  const eye = { turn: data.turn, raise: data.raise, scale: data.scale };
+  const eye = { turn: data.turn, raise: data.raise, scale };
   const ends = data.shades.map((shade, k) => endsOf(shades[k], shade.shades));
   let waiting = false;
 
@@ -22,10 +61,10 @@ const enlivenSolid = async (figure, data) => {
     const [ca, sa, cb, sb] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
     const at = [], near = [];
     const seen = (every, k) => {
-      const [x, y, z] = [0, 1, 2].map((i) => every[3 * k + i] - data.middle[i]);
+      const [x, y, z] = [0, 1, 2].map((i) => every[3 * k + i] - middle[i]);
       const away = -sa * x + ca * y;
-      return [(data.centre[0] + eye.scale * (ca * x + sa * y)).toFixed(1),
-        (data.centre[1] - eye.scale * (z * cb + away * sb)).toFixed(1), z * sb - away * cb];
+      return [(centre[0] + eye.scale * (ca * x + sa * y)).toFixed(1),
+        (centre[1] - eye.scale * (z * cb + away * sb)).toFixed(1), z * sb - away * cb];
     };
     for (let k = 0; k < nodes; k++) {
       const [across, up, nearness] = seen(points, load * nodes + k);
@@ -61,7 +100,7 @@ const enlivenSolid = async (figure, data) => {
   };
   const zoom = (factor) => { eye.scale *= factor; later(); };
   const reset = () => {
-    Object.assign(eye, { turn: data.turn, raise: data.raise, scale: data.scale });
+    Object.assign(eye, { turn: data.turn, raise: data.raise, scale });
     later();
   };
 
