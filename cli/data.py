@@ -344,7 +344,7 @@ def biaxial_command(**options: Any) -> None:
     text = None if read.written is None else read.written.text
     data = data_rows((test.name, PreparedBiaxial(test)) for test in chosen)
     record = Record(read.path, text, None, data, {}, [this_run(given.command_line())])
-    write_constants(read.title, evaluations, record, folder)
+    write_constants(read, evaluations, record, folder)
     notes = [note for one in evaluations for note in one.notes]
     tests = {one.test: numbers_of(one) for one in evaluations}
     result = {"command": "biaxial", "title": read.title, "version": __version__, "tests": tests}

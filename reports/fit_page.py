@@ -193,7 +193,7 @@ def bounds_table(fit: Fit) -> Table:
 WORDS: Mapping[str, str] = {
     "E1": "Young's modulus along the warp, E1",
     "E2": "Young's modulus along the fill, E2",
-    "G12": "shear modulus between warp and fill, G12",
+    "G12": "Shear modulus between warp and fill, G12",
 }
 #: Between words that stay on one line.
 SPACE = "\u00a0"

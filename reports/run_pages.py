@@ -17,6 +17,7 @@ from ..experiments.kinds import Output
 from ..experiments.registry import report_of
 from ..files import __version__, json_text, write_notes, write_text
 from ..inference.posterior import LEVEL
+from ..project.project import Project
 from ..runs.fit import Check
 from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
 from ..runs.predictions import Predictions
@@ -203,7 +204,7 @@ def _estimate(check: Check, folder: Path, several: bool) -> Sequence[Part]:
 
 
 def write_constants(
-    title: str, evaluations: Sequence[BiaxialEvaluation], record: Record, folder: Path
+    project: Project, evaluations: Sequence[BiaxialEvaluation], record: Record, folder: Path
 ) -> Path:
     """Write tables, pictures and the page of the constants of biaxial tests; return its path."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -239,7 +240,8 @@ def write_constants(
     files = [*(file for e in exhibits.values() for file in e.files), (NOTES, NOTES_ARE),
              (RESULT, "all numbers of this page, for programs"), *record.files]  # fmt: skip
     report = Report(
-        title=f"{title}: constants of biaxial tests", summary=" ".join(summary),
+        title=f"{project.title}: constants of biaxial tests", summary=" ".join(summary),
+        about=about_of(project, record),
         facts=[("ratios", ", ".join(line.ratio for line in one.lines)) for one in evaluations],
         warnings=[note.line for note in notes], sections=sections, files=files,
         versions={"bubblefit": __version__},

@@ -4,6 +4,7 @@
 to place and from day to day is replaced.
 """
 
+import json
 import re
 from pathlib import Path
 
@@ -57,10 +58,13 @@ class Golden:
         self.rewrite = rewrite
 
     def __call__(self, name, text, folder):
-        """Assert that a command run in `folder` printed what NAME.txt holds."""
+        """Assert that a command run in `folder` printed what NAME.txt holds; pages have a head."""
         path, said = FOLDER / f"{name}.txt", normalised(text, folder)
         if self.rewrite:
             FOLDER.mkdir(exist_ok=True)
             path.write_text(said)
         assert path.exists(), f"there is no {path.name}: pytest --rewrite-golden writes it"
         assert said == path.read_text()
+        for page in folder.rglob("page.json"):
+            about = dict(json.loads(page.read_text())["about"])
+            assert re.fullmatch(r"\d{4}-\d\d-\d\d", about["date"]) and about["fabric"], page
