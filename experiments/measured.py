@@ -1,18 +1,32 @@
-"""Kinds whose tests are read with their data, and the objective of measured columns of strain."""
+"""Kinds whose tests are read with their data: what they prepare, compare and report alike."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..errors import SolverFailure
+from ..files import pandas as pd
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
-from .kinds import Array, FittedTest, MakeSolver, Masks, Predicted, PreparedTest, Studied, Weighting
+from .kinds import (
+    Array,
+    CardRun,
+    FittedTest,
+    MakeSolver,
+    Masks,
+    Predicted,
+    PreparedTest,
+    Reach,
+    Studied,
+    Weighting,
+)
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
@@ -32,6 +46,50 @@ class MeasuredKind:
         return cast(PreparedTest, self.prepared(test))
 
 
+def compared(
+    quantity: str, measured: ArrayLike, modelled: ArrayLike, unit: str, **where: Any
+) -> pd.DataFrame:
+    """Return a row a matched value: where it is, measured, modelled, and their difference."""
+    values = {"quantity": quantity, "measured": measured, "modelled": modelled}
+    table = pd.DataFrame({**where, **values})
+    return table.assign(difference=table["modelled"] - table["measured"], unit=unit)
+
+
+def errors_of_cards(
+    runs: Mapping[tuple[str, str], CardRun], errors: Callable[[History], dict[str, Any]],
+    words: Callable[[Any], str],
+) -> tuple[dict[str, Any], list[str], dict[str, History]]:  # fmt: skip
+    """Return numbers, lines and histories by card, of a test of one part; failures in words."""
+    numbers, lines, good = dict[str, Any](), list[str](), dict[str, History]()
+    for (name, _), run in runs.items():
+        try:
+            if isinstance(run.outcome, SolverFailure):
+                raise run.outcome
+            numbers[name] = errors(run.outcome)
+            lines += [f"{name}: {words(numbers[name])}"] if numbers[name] else []
+            good[name] = run.outcome
+        except SolverFailure as failure:
+            numbers[name] = {"failed": failure.reason}
+            lines.append(f"{name}: failed: {failure.reason}")
+    return numbers, lines, good
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedWhole:
+    """A test, read with its data, that is matched whole."""
+
+    test: Any
+    known = None  # what is matched is measured, not computed
+
+    @property
+    def specimens(self) -> Mapping[str, Sequence[int]]:
+        return {}
+
+    def reach(self, masks: Masks) -> Reach:
+        """Return the reach of the test."""
+        return cast(Reach, self.test.reach)
+
+
 @dataclass(frozen=True, eq=False)
 class FittedPart:
     """One part of a finished fit: its data (a strip, a path) and the best law's response."""
@@ -48,16 +106,9 @@ class FittedPart:
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedParts:
-    """A test, read with its data, of which each part (a strip, a ratio) has its comparison.
+class PreparedParts(PreparedWhole):
+    """A test of which each part (a strip, a ratio) has its comparison.
     test.matched : the data of the parts by name."""
-
-    test: Any
-    known = None  # what is matched is measured, not computed
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        return {}
 
     def part(self, name: str) -> str:
         """Return the name of the comparison of a part."""

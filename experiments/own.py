@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from ..materials.law import HypoelasticLaw, law_beside, usual_step
 from ..solvers.base import History, SolverCheck
 from . import kinds
 from .kinds import Array, MakeSolver, Masks, Weighting
+from .measured import PreparedWhole, compared
 
 #: Relative step of the central differences, and noise of values, of the largest, unless given.
 STEP, NOISE = 1e-5, 0.01
@@ -134,20 +135,12 @@ class ValuesObjective:
         return self  # it is asked by the same solver, whichever leads
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedOwn:
+class PreparedOwn(PreparedWhole):
     """A test of one's own in a fit."""
-
-    test: OwnTest
-    known = None
-    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
 
     @property
     def objective_is(self) -> str:
         return f"RMS error, {self.test.unit}"
-
-    def reach(self, masks: Masks) -> kinds.Reach:
-        return self.test.reach
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None
@@ -181,12 +174,9 @@ class OwnKind:
         return kinds.Findings(numbers, (), (words,), words, words)
 
     def residuals(self, prepared: PreparedOwn, fitted: kinds.FittedTest) -> Any:
-        import pandas as pd
-
         test, modelled = prepared.test, fitted.histories[0].load
-        columns = {"part": test.name, **test.places, "quantity": "value", "measured": test.measured}
-        table = pd.DataFrame({**columns, "modelled": modelled, "unit": test.unit})
-        return table.assign(difference=table["modelled"] - table["measured"])
+        where = {"part": test.name, **test.places}
+        return compared("value", test.measured, modelled, test.unit, **where)
 
     def simulate(self, *_: Any, **__: Any) -> kinds.Simulation:
         return kinds.Simulation({"cards": {}})

@@ -6,7 +6,7 @@ measured loads best. Its derivatives are differences of whole bendings (`solvers
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, cast
+from typing import Annotated, cast
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -20,8 +20,8 @@ from ...solvers.base import History
 from .. import kinds
 from ..cylinder.test import PART, BentSection, CylinderTest
 from ..cylinder.test import read as read_cylinder
-from ..kinds import Array, Kind, MakeSolver, Masks, Place, Reach, Weighting
-from ..measured import MeasuredKind
+from ..kinds import Array, Kind, MakeSolver, Masks, Place, Weighting
+from ..measured import MeasuredKind, PreparedWhole
 from ..strips.prepared import LoadObjective
 
 #: Frames of a bending, unless the section says otherwise: each costs an analysis an unknown.
@@ -106,17 +106,10 @@ class BendingObjective(LoadObjective):
         return super().shifted(*loads)
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedBending:
+class PreparedBending(PreparedWhole):
     """A bent cylinder with its loads."""
 
-    test: BendingTest
-    known = None
-    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
     objective_is = "RMS error of the collar's load, N"
-
-    def reach(self, masks: Masks) -> Reach:
-        return self.test.reach
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,

@@ -1,17 +1,16 @@
 """Results of bent cylinders in a fit as numbers, a table, a figure and a file."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import pandas as pd
 
-from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.vega import saved
 from ...solvers.base import History
 from ..cylinder.test import PART
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation, Weighting
+from ..measured import compared, errors_of_cards
 from . import BendingObjective, BendingTest, PreparedBending
 
 FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measured and modelled"
@@ -20,10 +19,8 @@ FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measur
 def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N."""
     own = BendingObjective(prepared.test, Weighting())
-    modelled = own.modelled(fitted.histories[0])
-    columns = {"deflection_mm": own.elongation, "quantity": "load", "measured": own.measured}
-    table = pd.DataFrame({"part": PART, **columns, "modelled": modelled})
-    return table.assign(difference=table["modelled"] - table["measured"], unit="N")
+    loads, where = own.modelled(fitted.histories[0]), {"deflection_mm": own.elongation}
+    return compared("load", own.measured, loads, "N", part=PART, **where)
 
 
 def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
@@ -38,18 +35,9 @@ def simulate(
     out: Output, within_range: bool = False,
 ) -> Simulation:  # fmt: skip
     """Draw the loads with every card; return the RMS errors."""
-    numbers, lines, good = dict[str, Any](), list[str](), dict[str, History]()
-    for name in cards:
-        ended = runs[name, PART].outcome
-        try:
-            if isinstance(ended, SolverFailure):
-                raise ended
-            numbers[name] = _errors(test, ended) if test.measured else {}
-            lines += [f"{name}: {_words(numbers[name])}"] if test.measured else []
-            good[name] = ended
-        except SolverFailure as failure:
-            numbers[name] = {"failed": failure.reason}
-            lines.append(f"{name}: failed: {failure.reason}")
+    numbers, lines, good = errors_of_cards(
+        runs, lambda history: _errors(test, history) if test.measured else {}, _words
+    )
     figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
     return Simulation({"cards": numbers}, lines, figures)
 

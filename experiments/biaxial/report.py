@@ -16,7 +16,7 @@ from ...reports.strips import ratio_chart
 from ...reports.vega import saved
 from .. import kinds
 from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
-from ..measured import PERCENT, FittedPart
+from ..measured import PERCENT, FittedPart, compared
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
 from .prepared import PreparedBiaxial
 from .test import BiaxialTest
@@ -186,12 +186,11 @@ def residuals(prepared: PreparedBiaxial, fitted: FittedTest) -> pd.DataFrame:
     parts = []
     for p in prepared.fitted_parts(fitted):
         measured, modelled = PERCENT * p.objective.strain, PERCENT * p.objective.modelled(p.history)
-        columns = {"measured": measured, "modelled": modelled, "difference": modelled - measured}
+        loads = _columns(p.data.load[1:], "load_kN_per_m")
         for k, yarn in enumerate(YARNS):
-            table = _columns(p.data.load[1:], "load_kN_per_m")
-            table.insert(0, "part", p.data.ratio)
-            own = {name: values[1:, k] for name, values in columns.items()}
-            parts.append(table.assign(quantity=f"{yarn}_strain", **own, unit="%"))
+            values = measured[1:, k], modelled[1:, k]
+            where = {"part": p.data.ratio, **loads}
+            parts.append(compared(f"{yarn}_strain", *values, "%", **where))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -39,6 +39,7 @@ from ...reports.maps import (
 from ...reports.vega import save, saved
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
 from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
+from ..measured import compared
 from . import findings as wording
 from .doubts import View
 from .findings import fitted_model, objective_of
@@ -144,14 +145,11 @@ def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
         places = target.at(nodes)
         for axis, name in enumerate(DIRECTIONS):
-            columns = {
-                "part": "bubble", "frame": frame, "pressure_kPa": 1e3 * target.pressure,
-                "x_mm": places[:, 0], "y_mm": places[:, 1], "quantity": name,
-                "measured": np.asarray(target.displacement)[:, axis], "modelled": modelled[:, axis],
-            }  # fmt: skip
-            frames.append(pd.DataFrame(columns))
-    table = pd.concat(frames, ignore_index=True)
-    return table.assign(difference=table["modelled"] - table["measured"], unit=objective.unit)
+            where = {"part": "bubble", "frame": frame, "pressure_kPa": 1e3 * target.pressure}
+            where |= {"x_mm": places[:, 0], "y_mm": places[:, 1]}
+            values = np.asarray(target.displacement)[:, axis], modelled[:, axis]
+            frames.append(compared(name, *values, objective.unit, **where))
+    return pd.concat(frames, ignore_index=True)
 
 
 def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:

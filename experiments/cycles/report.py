@@ -15,6 +15,7 @@ from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from ..measured import compared
 from . import CyclesTest, PreparedCycles
 
 FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
@@ -26,13 +27,11 @@ def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, Hist
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N from the reference load on."""
-    parts = []
-    for p in prepared.fitted_parts(fitted):
-        columns = {"part": p.data.name, "cycle": p.data.cycle, "strain": p.data.strain}
-        columns |= {"quantity": "load", "measured": p.data.load, "modelled": p.history.load}
-        table = pd.DataFrame(columns)
-        parts.append(table.assign(difference=table["modelled"] - table["measured"], unit="N"))
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat([
+        compared("load", p.data.load, p.history.load, "N", part=p.data.name, cycle=p.data.cycle,
+                 strain=p.data.strain)
+        for p in prepared.fitted_parts(fitted)
+    ], ignore_index=True)  # fmt: skip
 
 
 def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, dict[str, float]]:

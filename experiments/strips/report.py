@@ -38,7 +38,7 @@ from ..kinds import (
     by_strain,
     strains_of,
 )
-from ..measured import FittedPart
+from ..measured import FittedPart, compared
 from .data import Strip, compare_orders, curves_of
 from .prepared import PreparedStrips
 from .test import StripsTest
@@ -374,13 +374,8 @@ def examine(prepared: PreparedStrips, out: Output) -> Exhibit:
 
 def residuals(prepared: PreparedStrips, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load."""
-    parts = []
-    for s in prepared.fitted_parts(fitted):
-        modelled, measured = s.objective.modelled(s.history), s.objective.measured
-        columns = {
-            "part": s.data.direction, "elongation_mm": s.objective.elongation, "quantity": "load",
-            "measured": measured, "modelled": modelled, "difference": modelled - measured,
-            "unit": s.objective.unit,
-        }  # fmt: skip
-        parts.append(pd.DataFrame(columns))
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat([
+        compared("load", s.objective.measured, s.objective.modelled(s.history), s.objective.unit,
+                 part=s.data.direction, elongation_mm=s.objective.elongation)
+        for s in prepared.fitted_parts(fitted)
+    ], ignore_index=True)  # fmt: skip

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
-from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, StrainObjective
+from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, PreparedWhole, StrainObjective
 
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
@@ -154,18 +154,10 @@ def _centred(values: Array) -> Array:
     return np.asarray(values - values.mean(axis=0))
 
 
-@dataclass(frozen=True, eq=False)
-class PreparedTube:
+class PreparedTube(PreparedWhole):
     """A tube with its data."""
 
-    test: TubeTest
-    known = None
-    specimens: ClassVar[Mapping[str, Sequence[int]]] = {}
     objective_is = "sum of the RMS errors of the measured strains over their largest"
-
-    def reach(self, masks: Masks) -> Reach:
-        """Return the reach of the test, which is matched whole."""
-        return self.test.reach
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None

@@ -1,18 +1,17 @@
 """Results of tubes in tension and torsion as numbers, a table, a figure and a file."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ...errors import SolverFailure
 from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
 from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from ..measured import compared, errors_of_cards
 from . import PART, PERCENT, PreparedTube, TubeObjective, TubeTest
 
 NAMES = ("along the tube", "around the tube", "radius times twist")
@@ -21,15 +20,13 @@ FIGURE, CAPTION = "strains.png", "Strains about their means"
 
 def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
-    objective, history = TubeObjective(prepared.test, 1.0), fitted.histories[0]
-    modelled, parts = objective.modelled(history), []
-    for k, column in enumerate(objective.read):
-        table = pd.DataFrame({"part": PART, "row": np.arange(1, 1 + len(modelled))})
-        table["quantity"] = NAMES[column]
-        table["measured"] = PERCENT * objective.measured[:, k]
-        table["modelled"] = PERCENT * modelled[:, k]
-        parts.append(table.assign(difference=table["modelled"] - table["measured"], unit="%"))
-    return pd.concat(parts, ignore_index=True)
+    own = TubeObjective(prepared.test, 1.0)
+    measured, modelled = PERCENT * own.measured, PERCENT * own.modelled(fitted.histories[0])
+    where = {"part": PART, "row": np.arange(1, 1 + len(measured))}
+    return pd.concat([
+        compared(NAMES[column], measured[:, k], modelled[:, k], "%", **where)
+        for k, column in enumerate(own.read)
+    ], ignore_index=True)  # fmt: skip
 
 
 def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
@@ -55,14 +52,10 @@ def simulate(
     out: Output, within_range: bool = False,
 ) -> Simulation:  # fmt: skip
     """Draw the strains with every card; return the RMS errors."""
-    ended = {name: runs[name, PART].outcome for name in cards}
-    good = {name: one for name, one in ended.items() if isinstance(one, History)}
-    numbers: dict[str, Any] = {name: {"rms_percent": _errors(test, h)} for name, h in good.items()}
-    lines = [f"{name}: RMS of strain in %: {_words(_errors(test, h))}" for name, h in good.items()]
-    for name, failure in ended.items():
-        if isinstance(failure, SolverFailure):
-            numbers[name] = {"failed": failure.reason}
-            lines.append(f"{name}: failed: {failure.reason}")
+    numbers, lines, good = errors_of_cards(
+        runs, lambda history: {"rms_percent": _errors(test, history)},
+        lambda found: f"RMS of strain in %: {_words(found['rms_percent'])}",
+    )  # fmt: skip
     figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
     return Simulation({"cards": numbers}, lines, figures)
 

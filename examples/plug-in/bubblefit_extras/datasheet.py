@@ -7,13 +7,12 @@ strain = 0.02
 load_per_width = 12.4   # N/mm
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
-from bubblefit.errors import InputError, SolverFailure
 from bubblefit.experiments.kinds import (
     CardRun,
     Findings,
@@ -27,17 +26,22 @@ from bubblefit.experiments.kinds import (
     Simulation,
     Weighting,
 )
+from bubblefit.experiments.measured import (
+    MeasuredKind,
+    PreparedWhole,
+    compared,
+    errors_of_cards,
+)
+from bubblefit.experiments.strips.prepared import LoadObjective
 from bubblefit.inference.comparison import Comparison
 from bubblefit.materials.card import MaterialCard
-from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import UniaxialModel, straight_strip
 from bubblefit.readers.sections import Positive, Section
-from bubblefit.reports.content import Exhibit
-from bubblefit.solvers.base import Array, History
+from bubblefit.solvers.base import History
 from pydantic import Field
 
-#: mm: any strip of the same strain would do.
-LENGTH, WIDTH, INCREMENTS = 100.0, 50.0, 20
+#: mm: any strip of the same strain would do. A data sheet is rounded to two or three digits.
+LENGTH, WIDTH, INCREMENTS, ROUNDED = 100.0, 50.0, 20, 0.005
 
 
 class DatasheetSection(Section):
@@ -91,64 +95,24 @@ class DatasheetTest:
         return {"direction": self.direction, "strain": self.strain, "weight": self.weight}
 
 
-class LoadObjective:
-    """The load of the last frame less the one stated, over the one stated: one block of one."""
-
-    sizes = (1,)
-    unit = "N"
-
-    def __init__(self, load: float, weight: float) -> None:
-        self.load, self.weight = load, weight
-        # A data sheet is rounded to two or three digits.
-        self.least_noise = 0.005 * load
-        self.scale = np.array([load / weight])
-        self.data = (np.array([load]),)
-
-    def residual(self, history: History, nuisance: Mapping[str, float]) -> Array:
-        """(1,)"""
-        return np.array([(history.load[-1] - self.load) / self.scale[0]])
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        """(1, parameters) from the slope of the load."""
-        if history.load_slope is None:
-            raise InputError(None, "history", "the solver gives no derivatives of the load")
-        return np.asarray(history.load_slope[-1:] / self.scale[0])
-
-    def nuisance_columns(self, names: Sequence[str], nuisance: Mapping[str, float]) -> Array:
-        """There is no nuisance."""
-        return np.empty((1, 0))
-
-    def shifted(self, here: History, there: History) -> "LoadObjective":
-        """For a model that carries `here` where this one's carries `there`."""
-        other = LoadObjective(self.load, self.weight)
-        other.load = self.load - float(here.load[-1] - there.load[-1])
-        return other
-
-
-@dataclass(frozen=True)
-class PreparedDatasheet:
+class PreparedDatasheet(PreparedWhole):
     """The test in a fit."""
 
-    test: DatasheetTest
     objective_is = "error of the load, of the one stated"
-    known = None
-
-    @property
-    def specimens(self) -> Mapping[str, Sequence[int]]:
-        """Nothing that could be left out."""
-        return {}
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """The one load. It leads in: such a strip hardly ever fails."""
         (model,) = self.test.models().values()
-        objective = LoadObjective(self.test.load, weighting.weight if weighting.relative else 1.0)
+        load, weight = self.test.load, weighting.weight if weighting.relative else 1.0
+        given = model.elongations, model.elongations[-1:], [load], load, weight, ROUNDED * load
+        objective = LoadObjective(*given)
         return (Comparison(self.test.name, model, make_solver(), objective, contracts=True),)
 
 
 class DatasheetReport:
-    """Write and word the results of a data sheet."""
+    """Word the results of a data sheet; there is no figure, and so no `show`."""
 
     def findings(self, prepared: PreparedDatasheet, fitted: FittedTest) -> Findings:
         """How far the best fit is from the sheet."""
@@ -157,26 +121,11 @@ class DatasheetReport:
         numbers = {"relative_error": off, "load_N": prepared.test.load}
         return Findings(numbers, (), (words,), words, words)
 
-    def show(
-        self, prepared: PreparedDatasheet, fitted: FittedTest, found: Findings, out: Output
-    ) -> Exhibit:
-        """Return the one fact: there is no figure."""
-        return Exhibit(facts=[("data sheet", found.summary)])
-
     def residuals(self, prepared: PreparedDatasheet, fitted: FittedTest) -> pd.DataFrame:
         """The one matched value."""
-        modelled, measured = float(fitted.histories[0].load[-1]), prepared.test.load
-        return pd.DataFrame(
-            {
-                "part": [prepared.test.direction],
-                "strain": [prepared.test.strain],
-                "quantity": ["load"],
-                "measured": [measured],
-                "modelled": [modelled],
-                "difference": [modelled - measured],
-                "unit": ["N"],
-            }
-        )
+        test, modelled = prepared.test, fitted.histories[0].load[-1:]
+        where = {"part": test.direction, "strain": test.strain}
+        return compared("load", [test.load], modelled, "N", **where)
 
     def simulate(
         self,
@@ -187,46 +136,29 @@ class DatasheetReport:
         within_range: bool = False,
     ) -> Simulation:
         """The load of every card beside the one stated."""
-        told: list[dict[str, Any]] = []
-        lines = []
-        for (card, _), run in runs.items():
-            if isinstance(run.outcome, SolverFailure):
-                told.append({"card": card, "failed": run.outcome.reason})
-                lines.append(f"{card}: failed: {run.outcome.reason}")
-                continue
-            load = float(run.outcome.load[-1])
-            told.append({"card": card, "load_N": load, "stated_N": test.load})
-            lines.append(f"{card}: {load:.4g} N, stated {test.load:.4g} N")
+
+        def numbers(history: History) -> dict[str, Any]:
+            return {"load_N": float(history.load[-1]), "stated_N": test.load}
+
+        def words(found: dict[str, Any]) -> str:
+            return "{load_N:.4g} N, stated {stated_N:.4g} N".format(**found)
+
+        told, lines, _ = errors_of_cards(runs, numbers, words)
         return Simulation({"cards": told}, lines)
 
 
-class Datasheet:
-    """[[datasheet]] of a project."""
+class Datasheet(MeasuredKind):
+    """[[datasheet]] of a project: there is nothing to read but the section."""
 
     name = "datasheet"
     title = "the load per width of a data sheet"
     section = DatasheetSection
-    fitted = True
-    predicted = None
-    studied = None
+    prepared = PreparedDatasheet
     report = DatasheetReport()
 
     def read(self, section: DatasheetSection, place: Place, name: str) -> DatasheetTest:
         """The test of a section."""
-        return DatasheetTest(
-            name=name,
-            place=place,
-            weight=section.weight,
-            direction=section.direction,
-            strain=section.strain,
-            load_per_width=section.load_per_width,
-        )
-
-    def prepare(
-        self, test: DatasheetTest, law: HypoelasticLaw, make_solver: MakeSolver
-    ) -> PreparedDatasheet:
-        """Return the test as it is: there is nothing to read or to compute."""
-        return PreparedDatasheet(test)
+        return DatasheetTest(**{**section.model_dump(), "name": name}, place=place)
 
 
 #: The object that the entry point names.
