@@ -139,16 +139,16 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
 
 def residuals(prepared: PreparedBubble, fitted: FittedTest) -> pd.DataFrame:
     """Return a row a place, pressure (`frame`, from 1) and direction; offsets included."""
-    objective, frames = objective_of(fitted), []
+    objective, frames, where = objective_of(fitted), [], dict[str, Any]()
     nodes = fitted.comparisons[0].model.mesh.points[:, :2]
     every = objective.modelled(fitted.histories[0].displacement, fitted.nuisance)
     for frame, (target, modelled) in enumerate(zip(objective.targets, every, strict=True), 1):
         places = target.at(nodes)
         for axis, name in enumerate(DIRECTIONS):
-            where = {"part": "bubble", "frame": frame, "pressure_kPa": 1e3 * target.pressure}
+            where = {"frame": frame, "pressure_kPa": 1e3 * target.pressure}
             where |= {"x_mm": places[:, 0], "y_mm": places[:, 1]}
             values = np.asarray(target.displacement)[:, axis], modelled[:, axis]
-            frames.append(compared(name, *values, objective.unit, **where))
+            frames.append(compared(name, *values, objective.unit, part="bubble", **where))
     return pd.concat(frames, ignore_index=True)
 
 
