@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
 from ..files import is_file, replacing
+from ..files import pandas as pd
 from ..materials.card import MaterialCard, State, positive, thickness_difference
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
@@ -29,7 +30,6 @@ from ..readers.sections import ModulusUnit, Number, Section, beside
 from ..solvers.base import History, instability
 
 if TYPE_CHECKING:
-    import pandas as pd
     from pydantic import BaseModel
 
     from ..inference.assessment import Certainty

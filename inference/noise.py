@@ -57,8 +57,6 @@ def alike(
     """Return the number of values that err as one, 1 where they are independent.
     residuals : blocks (n,), which count alike. places : (n, 2) mm or (n, 1) of each. reach : of the
     largest extent, where neighbours end. rings : of distances."""
-    from scipy.spatial.distance import cdist
-
     products, pairs, asked = np.zeros(rings), np.zeros(rings), 0
     random = np.random.default_rng(0)
     step = max(1, -(-len(residuals) // BLOCKS))
@@ -67,7 +65,8 @@ def alike(
             continue
         few = random.permutation(len(own))[: max(20, DISTANCES // len(own))]
         extent = float(np.ptp(at, axis=0).max())
-        ring = np.minimum(cdist(at[few], at) / (reach * extent) * rings, rings).astype(int)
+        apart = scipy.spatial.distance.cdist(at[few], at) / (reach * extent)
+        ring = np.minimum(apart * rings, rings).astype(int)
         ring[np.arange(len(few)), few] = rings  # a point is no neighbour of its own
         value = own[few, None] * own
         inside = ring < rings

@@ -344,9 +344,7 @@ class SobolStarts:
     Where that cannot be analysed, random points follow."""
 
     def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        from scipy.stats import qmc
-
-        sequence, before = qmc.Sobol(dimensions(unknowns), seed=seed), 0
+        sequence, before = scipy.stats.qmc.Sobol(dimensions(unknowns), seed=seed), 0
         for _ in range(MOST_DRAWS // SOBOL_BATCH):
             points = coefficients_at(unknowns, sequence.random(SOBOL_BATCH))
             good = points[allowed(unknowns, points)]

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
@@ -15,7 +16,6 @@ from ..files import compiled
 
 if TYPE_CHECKING:
     import meshio
-    import scipy.sparse as sp
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +84,11 @@ NEIGHBOURS = 12  # candidate quads of a point, nearest centre first
 INSIDE = 1.0 + 1e-6
 
 
-def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+def sampling_matrix(mesh: Mesh, points: Array) -> tuple[scipy.sparse.csr_matrix, NDArray[np.bool_]]:
     """Return bilinear interpolation (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
-    import scipy.sparse as sp
-    from scipy.spatial import cKDTree
-
     corner = mesh.points[:, :2][mesh.quads]
     count = min(NEIGHBOURS, len(mesh.quads))
-    _, candidate = cKDTree(corner.mean(axis=1)).query(points, k=count)
+    _, candidate = scipy.spatial.cKDTree(corner.mean(axis=1)).query(points, k=count)
     candidate = candidate.reshape(len(points), count)
     owner = np.full(len(points), -1)
     where = np.zeros((len(points), 2))
@@ -111,7 +108,7 @@ def sampling_matrix(mesh: Mesh, points: Array) -> tuple[sp.csr_matrix, NDArray[n
     rows = np.repeat(np.arange(int(inside.sum())), 4)
     columns = mesh.quads[owner[inside]].reshape(-1)
     shape = (int(inside.sum()), len(mesh.points))
-    return sp.csr_matrix((weights.reshape(-1), (rows, columns)), shape=shape), inside
+    return scipy.sparse.csr_matrix((weights.reshape(-1), (rows, columns)), shape=shape), inside
 
 
 def _natural(corner: Array, point: Array) -> Array:
@@ -249,16 +246,14 @@ class SmoothReading:
     """Reading of nodal fields in the xy plane; quadratics : (5 nodes, nodes), of each node."""
 
     mesh: Mesh
-    quadratics: sp.csr_matrix
+    quadratics: scipy.sparse.csr_matrix
 
     @classmethod
     def of(cls, mesh: Mesh) -> Self:
         return cls(mesh, _quadratics(mesh))
 
-    def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+    def matrix(self, points: Array) -> tuple[scipy.sparse.csr_matrix, NDArray[np.bool_]]:
         """Return the matrix (inside points, nodes) to points (n, 2) mm, and inside (n,)."""
-        import scipy.sparse as sp
-
         bilinear, inside = sampling_matrix(self.mesh, points)
         shares = bilinear.tocoo()
         away = points[inside][shares.row] - self.mesh.points[shares.col, :2]
@@ -266,8 +261,9 @@ class SmoothReading:
         columns = TERMS * shares.col[:, None] + np.arange(TERMS)
         rows = np.repeat(shares.row, TERMS)
         shape = (bilinear.shape[0], TERMS * len(self.mesh.points))
-        curved = sp.csr_matrix((values.reshape(-1), (rows, columns.reshape(-1))), shape=shape)
-        return sp.csr_matrix(bilinear + curved @ self.quadratics), inside
+        flat = values.reshape(-1), (rows, columns.reshape(-1))
+        curved = scipy.sparse.csr_matrix(flat, shape=shape)
+        return scipy.sparse.csr_matrix(bilinear + curved @ self.quadratics), inside
 
 
 def _terms(away: Array) -> Array:
@@ -275,9 +271,7 @@ def _terms(away: Array) -> Array:
     return np.stack([x, y, x * x, x * y, y * y], axis=1)
 
 
-def _quadratics(mesh: Mesh) -> sp.csr_matrix:
-    import scipy.sparse as sp
-
+def _quadratics(mesh: Mesh) -> scipy.sparse.csr_matrix:
     nodes = mesh.points[:, :2]
     count = len(nodes)
     rows, columns, values = [], [], []
@@ -295,20 +289,18 @@ def _quadratics(mesh: Mesh) -> sp.csr_matrix:
         values += [solution.reshape(-1), -solution.sum(axis=1)]
     shape = (TERMS * count, count)
     flat = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_matrix(flat, shape=shape)
+    return scipy.sparse.csr_matrix(flat, shape=shape)
 
 
 def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
-    import scipy.sparse as sp
-
     count, each = len(mesh.points), mesh.quads.shape[1]
     of_quad = np.repeat(np.arange(len(mesh.quads)), each)
     ones = np.ones(mesh.quads.size, dtype=np.int64)
-    belongs = sp.csr_matrix(
+    belongs = scipy.sparse.csr_matrix(
         (ones, (of_quad, mesh.quads.reshape(-1))), shape=(len(mesh.quads), count)
     )
-    beside = sp.csr_matrix(belongs.T @ belongs)
-    further = sp.csr_matrix(beside @ beside)
+    beside = scipy.sparse.csr_matrix(belongs.T @ belongs)
+    further = scipy.sparse.csr_matrix(beside @ beside)
     near, far = (np.split(known.indices, known.indptr[1:-1]) for known in (beside, further))
     enough = (a if len(a) > ENOUGH else b for a, b in zip(near, far, strict=True))
     return [np.sort(own[own != node]).astype(np.intp) for node, own in enumerate(enough)]
@@ -374,13 +366,11 @@ class FacetReading:
     reading: SmoothReading
     facet: Facet
 
-    def matrix(self, points: Array) -> tuple[sp.csr_matrix, NDArray[np.bool_]]:
+    def matrix(self, points: Array) -> tuple[scipy.sparse.csr_matrix, NDArray[np.bool_]]:
         """Return as `SmoothReading.matrix`; a facet over the edge reads the rest."""
-        import scipy.sparse as sp
-
         _, inside = self.reading.matrix(points)
         own = points[inside]
-        total = sp.csr_matrix((len(own), len(self.reading.mesh.points)))
+        total = scipy.sparse.csr_matrix((len(own), len(self.reading.mesh.points)))
         count = np.zeros(len(own))
         for centre in self.facet.centres:
             read, seen = self._facets(own + centre)
@@ -390,13 +380,12 @@ class FacetReading:
         alone = count == 0
         if alone.any():
             plain, _ = self.reading.matrix(own)
-            total = total + sp.diags(alone.astype(float)) @ plain
-        return sp.csr_matrix(sp.diags(1.0 / np.maximum(count, 1.0)) @ total), inside
+            total = total + scipy.sparse.diags(alone.astype(float)) @ plain
+        shares = scipy.sparse.diags(1.0 / np.maximum(count, 1.0))
+        return scipy.sparse.csr_matrix(shares @ total), inside
 
-    def _facets(self, middles: Array) -> tuple[sp.csr_matrix, Array]:
+    def _facets(self, middles: Array) -> tuple[scipy.sparse.csr_matrix, Array]:
         """Return rows of facets, and 1 of each that counts; 0, with an empty row, of the others."""
-        import scipy.sparse as sp
-
         offsets, share = self.facet.places
         places = (middles[:, None] + offsets).reshape(-1, 2)
         read, inside = self.reading.matrix(places)
@@ -412,11 +401,11 @@ class FacetReading:
         columns = np.cumsum(inside) - 1
         rows = np.repeat(np.arange(len(middles)), seen.shape[1])
         flat = inside & np.repeat(counts, seen.shape[1])
-        gather = sp.csr_matrix(
+        gather = scipy.sparse.csr_matrix(
             (weights.reshape(-1)[flat], (rows[flat], columns[flat])),
             shape=(len(middles), read.shape[0]),
         )
-        return sp.csr_matrix(gather @ read), counts.astype(float)
+        return scipy.sparse.csr_matrix(gather @ read), counts.astype(float)
 
 
 def places_of(wanted: Sequence[float], steps: Sequence[float]) -> NDArray[np.intp]:

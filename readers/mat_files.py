@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import content_of, ends, reading
+from ..files import Later, content_of, ends, reading
+
+h5py: Any = Later("h5py")
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Within which a file of HDF5 must be read once.
@@ -205,8 +207,6 @@ def _variables_73(path: Path, wanted: Collection[str]) -> dict[str, Any]:
 
 def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
     """Return the value of a variable of version 7.3; `parts` runs out when too many are read."""
-    import h5py
-
     if depth > DEEPEST or next(parts, None) is None:
         raise InputError(path, name, "has too many parts; is the file damaged?")
     if isinstance(item, h5py.Group):
@@ -258,16 +258,14 @@ def check_readable(path: Path, read: Callable[[], object]) -> None:
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[Any]:
     """Open a file, as an `h5py.File`."""
-    try:
-        import h5py
-    except ImportError:
-        install = "install it with: pip install 'bubblefit[hdf5]'"
-        raise InputError(path, "", f"is an HDF5 file, which needs h5py; {install}") from None
     if not path.is_file():
         raise InputError(path, "", "no such file")
     try:
         with h5py.File(path, "r") as file:
             yield file
+    except ImportError:
+        install = "install it with: pip install 'bubblefit[hdf5]'"
+        raise InputError(path, "", f"is an HDF5 file, which needs h5py; {install}") from None
     except InputError:
         raise
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
@@ -277,8 +275,6 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
 def member(path: Path, group: Any, name: str) -> Any:
     """Return the object below a group by its path; None where there is none."""
-    import h5py
-
     here = group
     for part in name.split("/"):
         if not isinstance(here, h5py.Group) or part not in here:
@@ -291,8 +287,6 @@ def member(path: Path, group: Any, name: str) -> Any:
 
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:
     """Read a dataset's numbers, which must lie in this file."""
-    import h5py
-
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiub":
         raise InputError(path, name, "expected an array of numbers")
     if dataset.is_virtual or dataset.external:

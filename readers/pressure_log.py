@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..errors import InputError
@@ -108,8 +109,6 @@ def misfit_of(p: Array, h: Array, rest: float) -> float:
 
 def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
     """Return share of the variance of y that no rising function of x through the rest explains."""
-    from scipy.optimize import isotonic_regression
-
     total = float(np.sum((y - y.mean()) ** 2))
     if not total > 0:
         return 1.0
@@ -118,7 +117,8 @@ def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
     # A function has one value where x has one: readings of one pressure are put together.
     which = np.unique(all_x, return_inverse=True)[1]
     sums = np.bincount(which, weight)
-    rising = isotonic_regression(np.bincount(which, weight * all_y) / sums, weights=sums).x
+    means = np.bincount(which, weight * all_y) / sums
+    rising = scipy.optimize.isotonic_regression(means, weights=sums).x
     return float(np.sum((y - rising[which[:-1]]) ** 2)) / total
 
 

@@ -10,16 +10,13 @@ from dataclasses import dataclass, replace
 from datetime import date
 from itertools import permutations
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import content_of
-
-if TYPE_CHECKING:
-    import pandas as pd
+from ..files import pandas as pd
 
 #: Cells, in small letters, that stand for no value: empty, and what C, .NET and spreadsheets write.
 HOLES = ("", "nan", "-nan", "-nan(ind)", "1.#qnan", "-1.#ind", "n. def.", "n/a", "---")
@@ -36,8 +33,6 @@ class TextTable:
 
     def numbers(self, column: str, holes: bool = False) -> NDArray[np.float64]:
         """Return one column as finite numbers, (rows,); with `holes`, those of `HOLES` give NaN."""
-        import pandas as pd
-
         text = plain = self.text(column)
         if self.decimal != ".":
             # A point beside decimal commas marks thousands, or a mistake: no number either way.
@@ -142,8 +137,6 @@ def check_row(
 
 def read_table(path: Path | str, comment: str = "#") -> TextTable:
     """Read a table with a header line, without blank lines and those that start with `comment`."""
-    import pandas as pd
-
     path = Path(path)
     numbered = read_lines(path, comment)
     if len(numbered) < 2:

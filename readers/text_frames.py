@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import pandas as pd
 from . import frames, tables
 
 Array = NDArray[np.float64]
@@ -248,8 +249,6 @@ def _quick(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
     """Read all rows by pandas; None where they have to be read one by one."""
-    import pandas as pd
-
     separator, width = layout.separator, len(layout.headings)
     texts = [text for _, text in layout.body]
     if separator is None and {len(text.split()) for text in texts} != {width}:
@@ -295,8 +294,6 @@ def _slow(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Read row by row, flags first: a doubtful row may hold anything."""
-    import pandas as pd
-
     width, rows = len(layout.headings), []
     for number, text in layout.body:
         row = cells_of(text, layout.separator)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..errors import InputError, Note, SolverFailure
@@ -88,12 +89,11 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
 
 def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
     """Return values (increments, ...), zero at rest, over mm of the gauge; SolverFailure."""
-    from scipy.interpolate import CubicSpline  # heavy: where it is used
-
     gauge = np.insert(opened, 0, 0.0)
     if not (np.diff(gauge) > 0).all():
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
-    return CubicSpline(gauge, np.concatenate([np.zeros((1, *values.shape[1:])), values]))
+    whole = np.concatenate([np.zeros((1, *values.shape[1:])), values])
+    return scipy.interpolate.CubicSpline(gauge, whole)
 
 
 def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import InputError, Note, rows
+from ...files import pandas as pd
 from ...inference.assessment import UNCERTAIN
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
@@ -21,9 +22,6 @@ from ..kinds import UNMATCHED, UNSTABLE, Array
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialTest
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 #: Of a loading's range: how near both loads must be to those of the first row.
 BACK = 0.01
@@ -155,8 +153,6 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
     """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
     Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
     Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither."""
-    import pandas as pd
-
     evaluated = {
         (path.table.path.name, path.cycle.phase): (path, line)
         for path, line in zip(found.paths, found.lines, strict=True)
@@ -203,8 +199,6 @@ STANDARD = "en-17117"
 
 def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     """Return all tables by name: constants E, A (direct form), kN/m; squares of strain, %^2."""
-    import pandas as pd
-
     named = [("chosen", found.chosen), *(("", one) for one in found.others)]
     ends = {"first cycle": found.first, "last cycle": found.last}
     named += [(which, one) for which, one in ends.items() if one is not None]

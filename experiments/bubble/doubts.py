@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
@@ -336,13 +337,11 @@ def _same_points(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the rows of points that are in both frames: by their places, before or after.
     Rows are paired as they stand where most of the places are found in neither way."""
-    from scipy.spatial import cKDTree  # heavy: where it is used
-
     moved = float(np.median(np.linalg.norm(last.displacement[:, :2], axis=1)))
     for taken_off in (0.0, 1.0):
         a, b = (f.points - taken_off * f.displacement[:, :2] for f in (last, other))
         some = np.arange(len(b))[:: max(1, -(-len(b) // ENOUGH))]
-        apart, row = cKDTree(a).query(b[some])
+        apart, row = scipy.spatial.cKDTree(a).query(b[some])
         near = apart <= CLOSE * moved
         if near.mean() > MOST:
             return row[near], some[near]
@@ -451,10 +450,8 @@ def _motion(view: View) -> Array | None:
 
 def _mean_motion(view: View, field: DisplacementField) -> Array:
     """Return (3,) mm over points with others across the centre: a side that is lost is no tilt."""
-    from scipy.spatial import cKDTree  # heavy: where it is used
-
     inner = view.inner(field)
-    points, tree = field.points[inner], cKDTree(field.points[inner])
+    points, tree = field.points[inner], scipy.spatial.cKDTree(field.points[inner])
     apart = 2.0 * np.median(tree.query(points, 2)[0][:, 1])
     paired = tree.query(-points)[0] < apart
     return np.asarray(field.displacement[inner][paired if paired.any() else ...].mean(axis=0))

@@ -359,9 +359,7 @@ def _interpolated(field: DisplacementField, mesh: Mesh) -> Array:
         return field.displacement
     # C1 interpolation: the data mesh is curved between its nodes, linear would cut corners.
     whole = mirrored(field)
-    from scipy.interpolate import CloughTocher2DInterpolator  # heavy: where it is used
-
-    between = CloughTocher2DInterpolator(whole.points, whole.displacement)(nodes)
+    between = scipy.interpolate.CloughTocher2DInterpolator(whole.points, whole.displacement)(nodes)
     # Chords of the data's rim can leave a rim node of ours outside: it does not move anyway.
     outside = ~np.isfinite(between).all(axis=1)
     between[outside] = 0.0

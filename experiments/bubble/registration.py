@@ -15,6 +15,7 @@ from math import factorial
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError
@@ -268,10 +269,9 @@ def _followed(
             parts.append(rise - orthogonal @ (orthogonal.T @ rise))
         return np.concatenate(parts)
 
-    from scipy.optimize import least_squares  # heavy: where it is used
-
     start = min(starts, key=lambda place: np.linalg.norm(left(place)))
-    best = least_squares(left, start, x_scale=scale, bounds=(start - reach, start + reach))
+    bounds = start - reach, start + reach
+    best = scipy.optimize.least_squares(left, start, x_scale=scale, bounds=bounds)
     variance = 2 * best.cost / max(len(best.fun) - len(best.x), 1)
     return best.x, variance * np.linalg.pinv(best.jac.T @ best.jac)
 

@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
@@ -191,14 +192,10 @@ def at_nodes(nodes: Array, places: Array, values: Array) -> Array:
     found = np.full((len(nodes), 3), np.nan)
     if len(places) < 4:
         return found
-    from scipy.spatial import QhullError, cKDTree  # heavy: where it is used
-
-    tree = cKDTree(places)
+    tree = scipy.spatial.cKDTree(places)
     apart = float(np.median(tree.query(places, k=2)[0][:, 1]))
     near = tree.query(nodes)[0] <= FAR * apart
     if near.any():
-        with suppress(QhullError):  # all places on one line: there is nothing between them
-            from scipy.interpolate import LinearNDInterpolator  # heavy: where it is used
-
-            found[near] = LinearNDInterpolator(places, values)(nodes[near])
+        with suppress(scipy.spatial.QhullError):  # nothing lies between places on one line
+            found[near] = scipy.interpolate.LinearNDInterpolator(places, values)(nodes[near])
     return found

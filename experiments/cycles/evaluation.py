@@ -14,12 +14,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind
+from ...files import pandas as pd
 from ...materials.forms.spline import Spline
 from ...materials.law import HypoelasticLaw, law_slopes
 from ...materials.memory import NAMES, QUANTITIES, Memory, own_stress
@@ -33,9 +35,6 @@ from ...readers.histories import (
     read_history,
 )
 from ..kinds import READING, Array
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SLIP, DRIFT = NoteKind("extensometer slip", 3.0), NoteKind("extensometer drift", 2.0)
 GRIPS, CHANGING = NoteKind("strain between grips", 1.0), NoteKind("not conditioned", 1.0)
@@ -306,8 +305,6 @@ def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> Fit
     What an extensometer has lost by slip before a later cycle is an unknown; a cycle that is left
     out has that of the next one.
     """
-    from scipy.optimize import least_squares
-
     h, values, level = one.history, one.values, one.reference
     last, (start, end) = len(values), matched_rows(one)
     rows = np.arange(start, end + 1)
@@ -351,7 +348,7 @@ def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> Fit
     low = [*[BOUNDS[0]] * knots, 0.0, 1.0, 0.0, 0.0, *[SLIPS[0]] * many]
     high = [*[BOUNDS[1]] * knots, 0.99, MOST, 1.0, 100.0, *[SLIPS[1]] * many]
     begin = [*[1.0] * knots, 0.3, 1.4, 0.4, 0.1, *[0.0] * many]
-    best = least_squares(
+    best = scipy.optimize.least_squares(
         lambda x: weight * (_stress(law_at(x), strain_at(x)) - load), begin, slopes,
         bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400,
     )  # fmt: skip
@@ -377,8 +374,6 @@ def left_out(one: EvaluatedHistory, knots: int = KNOTS) -> pd.DataFrame:
     and permanent strain, without slip. A cycle that alone reaches its load, and the first, have no
     others that could predict them.
     """
-    import pandas as pd
-
     table = []
     for v in one.values:
         number = v.cycle.number
@@ -414,8 +409,6 @@ class Cycles:
     @property
     def table(self) -> pd.DataFrame:
         """Return a row a cycle; stiffness in N, or N/mm of width; ratios to the first cycle."""
-        import pandas as pd
-
         scale, unit = (1.0, "N") if self.width is None else (1.0 / self.width, "N_per_mm")
         table = []
         for one in self.histories:
@@ -445,8 +438,6 @@ class Cycles:
     @property
     def holds(self) -> pd.DataFrame:
         """Return a row a hold: strain (creep) and load (relaxation) before, after, per decade."""
-        import pandas as pd
-
         table = []
         for one in self.histories:
             h, zero = one.history, one.zero
@@ -473,8 +464,6 @@ class Cycles:
     @property
     def memory(self) -> pd.DataFrame:
         """Return a row a history: set, unloading, reloading, saturation, one sigma each, RMS."""
-        import pandas as pd
-
         table = []
         for one, fitted in zip(self.histories, self.fits, strict=True):
             row: dict[str, Any] = {"file": one.history.path.name, "rms_N": fitted.rms}
@@ -489,8 +478,6 @@ class Cycles:
     @cached_property
     def left_out(self) -> pd.DataFrame:
         """Return each cycle beside its prediction by a fit to the others, see `left_out`."""
-        import pandas as pd
-
         return pd.concat([left_out(one) for one in self.histories], ignore_index=True)
 
     def fit_lines(self) -> list[str]:

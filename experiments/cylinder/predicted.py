@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure, marks
+from ...files import pandas as pd
 from ...materials.card import BAND
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CurveReading, CylinderModel
@@ -19,9 +20,6 @@ from ...readers.bending import BendingCurve, BendingError, model_error, scatter
 from ...solvers.base import BandEnd, History
 from ..kinds import STRAINS, Array, PredictedRun, RunRecord, Studied, band_of
 from .test import CylinderTest
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,8 +284,6 @@ MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetiti
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     """Return mean and scatter of the repetitions on a grid; one test at least was measured."""
-    import pandas as pd
-
     parts = []
     for test in tests:
         if test.measured:
@@ -453,8 +449,6 @@ class CylinderOutcome:
         return row
 
     def curve(self, number: int) -> pd.DataFrame:
-        import pandas as pd
-
         run = self.bent.get(number)
         values = [np.empty(0)] * len(CURVE)
         if run is not None:

@@ -8,20 +8,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError, Note, NoteKind, as_note, rows
+from ...files import pandas as pd
 from ...files import replacing
 from ...readers.curves import LoadCurve, direction_named
 from ...readers.frames import Frame
 from ...readers.machine_tables import read_machine_loads, read_times
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from scipy.spatial import Delaunay
 
 #: Kinds of notes that are made here.
 LOST, NO_LOAD = NoteKind("correlation lost"), NoteKind("frames without load")
@@ -34,7 +32,7 @@ class Surface:
     """The correlated points of a frame, triangulated by their reference x and y.
     places : (points, 2, 3) mm, before and after."""
 
-    mesh: Delaunay
+    mesh: scipy.spatial.Delaunay
     places: Array
 
     def longest_edge(self, triangles: NDArray[np.intp] | slice = slice(None)) -> Array:
@@ -48,8 +46,6 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
     """Triangulate a frame; None where fewer than three points, or a line, were correlated.
     before : a surface; its triangles are taken where the reference points are the same:
     triangulating is what costs."""
-    from scipy.spatial import Delaunay, QhullError
-
     places = np.stack([frame.points, frame.points + frame.displacement], axis=1)
     places = places[np.isfinite(places).all(axis=(1, 2))]
     if len(places) < 3:
@@ -57,8 +53,8 @@ def triangulated(frame: Frame, before: Surface | None = None) -> Surface | None:
     if before is not None and np.array_equal(places[:, 0, :2], before.places[:, 0, :2]):
         return Surface(before.mesh, places)
     try:
-        return Surface(Delaunay(places[:, 0, :2]), places)
-    except QhullError:  # all on one line
+        return Surface(scipy.spatial.Delaunay(places[:, 0, :2]), places)
+    except scipy.spatial.QhullError:  # all on one line
         return None
 
 
@@ -315,8 +311,6 @@ class GaugeTable:
 
     def frame(self) -> pd.DataFrame:
         """Return a DataFrame, a row a frame; with loads only the frames of the curve."""
-        import pandas as pd
-
         record, curve = self.record, self.curve
         rows = np.arange(len(self.files)) if curve is None else self._used()
         table = pd.DataFrame({"frame": rows, "file": [self.files[i] for i in rows]})

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...inference.comparison import Comparison, NoiseIs
@@ -55,9 +56,7 @@ class LoadObjective:
         knots = np.concatenate([[0.0], np.asarray(increments, float)])
         self.elongation, self.measured = np.asarray(elongation, float), np.asarray(load, float)
         # Interpolation is linear in the loads; the first knot is the unloaded strip.
-        from scipy.interpolate import CubicSpline
-
-        curve = CubicSpline(knots, np.eye(len(knots)))
+        curve = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)))
         self.sample = curve(self.elongation)[:, 1:]
         self.steep = curve(self.elongation, 1)[:, 1:]
         self.sizes = (len(self.measured),)

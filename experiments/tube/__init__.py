@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, Field
 
 from ...errors import InputError
+from ...files import pandas as pd
 from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
@@ -96,8 +97,6 @@ def read(section: TubeSection, place: Place, name: str) -> TubeTest:
 
 
 def _columns(path: Path, radius: float) -> tuple[Array, Array]:
-    import pandas as pd
-
     try:
         table = pd.read_csv(path, comment="#", skipinitialspace=True)
     except (OSError, ValueError) as error:

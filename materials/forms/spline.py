@@ -8,6 +8,7 @@ from math import comb
 from typing import Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from ...errors import InputError
@@ -106,9 +107,7 @@ def _between(ends: Sequence[float], parts: int) -> Array:
 
 def _coefficients(knots: Sequence[float]) -> Array:
     """Return (n - 1, 4, n): powers of strain, highest first, by the values at n knots."""
-    from scipy.interpolate import CubicSpline  # half a second, and only splines need it
-
-    spline = CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
+    spline = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
     whole = np.zeros((len(knots) - 1, 4, len(knots)))
     for k, start in enumerate(knots[:-1]):
         for power in range(4):  # c (x - start)^power
@@ -298,15 +297,13 @@ class Pieces:
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from values where the functions differ most; InputError: they do not."""
-        from scipy.linalg import qr  # heavy, and only forms of one's own need it
-
         whole = np.zeros((self.size, self.size))
         for name in ORDER:
             own = np.flatnonzero(np.array(self.modulus_of) == name)
             strain = self.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
             rows = modulus_rows(self, name, strain, strain_range)[:, own]
             scaled = rows / np.maximum(np.abs(rows).max(axis=0), 1e-300)
-            _, sizes, places = qr(scaled.T, mode="economic", pivoting=True)
+            _, sizes, places = scipy.linalg.qr(scaled.T, mode="economic", pivoting=True)
             if not np.abs(np.diag(sizes)).min() > DEPENDENT:
                 problem = f"the functions of {name} are not independent up to a strain of "
                 raise InputError(None, "form", f"{problem}{strain[-1]:g}; leave one out")

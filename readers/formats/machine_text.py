@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ...files import pandas as pd
 from .. import tables
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
@@ -196,8 +197,6 @@ def table_of(
     path: Path, rows: Rows, index: int, options: TableOptions, separator: str | None = ";"
 ) -> MachineTable:
     """Return the table whose names stand in the row `index`, or one below that has more rows."""
-    import pandas as pd
-
     named, quantities = options.columns, options.quantities
     blocks = find_blocks(path, rows, index, named, quantities)
     chosen = max(blocks, key=lambda names: sum(len(one.rows) for one in blocks[names]))

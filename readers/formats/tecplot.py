@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...files import pandas as pd
 from ..frames import Frame, FrameOptions, FrameRows, Heading, columns_of, frame_of, heading_of
 from ..registry import Format, register_format
 from ..tables import read_lines
@@ -109,8 +110,6 @@ def _numbers(
 
 def _flat(lines: list[str], width: int) -> NDArray[np.float64]:
     """Return all numbers, as they follow each other: rows of one length by pandas' reader."""
-    import pandas as pd
-
     if {len(line.split()) for line in lines} == {width} and not any("," in line for line in lines):
         table = pd.read_csv(
             StringIO("\n".join(lines)), sep=r"\s+", header=None, dtype=float, keep_default_na=False,

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
 from ...materials.law import HypoelasticLaw
@@ -312,10 +313,8 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
 
 def _between(x: Array, values: Array, wanted: Array) -> Array:
     """Interpolate (n, ...) by cubics with slopes from neighbours: forces in balance stay so."""
-    from scipy.interpolate import CubicHermiteSpline  # heavy: where it is used
-
     slopes = np.gradient(values, x, axis=0)
-    return np.asarray(CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
+    return np.asarray(scipy.interpolate.CubicHermiteSpline(x, values, slopes, axis=0)(wanted))
 
 
 def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
