@@ -39,6 +39,8 @@ class Modules(build_py):
             kernels = Path(self.made("-c", COMPILE))
             if kernels.name:
                 shutil.copytree(kernels, package / kernels.name, dirs_exist_ok=True)
+            else:
+                print("bubblefit: the kernels were not compiled; the first run compiles them")
 
     def made(self, *arguments):
         """Run Python on the modules that are built; return the last line that it prints."""

@@ -14,6 +14,7 @@ import bubblefit
 import pytest
 from bubblefit import files
 from bubblefit.project.schema import project_file as project_model
+from bubblefit.runs import folder
 from bubblefit.solvers.process import run_process
 from bubblefit.solvers.registry import solver_sections
 
@@ -233,6 +234,12 @@ def wheel(tmp_path_factory):
     output_of(sys.executable, "-m", "pip", "--quiet", "wheel", *options, source)
     (built,) = place.glob("*.whl")
     return built
+
+
+def test_what_builds_the_package_can_fit():
+    said = PROJECT["build-system"]["requires"], PROJECT["project"]["dependencies"]
+    builds, runs = ({re.split("[>=]", one)[0] for one in names} for names in said)
+    assert set(folder.PACKAGES) <= builds <= {*runs, "setuptools"}
 
 
 def test_versions_agree():
