@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BubblefitError, InputError
-from .mesh import Array, Mesh, snapped, with_mirror_image
+from .mesh import Array, Mesh, grid_quads, snapped, with_mirror_image
 
 #: Layers of the ring for each division of the core, at least and at most: beyond, elements are
 #: drawn out.
@@ -28,7 +28,7 @@ def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
     outside = len(core_nodes.ravel()) + np.arange(m * len(side)).reshape(m, len(side))
     ring_nodes = np.concatenate([side[None], outside])
     points = np.concatenate([core.reshape(-1, 2), ring[1:].reshape(-1, 2)])
-    return points, np.concatenate([_quads(core_nodes), _quads(ring_nodes)])
+    return points, np.concatenate([grid_quads(core_nodes), grid_quads(ring_nodes)])
 
 
 def divisions(elements: float) -> tuple[int, int]:
@@ -83,12 +83,6 @@ def _transfinite(floor: Array, top: Array, left: Array, right: Array) -> Array:
     along_u = (1 - v) * floor[:, None] + v * top[:, None]
     along_v = (1 - u) * left + u * right
     return np.asarray(along_u + along_v - corners)
-
-
-def _quads(nodes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return quads (q, 4) of a structured grid of node numbers (a, b)."""
-    corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
-    return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 MIN_ELEMENTS, MAX_ELEMENTS = 8, 4_000_000

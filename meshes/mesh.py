@@ -63,6 +63,12 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 
+def grid_quads(nodes: Numbers) -> Numbers:
+    """Return quads (q, 4) of a structured grid of node numbers (a, b)."""
+    corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
+    return np.stack(corners, axis=-1).reshape(-1, 4)
+
+
 def snapped(points: Array, near: float) -> Array:
     """Return points (n, k) with coordinates within `near` of zero exactly zero."""
     return np.where(np.abs(points) < near, 0.0, points)

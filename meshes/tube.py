@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .disk import divided_quarter_disk
-from .mesh import Array, Mesh, Numbers, snapped, with_mirror_image
+from .mesh import Array, Mesh, Numbers, grid_quads, snapped, with_mirror_image
 
 NEAR = 1e-9  # in radii
 
@@ -204,18 +204,12 @@ def _lines(
     return {name: np.isin(np.arange(count), nodes) for name, nodes in members.items()}
 
 
-def block(surface: np.ndarray, first: int) -> np.ndarray:
-    """Return quads of a grid of points (rows, columns, 3) numbered from `first`."""
-    rows, columns = surface.shape[:2]
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel() + first
-    return np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=1)
-
-
 def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
     """Join blocks, outward seen from the middle of the surface; sets by plane and pole."""
-    starts = np.cumsum([0] + [b.shape[0] * b.shape[1] for b in blocks])
     points = np.concatenate([b.reshape(-1, 3) for b in blocks])
-    quads = np.concatenate([block(b, s) for b, s in zip(blocks, starts, strict=False)])
+    ends = np.cumsum([b[..., 0].size for b in blocks])[:-1]
+    nodes = zip(np.split(np.arange(len(points)), ends), blocks, strict=True)
+    quads = np.concatenate([grid_quads(own.reshape(b.shape[:2])) for own, b in nodes])
     rounded = np.round(points, 6)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     points, quads = points[first], inverse.ravel()[quads]

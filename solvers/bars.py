@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.strip_models import UniaxialModel, straight_strip
-from .base import History, Solver
+from .base import Array, History, Solver
 
 #: Relative. The integral of the published coefficients (5 digits) is within 6e-5 of every stress.
 TOLERANCE = 1e-4
@@ -82,3 +82,19 @@ def strip_stresses(solver: Solver) -> tuple[float, ...]:
             raise SolverFailure(problem, solver.name)
         found.append(stress_of(model, history))
     return tuple(found)
+
+
+def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> History:
+    """Return the history of a strip along a yarn that is strained alike everywhere.
+
+    strain : (n, 3) log strain; force : (n,) N, of the whole strip.
+    """
+    points, sets = model.mesh.points, model.mesh.node_sets
+    along = 0 if abs(model.warp[1]) > 0.999 else 1
+    middle = points[sets["symmetry_x"], 0].mean(), points[sets["top"], 1].mean()
+    grown = np.expm1(strain[:, [1 - along, along]])
+    moved = np.zeros((len(strain), len(points), 3))
+    moved[..., :2] = grown[:, None] * (points[:, :2] - middle)
+    whole, up = np.vstack([np.zeros(3), strain]), np.outer(force / model.load_factor, [0, 1, 0])
+    reactions = {"top": up, model.pulled: -up}
+    return History(force, moved, whole.min(axis=0), whole.max(axis=0), reactions)

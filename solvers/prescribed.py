@@ -19,7 +19,7 @@ from ..errors import InputError, Note, SolverFailure
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import BubbleModel
 from ..meshes.cylinder_model import Collar, CylinderModel, RigidSupports
-from ..meshes.mesh import Array, Numbers, enclosed_volume
+from ..meshes.mesh import Array, Numbers, enclosed_volume, grid_quads
 from ..meshes.strip_models import UniaxialModel
 from .base import History, extremes, log_strain
 from .membrane.solver import MembraneSolver
@@ -305,8 +305,7 @@ def _body(u: Array, v: Array, place: Callable[[Array, Array, int], Array]) -> Ri
     grid = np.meshgrid(u, v, indexing="ij")
     points = np.concatenate([place(*grid, face).reshape(-1, 3) for face in (0, 1)])
     nodes = np.arange(len(u) * len(v)).reshape(len(u), len(v))
-    corners = [nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]]
-    quads = np.stack(corners, axis=-1).reshape(-1, 4)
+    quads = grid_quads(nodes)
     behind, front = points[quads[0]], points[quads[0] + nodes.size]
     normal = np.cross(behind[1] - behind[0], behind[3] - behind[0])
     if normal @ (front[0] - behind[0]) < 0:

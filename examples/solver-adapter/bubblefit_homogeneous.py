@@ -15,7 +15,8 @@ import numpy as np
 from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import UniaxialModel
-from bubblefit.solvers.base import Array, History, SolverCheck
+from bubblefit.solvers.bars import homogeneous_history
+from bubblefit.solvers.base import History, SolverCheck
 from bubblefit.solvers.process import log_tail, run_process
 from bubblefit.solvers.scratch import run_folder
 
@@ -86,7 +87,9 @@ class HomogeneousSolver:
             # Half a result must not look like one.
             if rows.shape != (len(model.elongations), 3) or not np.isfinite(rows).all():
                 raise SolverFailure("job.csv is not complete", NAME, 0)
-        return _history(model, yarn, *rows.T)
+        strain = np.zeros_like(rows)
+        strain[:, [yarn, 1 - yarn]] = np.log(rows[:, :2])
+        return homogeneous_history(model, strain, rows[:, 2])
 
     def _command(self, argument: str) -> list[str | Path]:
         return [sys.executable, self.program, argument]
@@ -110,20 +113,3 @@ class HomogeneousSolver:
             "stretches": (1 + np.array(model.elongations) / model.gauge_length).tolist(),
         }
         return job, pulled
-
-
-def _history(
-    model: UniaxialModel, pulled: int, along: Array, across: Array, force: Array
-) -> History:
-    """Frames of the model's nodes: here the strain is the same everywhere."""
-    points, sets = model.mesh.points, model.mesh.node_sets
-    x = points[:, 0] - points[sets["symmetry_x"], 0].mean()
-    y = points[:, 1] - points[sets["top"], 1].mean()
-    moved = np.zeros((len(along), len(points), 3))
-    moved[:, :, 0], moved[:, :, 1] = np.outer(across - 1, x), np.outer(along - 1, y)
-    strain = np.zeros((len(along) + 1, 3))
-    strain[1:, pulled], strain[1:, 1 - pulled] = np.log(along), np.log(across)
-    up = np.zeros((len(along), 3))
-    up[:, 1] = force / model.load_factor
-    reactions = {"top": up, model.pulled: -up}
-    return History(force, moved, strain.min(axis=0), strain.max(axis=0), reactions)

@@ -8,7 +8,8 @@ from bubblefit.errors import InputError, SolverFailure
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import bar
 from bubblefit.meshes.strip_models import UniaxialModel
-from bubblefit.solvers.base import Array, History, SolverCheck
+from bubblefit.solvers.bars import homogeneous_history
+from bubblefit.solvers.base import History, SolverCheck
 
 NAME, VERSION = "bar", "1.0"
 
@@ -47,20 +48,4 @@ class BarSolver:
         # Cauchy stress on the deformed width and thickness.
         thickness = model.thickness * (stretch * across) ** (law.area_power - 1)
         width = model.load_factor * float(np.ptp(model.mesh.points[:, 0])) * across
-        return _history(model, stretch, across, strain, stress[:, pulled] * width * thickness)
-
-
-def _history(
-    model: UniaxialModel, stretch: Array, across: Array, strain: Array, force: Array
-) -> History:
-    """Frames of the model's nodes."""
-    points, sets = model.mesh.points, model.mesh.node_sets
-    x = points[:, 0] - points[sets["symmetry_x"], 0].mean()
-    y = points[:, 1] - points[sets["top"], 1].mean()
-    moved = np.zeros((len(stretch), len(points), 3))
-    moved[:, :, 0], moved[:, :, 1] = np.outer(across - 1, x), np.outer(stretch - 1, y)
-    whole = np.vstack([np.zeros(3), strain])
-    up = np.zeros((len(stretch), 3))
-    up[:, 1] = force / model.load_factor
-    reactions = {"top": up, model.pulled: -up}
-    return History(force, moved, whole.min(axis=0), whole.max(axis=0), reactions)
+        return homogeneous_history(model, strain, stress[:, pulled] * width * thickness)
