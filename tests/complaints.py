@@ -22,3 +22,10 @@ def complaint_with(words, call, *arguments, **options):
     for word in words:
         assert word in message, message
     return message
+
+
+def raised(error, match, call, *arguments, **options):
+    """Return the error of that kind, with words that match, which a call has to raise."""
+    with pytest.raises(error, match=match or None) as caught:
+        call(*arguments, **options)
+    return caught.value

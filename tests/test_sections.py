@@ -33,7 +33,7 @@ from bubblefit.readers.tables import LOAD_UNITS, WIDTH_LOAD_UNITS, read_lines
 from bubblefit.solvers.marc.settings import site_settings
 from pydantic import Field, TypeAdapter, ValidationError
 
-from .complaints import complaint
+from .complaints import complaint, raised
 
 #: Of one of each, in SI.
 PASCAL = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5}
@@ -67,8 +67,7 @@ def test_numbers_of_a_project_at_their_ends(kind, good, bad):
     for value in good:
         assert TypeAdapter(kind).validate_python(value) == value
     for value in bad:
-        with pytest.raises(ValidationError):
-            TypeAdapter(kind).validate_python(value)
+        raised(ValidationError, "", TypeAdapter(kind).validate_python, value)
 
 
 def test_files_beside_a_project(monkeypatch):
@@ -93,9 +92,8 @@ RIGHT = {"length": 1.0}
 
 
 def said(content: dict, at: str = "") -> str:
-    with pytest.raises(ValidationError) as found:
-        Outer.model_validate(content)
-    return str(first_error(Path("p.toml"), found.value, Outer, at))
+    found = raised(ValidationError, "", Outer.model_validate, content)
+    return str(first_error(Path("p.toml"), found, Outer, at))
 
 
 @pytest.mark.parametrize(
@@ -143,8 +141,7 @@ def test_a_file_whole_and_no_more_of_it_than_is_meant(tmp_path):
     assert content_of("/proc/self/status").startswith(b"Name:")
     for large, most in ((path, 2**20 - 1), ("/proc/self/status", 10)):
         assert f"{large}: has more than 0 MiB" in complaint(content_of, large, most)
-    with pytest.raises(FileNotFoundError):
-        content_of(tmp_path / "b")
+    raised(FileNotFoundError, "", content_of, tmp_path / "b")
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -15,6 +15,7 @@ from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group
 
 from ..commands import every_command, in_process, one_line
+from ..complaints import raised
 
 ENDED = StartRecord(1, (1, 1), 0.25, "done", 1, (), (), 0.1)
 
@@ -100,8 +101,7 @@ def test_every_end_is_told(tmp_path):
             raise error
 
         EVENTS.begin(path, "c")
-        with pytest.raises((SystemExit, ValueError)):
-            terminal.exits(fails)()
+        raised((SystemExit, ValueError), "", terminal.exits(fails))
         assert told(path)[-1] == {**told(path)[-1], "exit_code": code, "error": words}
     before = path.read_text()
     EVENTS.write("late")

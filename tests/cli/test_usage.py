@@ -16,13 +16,13 @@ import pandas as pd
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.cli.terminal import HEAD, LOGGER
-from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from click.testing import CliRunner
 
 from .. import needs
 from ..commands import every_command, in_process, interrupted, one_line, result_in
+from ..complaints import refused
 from ..places import ROOT
 from ..projects import BUBBLE, small, with_form
 
@@ -157,9 +157,8 @@ def test_arguments_that_cannot_be_are_named(desk, field, call):
     with contextlib.chdir(desk):
         before = sorted(desk.rglob("*"))
         project, card = bf.read_project("known/project.toml"), bf.read_card("card.toml")
-        with pytest.raises(InputError) as caught:
-            call(project, card)
-    assert caught.value.field.split(".")[-1].split(", ")[-1] == field, caught.value
+        caught = refused(call, project, card)
+    assert caught.field.split(".")[-1].split(", ")[-1] == field, caught
     assert sorted(desk.rglob("*")) == before
 
 

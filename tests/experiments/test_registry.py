@@ -30,7 +30,7 @@ from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.base import History
 
-from ..complaints import complaint, complaint_with
+from ..complaints import complaint, complaint_with, raised
 from ..plug_ins import install
 
 KIND = """
@@ -82,9 +82,8 @@ def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, t
         assert name not in kinds() and "bubble" in kinds()
     line = f"the plug-in {name!r} of acme-things 2.5 {words}"
     assert caplog.text.count(line) == 1
-    with pytest.raises(PlugInFailure) as failure:
-        kind_named(name)
-    assert str(failure.value).startswith(line)
+    failure = raised(PlugInFailure, "", kind_named, name)
+    assert str(failure).startswith(line)
 
 
 def test_a_plug_in_does_not_replace_one_of_ours(packages):

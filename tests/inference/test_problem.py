@@ -13,7 +13,7 @@ from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from .cases import (
     CONSTANT,
     CUBIC,
@@ -189,16 +189,14 @@ def test_bounds_without_positive_moduli_give_no_start():
     lower, upper = (end.copy() for end in CUBIC.box)
     lower[7], upper[7] = 0.1, 1.0  # E2 at zero strain below the margin of 5 MPa
     bounds = LawBounds.of_entries(lower, upper, MARGINS)
-    with pytest.raises(NoFeasibleStart, match="bounds"):
-        feasible_start(problem(replace(CUBIC, bounds=bounds)), 1, 0)
+    raised(NoFeasibleStart, "bounds", feasible_start, problem(replace(CUBIC, bounds=bounds)), 1, 0)
 
 
 @pytest.mark.parametrize("how", ["failure", "nan"])
 def test_analyses_that_always_fail_give_no_start(how):
     fit = problem()
     fit.comparisons[0].solver = Failing(lambda run: True, how)
-    with pytest.raises(NoFeasibleStart, match="analysis failed"):
-        feasible_start(fit, 1, 0)
+    raised(NoFeasibleStart, "analysis failed", feasible_start, fit, 1, 0)
     assert fit.analyses == 50
 
     fit = problem()

@@ -19,7 +19,7 @@ from bubblefit.readers.registry import (
     register_format,
 )
 
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..plug_ins import install
 
 STARRED = "*** a camera\n1 2 0 0.1 0.2 0.3\n4 5 0 0.4 0.5 0.6\n7 8 0 nan nan nan\n"
@@ -116,10 +116,9 @@ def test_a_plug_ins_format_is_found_and_named_and_its_failures_are_told(packages
     assert message == "format: 'json' is of a frame, not of a machine table"
     for text, cause in (('{"places": []}', "KeyError: 'moves'"), ('"places"', "TypeError: ")):
         path.write_text(text)
-        with pytest.raises(PlugInFailure) as failure:
-            read_frames([path])
+        failure = raised(PlugInFailure, "", read_frames, [path])
         words = f"the plug-in 'json' of acme-things 2.5 fails on {path} ({cause}"
-        assert str(failure.value).startswith(words) and "\n" not in str(failure.value)
+        assert str(failure).startswith(words) and "\n" not in str(failure)
     # Ours are asked first, and keep their names.
     assert format_named("frame", "csv").title.startswith("columns of text")
     path.write_text('{"places": [[1, 2, 3]], "moves": [[0, 0, 0]]}')

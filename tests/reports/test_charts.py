@@ -27,6 +27,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
+from ..complaints import raised
 from ..drawings import check_charts
 
 FINITE = st.floats(-1e6, 1e6)
@@ -121,8 +122,7 @@ def test_files(tmp_path):
     assert "one &amp; &lt;two&gt;" in text
     for file, own, words in (("none.png", Charts("c", [], ""), "nothing to draw"),
                              ("c.bmp", charts, r"expected \.png")):  # fmt: skip
-        with pytest.raises(ValueError, match=words):
-            save(tmp_path / file, own)
+        raised(ValueError, words, save, tmp_path / file, own)
 
 
 def test_the_figure_of_the_page():
@@ -339,10 +339,8 @@ def test_a_picture_that_is_not_there_is_named(tmp_path):
 )  # fmt: skip
 def test_data_that_are_no_page(tmp_path, content, said):
     (tmp_path / "page.json").write_text(content)
-    with pytest.raises(InputError, match=re.escape(said)):
-        read_page_data(tmp_path)
-    with pytest.raises(InputError, match=r"page\.json.*cannot be read"):
-        read_page_data(tmp_path / "none")
+    raised(InputError, re.escape(said), read_page_data, tmp_path)
+    raised(InputError, r"page\.json.*cannot be read", read_page_data, tmp_path / "none")
 
 
 def test_data_are_strict_json(full, tmp_path):
@@ -404,5 +402,4 @@ def test_numbers(tmp_path):
             temporary.write_text("half")
             raise failure
         assert path.read_text() == "old" and os.listdir(tmp_path) == ["result.txt"]
-    with pytest.raises(OutputError, match=r"page\.json: cannot be written"):
-        write_report(path, Report(title="x"))
+    raised(OutputError, r"page\.json: cannot be written", write_report, path, Report(title="x"))

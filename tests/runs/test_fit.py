@@ -21,6 +21,7 @@ from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from bubblefit.solvers import registry
 
 from ..commands import in_process, result_in
+from ..complaints import raised
 from ..cylinder_cases import STOPS, Formula, write_project
 from ..projects import constant_strips, small
 
@@ -199,8 +200,7 @@ def test_another_program_gets_a_second_try(together, external, tries):
     problem.evaluate = fail
     problem.solver.external = external
     said = "the best fit does not run again: no licence; its starts are kept, --resume goes on"
-    with pytest.raises(SolverFailure, match=said):
-        best_fit(problem, together.best.records, 0.0)
+    raised(SolverFailure, said, best_fit, problem, together.best.records, 0.0)
     assert len(asked) == tries
 
 

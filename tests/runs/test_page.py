@@ -30,6 +30,7 @@ from bubblefit.runs.result import COMPARED, TABLES, next_step, reaches
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 
+from ..complaints import raised
 from ..cylinder_cases import FAILS, Banded, write_project, write_readings
 from ..places import ROOT
 from ..projects import ELONGATION, MODULI, small
@@ -433,5 +434,4 @@ def test_kinds_of_notes_are_no_closed_list():
     assert note.kind is kind and kind == "creep" and kind.mark == 0
     assert rows([note]) == [{"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}]
     assert foremost([note, Note(MESH, "m")]) == "m" and marks([note]) == []
-    with pytest.raises(ValueError, match="named by words"):
-        NoteKind(" ")
+    raised(ValueError, "named by words", NoteKind, " ")

@@ -26,7 +26,7 @@ from bubblefit.solvers import registry
 from bubblefit.solvers.base import SNAP, History
 
 from ..bars import BarTest, project_of
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..cylinder_cases import FAILS, Formula, write_project, write_readings
 
 CARDS = ("soft", "stiff")
@@ -290,8 +290,7 @@ def test_one_card_in_one_test(bars):
     half = simulate(BarTest("a bar"), CARD, solver="bars")["warp"]
     np.testing.assert_allclose(histories["warp"].load, 2 * half.load)
     assert {model.thickness for model in bars.seen} == {0.5, 1.0}
-    with pytest.raises(InputError, match="nowhere"):
-        simulate(BarTest("a bar"), CARD, solver="nowhere")
+    raised(InputError, "nowhere", simulate, BarTest("a bar"), CARD, solver="nowhere")
 
 
 def test_cards_in_tests(bars, tmp_path):

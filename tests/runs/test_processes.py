@@ -36,7 +36,7 @@ from bubblefit.solvers.scratch import run_folder
 
 from .. import counted_program, needs
 from ..commands import in_process, wait_for
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..counted_program import CountedSolver, seen
 
 MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
@@ -134,8 +134,7 @@ def test_what_cannot_cross_is_told_in_words():
     def task(number, tell):
         raise Own("of its own sort")
 
-    with pytest.raises(BubblefitError, match="Own: of its own sort"):
-        list(run_tasks(lambda: task, [1], 1))
+    raised(BubblefitError, "Own: of its own sort", list, run_tasks(lambda: task, [1], 1))
 
 
 def alive(process):
@@ -276,14 +275,13 @@ def test_errors_cross_the_process_border_whole(request, where):
 
     scheduler = None if where == "here" else request.getfixturevalue("scheduler")
     for number, kind in enumerate((SolverFailure, InputError)):
-        with pytest.raises(kind) as caught:
-            list(Executor(2, scheduler).run_tasks(lambda: task, [number]))
+        caught = raised(kind, "", list, Executor(2, scheduler).run_tasks(lambda: task, [number]))
         if number:
-            assert str(caught.value) == "mesh.vtu: quads: made to fail"
-            assert caught.value.field == "quads"
+            assert str(caught) == "mesh.vtu: quads: made to fail"
+            assert caught.field == "quads"
         else:
-            assert caught.value.exit_number == 3004
-            assert caught.value.scratch == Path("/tmp/scratch")
+            assert caught.exit_number == 3004
+            assert caught.scratch == Path("/tmp/scratch")
 
 
 def test_a_scheduler_that_goes_is_an_error_soon():
@@ -297,9 +295,8 @@ def test_a_scheduler_that_goes_is_an_error_soon():
             pass
         local.close()
         begun = time.monotonic()
-        with pytest.raises(BubblefitError, match="does not answer any more; finished parts") as end:
-            list(running)
-    assert time.monotonic() - begun < 10 and end.value.exit_code == 4
+        end = raised(BubblefitError, "does not answer any more; finished parts", list, running)
+    assert time.monotonic() - begun < 10 and end.exit_code == 4
 
 
 def test_programs_and_tasks_end_when_nobody_wants_their_results(scheduler, tmp_path):

@@ -38,6 +38,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import from_bytes, to_bytes
 
 from ..commands import in_process
+from ..complaints import raised
 from ..places import EXAMPLES, KNOWN
 from ..projects import edited, project_file, small
 
@@ -155,13 +156,10 @@ def test_a_mesh_goes_to_a_file_and_back(tmp_path):
 def test_what_a_history_cannot_say():
     bare = History(np.ones(1), np.zeros((1, 4, 3)), np.zeros(3), np.zeros(3))
     for call in (bare.strain, bare.stress, bare.to_meshio):
-        with pytest.raises(InputError, match="model: is not"):
-            call()
+        raised(InputError, "model: is not", call)
     known = replace(bare, model=PatchModel([[1.0, 1.0]], 1.0))
-    with pytest.raises(InputError, match="law: is not"):
-        known.stress()
-    with pytest.raises(InputError, match="at: expected 'elements' or 'points', got 'nodes'"):
-        known.strain("nodes")
+    raised(InputError, "law: is not", known.stress)
+    raised(InputError, "at: expected 'elements' or 'points', got 'nodes'", known.strain, "nodes")
 
 
 def test_a_fitted_thickness_is_not_added_twice():
@@ -184,8 +182,7 @@ def test_laws_drawn_agree_with_the_band(together):
         wide = row["upper_MPa"] - row["lower_MPa"]
         assert np.abs(ends - row[["lower_MPa", "upper_MPa"]].to_numpy(float)).max() < 0.1 * wide
     unknown = replace(together, best=replace(together.best, certainty=None))
-    with pytest.raises(InputError, match="draw_laws"):
-        unknown.draw_laws()
+    raised(InputError, "draw_laws", unknown.draw_laws)
 
 
 def test_the_analyses_of_a_fit(together, bubble):
@@ -214,8 +211,7 @@ def test_drawings_are_those_of_the_page(bubble, tmp_path, what):
     of_page = [charts.charts for charts in bubble.drawn]
     if what in ("moduli", "starts", "heights"):
         assert drawing.charts.charts in of_page
-    with pytest.raises(InputError, match="png"):
-        drawing.save(tmp_path / "one.txt")
+    raised(InputError, "png", drawing.save, tmp_path / "one.txt")
 
 
 def test_drawings_of_loads_and_of_one_test(together):
@@ -238,8 +234,7 @@ def test_drawings_of_loads_and_of_one_test(together):
         (lambda: together.plot_history(component=3), "component"),
         (lambda: together.plot_history(frame=10**6), "frame"),
     ):  # fmt: skip
-        with pytest.raises(InputError, match=words):
-            call()
+        raised(InputError, words, call)
 
 
 def test_tables_in_notebooks_are_escaped(together, strips_project):
@@ -267,11 +262,9 @@ def test_a_card_exports_as_the_command(together, tmp_path):
     assert files and {f.parent for f in files} == {tmp_path / "python"}
     for file in files:
         assert file.read_bytes() == (tmp_path / file.name).read_bytes()
-    with pytest.raises(OutputError, match="already there"):
-        card.export(name, tmp_path / "python")
+    raised(OutputError, "already there", card.export, name, tmp_path / "python")
     assert card.export(name, tmp_path / "python", overwrite=True) == files
-    with pytest.raises(InputError, match=r"abaqus-umat, .*gsa.*'nope'"):
-        card.export("nope")
+    raised(InputError, r"abaqus-umat, .*gsa.*'nope'", card.export, "nope")
 
 
 def test_specimens_that_differ_by_a_factor_are_fitted():
@@ -427,8 +420,7 @@ def test_no_shape_is_known_under_a_first_pressure(tmp_path):
     project = edited(
         tmp_path, "[bubble.nuisance]", "[bubble.sheet]\nfrom_pressure = 59\n\n[bubble.nuisance]"
     )
-    with pytest.raises(InputError, match="from_pressure"):
-        bf.estimate(project)
+    raised(InputError, "from_pressure", bf.estimate, project)
     # Then all starts are random.
     project = project.with_fit(starts_from="estimate")
     setup = prepare_fit(project, project.chosen(None, fitted=True))

@@ -29,7 +29,7 @@ from bubblefit.solvers.registry import solver_named
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..cylinder_cases import FAILS, STOPS, Formula, ran
 
 WAY = np.linspace(0.0, 240.0, 61)
@@ -82,8 +82,7 @@ def test_a_run_is_stored_exactly(folder, tmp_path):
             np.testing.assert_array_equal(one, other)
     assert [(note.kind, note.of) for note in again.remarks] == [(said.kind, said.of)]
     assert folder.read("b" * 64) is None
-    with pytest.raises(OutputError, match="--resume"):
-        folder.begin(False, False)
+    raised(OutputError, "--resume", folder.begin, False, False)
     folder.begin(True, False)
     assert folder.read(mark) is not None
     folder.begin(False, True)
@@ -313,12 +312,10 @@ def test_a_damaged_middle_line_or_fingerprint_is_an_error(tmp_path):
     study(tmp_path)
     lines = (tmp_path / STARTS).read_text().splitlines()
     (tmp_path / STARTS).write_text(lines[0][:20] + "\n" + lines[1] + "\n")
-    with pytest.raises(InputError, match=r"starts.jsonl: line 1: .*--overwrite"):
-        begin(Folder(tmp_path), resume=True)
+    raised(InputError, r"starts.jsonl: line 1: .*--overwrite", begin, Folder(tmp_path), resume=True)
     for content in (b"", b"{", b"[]", b"{}", b"3", b"\xff\xfe", b'{"x": 1}'):
         (tmp_path / RUN).write_bytes(content)
-        with pytest.raises(InputError, match=r"run.json"):
-            begin(Folder(tmp_path), resume=True)
+        raised(InputError, r"run.json", begin, Folder(tmp_path), resume=True)
 
 
 def test_resume_where_nothing_is_begins_afresh_and_says_so(tmp_path, caplog):
@@ -343,9 +340,8 @@ def test_a_folder_that_takes_no_files(tmp_path):
     (tmp_path / "file").write_text("")
     read_only = [Path("/proc/self/out")] if Path("/proc/self").is_dir() else []
     for path in (tmp_path / "file" / "out", tmp_path / "file", *read_only):
-        with pytest.raises(OutputError, match="--out") as caught:
-            begin(Folder(path))
-        assert caught.value.exit_code == 2 and "\n" not in str(caught.value)
+        caught = raised(OutputError, "--out", begin, Folder(path))
+        assert caught.exit_code == 2 and "\n" not in str(caught)
 
 
 class Killed(BaseException):
@@ -404,10 +400,9 @@ def test_whichever_write_is_the_last_the_end_is_the_same(strips_project, tmp_pat
         out = tmp_path / f"{number} {name}"
         with pytest.MonkeyPatch.context() as patch:
             counted(patch, number, ENDS[name])
-            with pytest.raises(Killed if name == "kill" else OutputError) as ended:
-                fitted(out)
+            ended = raised(Killed if name == "kill" else OutputError, "", fitted, out)
         if name != "kill":
-            assert "cannot be written" in str(ended.value)
+            assert "cannot be written" in str(ended)
         assert fitted(out, resume=Store(out).used) == whole, (number, name)
         assert not [path for path in out.rglob(".*") if path.is_file()]
 
@@ -427,8 +422,7 @@ def test_each_of_the_two_files_says_that_a_folder_is_used(tmp_path, name):
     (tmp_path / name).write_text("{}")
     store = Store(tmp_path)
     assert store.used
-    with pytest.raises(OutputError, match="already holds results"):
-        store.begin({}, False, False)
+    raised(OutputError, "already holds results", store.begin, {}, False, False)
     assert (tmp_path / name).read_text() == "{}"
     assert not store.begin({}, False, True)
     for file, folder in (("project.toml", "fabric"), ("linear.toml", "fabric-linear")):
@@ -443,8 +437,7 @@ def test_what_differs_is_named_without_facts(tmp_path):
     assert said.startswith(f"{tmp_path / RUN}: parts: ") and "another data and law;" in said
     # Parts that only one of the two knows differ, too.
     for parts in ({"law": "1", "data": "2"}, {"law": "1", "data": "2", "solver": "3", "x": "4"}):
-        with pytest.raises(InputError, match=r"another (solver|x);"):
-            store.begin(parts, True, False)
+        raised(InputError, r"another (solver|x);", store.begin, parts, True, False)
 
 
 def test_what_is_gone_on_with_is_kept(tmp_path):

@@ -24,7 +24,7 @@ from bubblefit.solvers.settings import LicenceSettings, licence_settings, split
 
 from .. import needs
 from ..commands import wait_for
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..counted_program import CountedSolver, seen
 from ..plug_ins import install
 
@@ -211,10 +211,8 @@ def test_pauses_double_up_to_ten_times_the_first(tmp_path, pauses):
     (tmp_path / "more").mkdir()
     run, tries = denials(99, tmp_path / "more")
     given = settings(tmp_path, licence_wait=20.0, licence_retry=4.0)
-    with pytest.raises(LicenceDenied) as caught:
-        patiently(run, "acme", given)
+    failure = raised(LicenceDenied, "", patiently, run, "acme", given)
     assert pauses == [4.0, 8.0, 8.0]  # the last one is cut: it is tried once more at the very end
-    failure = caught.value
     assert failure.reason == "no licence: none free; 4 tries in 20 s (licence_wait)"
     assert (failure.exit_number, failure.log_tail) == (5, "FLEXlm error -4")
     assert [folder.exists() for folder in tries] == [False, False, False, True]
@@ -416,8 +414,7 @@ def test_failed_runs_leave_memory(monkeypatch, tmp_path):
     assert scratch.put_aside(elsewhere) == elsewhere
     monkeypatch.setattr(scratch, "ROOM", 1 << 60)
     assert scratch.default_parent() == tmp_path / "disk"
-    with pytest.raises(OutputError, match="no scratch folder"):
-        scratch.fresh_folder("ccx", Path("/proc/none"))
+    raised(OutputError, "no scratch folder", scratch.fresh_folder, "ccx", Path("/proc/none"))
 
 
 def test_the_log_may_be_anything(tmp_path):

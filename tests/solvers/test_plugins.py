@@ -33,7 +33,7 @@ from click.testing import CliRunner
 from jinja2 import BaseLoader
 
 from ..commands import in_process
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..fortran_build import BETA, GONE, LAWS
 from ..places import EXAMPLES, PUBLISHED, ROOT
 from ..plug_ins import by_pip, install
@@ -120,9 +120,8 @@ def test_the_examples_failures_have_their_reasons(example, tmp_path):
     with pytest.raises(SolverFailure, match="homogeneous: takes strips along warp or fill only"):
         solver.run(bias, LAW)
     words = r"a modulus is not positive \(exit number 3\)"
-    with pytest.raises(SolverFailure, match=words) as found:
-        solver.run(warp, GONE, tmp_path)
-    assert (found.value.scratch / "job.json").is_file()
+    found = raised(SolverFailure, words, solver.run, warp, GONE, tmp_path)
+    assert (found.scratch / "job.json").is_file()
     broken = tmp_path / "broken.py"
     for text, words in (
         ("print('licence denied'); raise SystemExit(9)", r"exit number 9\).*\nlicence denied"),
@@ -299,8 +298,7 @@ def test_a_modulus_that_runs_out_makes_ccx_cut_its_increments(ccx, tmp_path):
 
 
 def test_every_ccx_by_preference(bare, monkeypatch):
-    with pytest.raises(SolverFailure, match=r"no ccx.*make calculix"):
-        find_ccx()
+    raised(SolverFailure, r"no ccx.*make calculix", find_ccx)
     named, chosen = fake(bare / "mine" / "ccx"), fake(bare / "other" / "ccx-2")
     built = fake(bare / "cache" / "calculix" / "ccx-2.99-external" / "ccx")
     system = fake(bare / "bin" / "ccx_2.99")
@@ -323,10 +321,8 @@ def test_a_ccx_without_material_libraries_is_passed_over_or_refused(bare):
     plain = bare / "bin" / "ccx"
     shutil.copy("/bin/true", plain)
     assert carries_external(plain) is False
-    with pytest.raises(SolverFailure, match=f"{plain} cannot.*make calculix"):
-        find_ccx()
-    with pytest.raises(SolverFailure, match="cannot load material libraries"):
-        find_ccx(plain)
+    raised(SolverFailure, f"{plain} cannot.*make calculix", find_ccx)
+    raised(SolverFailure, "cannot load material libraries", find_ccx, plain)
     better = fake(bare / "bin" / "ccx_3")
     assert find_ccx().path == better
 

@@ -32,6 +32,7 @@ from bubblefit.solvers.run_cache import (
 
 from ..bars import BarModel
 from ..commands import in_process
+from ..complaints import raised
 from ..programs import program
 
 KEY = hashlib.sha256(b"a run").hexdigest()
@@ -130,8 +131,7 @@ def test_another_run_layout_or_result_is_refused(tmp_path):
         (whole.replace(b"run 1", b"run 2", 1), KEY, "another version"),
         *((one, KEY, "") for one in spoiled),
     ):
-        with pytest.raises(Damaged, match=words):
-            from_bytes(given, key)
+        raised(Damaged, words, from_bytes, given, key)
     assert not mark.exists()
     # What a plug-in gives back by mistake is left to those who read it.
     with pytest.raises(TypeError, match="HypoelasticLaw is not a History"):
@@ -335,8 +335,7 @@ def test_runs_that_are_not_kept(cache):
     assert solver.runs == 2 and cache.entries() == []
     solver = Counting(fails=1)
     once = with_cache(solver, cache, {})
-    with pytest.raises(SolverFailure, match="no licence"):
-        once.run(MODEL, LAW)
+    raised(SolverFailure, "no licence", once.run, MODEL, LAW)
     assert cache.entries() == []
     assert once.run(MODEL, LAW).load == 2.0 and once.run(MODEL, LAW).from_cache
 

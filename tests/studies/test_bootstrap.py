@@ -35,6 +35,7 @@ from scipy.optimize import minimize_scalar
 
 from ..bars import STRETCH, BarTest, project_of
 from ..commands import in_process
+from ..complaints import raised
 from ..drawings import charts_of, data
 from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, small
 from ..published_laws import TABLE_4_2
@@ -159,10 +160,8 @@ def test_a_bootstrap_goes_on_where_it_was(project, drawn_again, tmp_path, monkey
 
     monkeypatch.setattr(module.StudyRecord, "write", stops)
     given = {"card": CARD, "tests": "one", "out": tmp_path / "out"}
-    with pytest.raises(KeyboardInterrupt):
-        bootstrap(project, "specimens", 4, **given)
-    with pytest.raises(OutputError, match="already holds results"):
-        bootstrap(project, "specimens", 4, **given)
+    raised(KeyboardInterrupt, "", bootstrap, project, "specimens", 4, **given)
+    raised(OutputError, "already holds results", bootstrap, project, "specimens", 4, **given)
     done = bootstrap(project, "specimens", 4, **given, resume=True)
     assert fitted == [0, 1, 2, 3]
     assert [s.counts for s in done.samples] == [s.counts for s in drawn_again.samples[:4]]
@@ -406,8 +405,7 @@ def test_a_value_that_fails_is_named(bars):
     project = project_of(BarTest("a bar"))
     study = vary_nu12(project, VARIED, [0.2, 0.45])
     assert study.result["models"]["a bar"]["responses"][END]["to_base"][-1] is None
-    with pytest.raises(SolverFailure):
-        vary_nu12(project, VARIED, [0.45])
+    raised(SolverFailure, "", vary_nu12, project, VARIED, [0.45])
     with pytest.raises(SolverFailure):  # the card as it is
         vary_nu12(project, replace(VARIED, law=replace(VARIED.law, nu12=0.41)))
 
@@ -458,8 +456,7 @@ def test_a_study_of_weights_goes_on_where_it_was(project, tmp_path, monkeypatch)
 
     monkeypatch.setattr(study_of, "refit", counting)
     given = {"starts": 1, "counts": (0.5, 1, 2, 4), "out": tmp_path / "out"}
-    with pytest.raises(KeyboardInterrupt):
-        weights(project, "two", **given)
+    raised(KeyboardInterrupt, "", weights, project, "two", **given)
     study = weights(project, "two", **given, resume=True)
     assert asked == [2, 4, 4, 0.5]
     assert [run.count for run in study.runs] == [0.5, 1, 2, 4]
@@ -492,5 +489,4 @@ BAD = [
 
 @pytest.mark.parametrize(("study", "given", "said"), BAD)
 def test_what_cannot_be_meant(project, study, given, said):
-    with pytest.raises(InputError, match=said):
-        study(project, **given)
+    raised(InputError, said, study, project, **given)

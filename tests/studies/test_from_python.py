@@ -17,6 +17,7 @@ from bubblefit.runs.simulation import Step
 from bubblefit.runs.starts import EvaluationRecord, Stage, StartRecord
 
 from ..commands import in_process
+from ..complaints import raised
 from ..projects import constant_strips
 
 #: Command with its options, and the same from Python; the result is in check.json or result.json.
@@ -86,8 +87,7 @@ def test_a_study_from_python_is_that_of_its_command(folder, name, monkeypatch):
     }
     if name != "check":
         assert found.plot().charts.charts
-        with pytest.raises(OutputError, match="already holds"):
-            study(project, **given, out=out, progress=False)
+        raised(OutputError, "already holds", study, project, **given, out=out, progress=False)
 
 
 def test_verification_is_that_of_its_command(tmp_path):
@@ -104,8 +104,7 @@ def test_comparisons_and_validations_trust_as_fits_do(folder):
     for study, given in ((bf.compare, {}), (bf.validate, {}), (bf.weights, {"counted": "two"})):
         with pytest.raises(InputError, match="there is no doubt 'nonsense'"):
             study(project, **given, trust=["nonsense"], progress=False)
-        with pytest.raises(InputError, match="starts: expected"):
-            study(project, **given, starts="two")
+        raised(InputError, "starts: expected", study, project, **given, starts="two")
 
 
 class Shell:

@@ -16,6 +16,7 @@ from bubblefit.runs.compare import FOLD, LOST, FoldError, FormFit, LawComparison
 from bubblefit.runs.simulation import StudyRecord
 from bubblefit.solvers.base import SNAP
 
+from ..complaints import raised
 from ..projects import constant_strips
 
 
@@ -57,8 +58,7 @@ def compared(run):
 
 def test_going_on_validates_nothing_twice(compared, run):
     before = [form.folds for form in compared.forms]
-    with pytest.raises(OutputError, match="--resume"):
-        run.compare()
+    raised(OutputError, "--resume", run.compare)
     again = run.compare(resume=True)
     assert [form.folds for form in again.forms] == before and not run.judged
     path = run.out / "linear" / "validation.json"
@@ -81,8 +81,7 @@ def test_what_is_replaced_is_not_gone_on_with(run, compared):
         if event == "constant moduli":
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        run.compare(progress=stop, overwrite=True)
+    raised(KeyboardInterrupt, "", run.compare, progress=stop, overwrite=True)
     again = run.compare(resume=True)
     assert [form.fit.project.fit.seed for form in again.forms] == [8, 8]
 

@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 
 from ..bars import STRETCH, WIDTH, BarKind, BarTest, project_of
 from ..commands import in_process, result_in
-from ..complaints import complaint
+from ..complaints import complaint, raised
 from ..drawings import check_convergence
 from ..projects import BUBBLE
 
@@ -108,11 +108,9 @@ def test_a_level_that_fails_is_named_and_left_out(bars, tmp_path, drawn):
 
 def test_nothing_to_compare_is_a_failure_and_a_defect_is_none(bars, monkeypatch):
     bars.fails = 2
-    with pytest.raises(SolverFailure, match="the bar breaks"):
-        refine(project_of(BarTest("a bar")), CARD)
+    raised(SolverFailure, "the bar breaks", refine, project_of(BarTest("a bar")), CARD)
     monkeypatch.setattr(bars, "run", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        refine(project_of(BarTest("a bar")), CARD)
+    raised(ZeroDivisionError, "", refine, project_of(BarTest("a bar")), CARD)
 
 
 @pytest.mark.parametrize(
@@ -123,8 +121,7 @@ def test_nothing_to_compare_is_a_failure_and_a_defect_is_none(bars, monkeypatch)
      ({"card": "thin"}, "no card")],
 )  # fmt: skip
 def test_levels_that_cannot_be_had(bars, options, words):
-    with pytest.raises(InputError, match=words):
-        refine(project_of(BarTest("a bar")), **{"card": CARD, **options})
+    raised(InputError, words, refine, project_of(BarTest("a bar")), **{"card": CARD, **options})
     assert not bars.seen
 
 
@@ -228,8 +225,7 @@ def test_changes_without_an_order_and_sizes_that_do_not_fall():
     for changes in (*every, (1.0, np.nan), (1.0, 2.0**-12.5)):
         assert observed_order([4.0, 2.0, 1.0], changes) is None, changes
     for sizes in ([1.0, 1.0, 0.5], [1.0, 2.0, 3.0], [1.0, 0.5, 0.0], [1.0, 0.5]):
-        with pytest.raises(ValueError, match="decreasing"):
-            observed_order(sizes, [1.0, 0.25])
+        raised(ValueError, "decreasing", observed_order, sizes, [1.0, 0.25])
 
 
 def test_a_second_term_makes_the_order_move_and_is_said():

@@ -41,7 +41,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
 from ...commands import in_process, result_in
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...drawings import caught
 from ...inference.cases import MODEL as CASE
 from ...inference.cases import reference, targets
@@ -423,8 +423,7 @@ def test_a_fit_through_the_same_filter_is_exact(tmp_path):
 def test_what_is_no_filter(tmp_path, filtered, symmetry, said):
     for name in ("a", "b"):
         (tmp_path / f"{name}.csv").write_text("x,y,dx,dy,dz\n0,0,0,0,1\n")
-    with pytest.raises(InputError, match=said):
-        read_project(project_in(tmp_path, filtered, symmetry))
+    raised(InputError, said, read_project, project_in(tmp_path, filtered, symmetry))
 
 
 POINTS = np.array([[0.0, 0.0], [3.0, 0.0], [0.0, 4.0], [5.0, 6.0]])

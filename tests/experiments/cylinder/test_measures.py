@@ -40,7 +40,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...cylinder_cases import STUDIED_PROJECT, ran
 from ...drawings import lines
 
@@ -264,8 +264,7 @@ def test_what_is_kept():
     ],
 )
 def test_results_without_an_end_or_gas(results, words):
-    with pytest.raises(SolverFailure, match=words):
-        arrays_of(MODEL, results)
+    raised(SolverFailure, words, arrays_of, MODEL, results)
 
 
 # Models and quantities of a study

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.cli.options import with_solver
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import SolverFailure
 from bubblefit.files import TEMPLATES
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
@@ -26,7 +26,7 @@ from bubblefit.solvers.decks import render
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.run_cache import VARIABLE
 
-from ...complaints import complaint
+from ...complaints import complaint, raised, refused
 from ...fortran_build import BETA, LAWS
 from ...projects import BUBBLE
 
@@ -113,8 +113,7 @@ def test_a_raised_slack_sheet_with_a_moving_rim_agrees_with_the_membrane(ccx):
 
 def test_a_rim_on_lines_of_symmetry_is_not_moved_by_calculix():
     model = replace(bubble(64), slack=(0.001, 0.001))
-    with pytest.raises(SolverFailure, match="on the full disk only"):
-        rim_paths(shell_mesh(model.mesh, "S8R"), model)
+    raised(SolverFailure, "on the full disk only", rim_paths, shell_mesh(model.mesh, "S8R"), model)
 
 
 def test_steep_shells_are_named():
@@ -249,9 +248,8 @@ def context(**changes):
 )
 def test_a_template_error_names_template_line_and_variable(tmp_path, text, where, what):
     (tmp_path / "bubble.inp.j2").write_text(text)
-    with pytest.raises(InputError) as found:
-        render("calculix", "bubble.inp.j2", context(), tmp_path)
-    message = str(found.value)
+    found = refused(render, "calculix", "bubble.inp.j2", context(), tmp_path)
+    message = str(found)
     assert str(tmp_path / "bubble.inp.j2") in message
     assert where in message and what in message
     assert "\n" not in message
@@ -275,8 +273,7 @@ def test_a_pressure_offset_reaches_calculix_and_a_disk_is_four_quarters(ccx):
     apex = model.mesh.node_sets["apex"][0]
     heights = found.displacement[:, apex, 2], expected.displacement[:, apex, 2]
     np.testing.assert_allclose(*heights, rtol=2e-3)
-    with pytest.raises(InputError):
-        model.with_parameters({"pressure_offset": -0.02})
+    refused(model.with_parameters, {"pressure_offset": -0.02})
     # A whole disk is four quarters.
     whole = bubble(64, "full", (0.025, 0.062))
     disk = CalculixSolver(element="S4").run(whole, LINEAR)

@@ -34,7 +34,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import fsolve
 
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...fortran_build import BETA
 
 THICKNESS, PRESSURE, RADIUS = 0.81, 0.14, 75.0
@@ -86,8 +86,7 @@ def run(ccx, model, folder):
     solids = solid_mesh(model)
     for name, text in (cylinder_decks(model, LINEAR, solids) | law_files(LINEAR)).items():
         (folder / name).write_text(text)
-    with pytest.raises(SolverFailure, match="no usable results"):
-        inflation_history(folder / "job.frd", model, solids)
+    raised(SolverFailure, "no usable results", inflation_history, folder / "job.frd", model, solids)
     libraries = {"LD_LIBRARY_PATH": str(material_library().parent), "OMP_NUM_THREADS": "1"}
     done = subprocess.run([str(ccx.path), "-i", "job"], cwd=folder, env=os.environ | libraries,
                           capture_output=True, text=True)  # fmt: skip
@@ -245,8 +244,7 @@ def test_a_run_that_stops_early_is_reported_up_to_there(bent, scratch, tmp_path)
     assert reported.early == reported.remarks[0] and reported.early.endswith(": it gave up")
     assert bending_history(model, whole, gas).early == ""
     for path, given in ((cut, None), (cut, set()), (tmp_path / "none.frd", None)):
-        with pytest.raises(SolverFailure, match="no usable results"):
-            bent_cylinder(path, model, solids, 0, given)
+        raised(SolverFailure, "no usable results", bent_cylinder, path, model, solids, 0, given)
     # Cut anywhere it is an early end, too, or none.
     for part in (0.3, 0.9, 0.99):
         cut.write_bytes(data[: int(part * len(data))])

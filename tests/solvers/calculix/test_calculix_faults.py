@@ -18,6 +18,7 @@ from bubblefit.solvers.calculix.library import law_number
 from bubblefit.solvers.calculix.solver import CalculixSolver
 
 from ...commands import interrupted
+from ...complaints import raised
 from ...projects import BUBBLE
 
 LAW = HypoelasticLaw.linear(800.0, 400.0, 60.0)
@@ -49,11 +50,10 @@ def fake(tmp_path, monkeypatch):
 
 
 def failure(solver, **options):
-    with pytest.raises(SolverFailure) as found:
-        solver.run(model(), LAW, **options)
-    assert found.value.scratch.is_dir()
-    assert (found.value.scratch / "job.inp").exists()
-    return found.value
+    found = raised(SolverFailure, "", solver.run, model(), LAW, **options)
+    assert found.scratch.is_dir()
+    assert (found.scratch / "job.inp").exists()
+    return found
 
 
 def gone(pid, seconds=5.0):

@@ -24,6 +24,7 @@ from bubblefit.solvers.calculix.library import (
 )
 
 from ... import needs
+from ...complaints import raised
 from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere, spline
 
 KNOTTED, ENDS = spline(), np.full(3, 0.13)
@@ -404,22 +405,18 @@ def test_the_library_is_compiled_once_a_source(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(library, "SOURCE", source)
     assert len({first, second, material_library(folder)}) == 3
     source.write_text("#error broken on purpose\n")
-    with pytest.raises(SolverFailure, match="broken on purpose"):
-        material_library(tmp_path / "cache")
+    raised(SolverFailure, "broken on purpose", material_library, tmp_path / "cache")
     assert not list((tmp_path / "cache").rglob("*.so"))
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="BUBBLEFIT_CACHE"):
-        material_library(tmp_path / "file")
+    raised(OutputError, "BUBBLEFIT_CACHE", material_library, tmp_path / "file")
 
 
 def test_no_compiler_is_one_line_of_advice(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
-    with pytest.raises(SolverFailure, match=r"C compiler.*install gcc"):
-        material_library(tmp_path)
+    raised(SolverFailure, r"C compiler.*install gcc", material_library, tmp_path)
     monkeypatch.setenv("CC", "no-such-compiler -m64")
-    with pytest.raises(SolverFailure, match=r"'no-such-compiler' that CC names"):
-        material_library(tmp_path)
+    raised(SolverFailure, r"'no-such-compiler' that CC names", material_library, tmp_path)
 
 
 def test_whole_times_commit_only_at_the_end_of_a_step(function):

@@ -15,6 +15,7 @@ from bubblefit.solvers.calculix.solver import CalculixSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.prescribed import at_elongations, corrected
 
+from ...complaints import raised
 from ...fortran_build import LAWS
 from ...published_laws import TABLE_3_2
 
@@ -147,8 +148,7 @@ def test_a_gauge_that_is_not_reached_is_a_failure(ccx, monkeypatch, tmp_path):
 def test_a_gauge_that_turns_back_is_a_failure():
     coarse = model("bias", 2, **COARSE)
     gauge = np.array([6.0, 5.0, 12.0])
-    with pytest.raises(SolverFailure, match="gets shorter"):
-        at_elongations(gauge, coarse, np.zeros(3), "calculix")
+    raised(SolverFailure, "gets shorter", at_elongations, gauge, coarse, np.zeros(3), "calculix")
     with pytest.raises(SolverFailure, match="gets shorter"):
         corrected(coarse, np.array([1.0, 2.0, 3.0]), gauge, "calculix")
     # A correction reaches beyond the first run.
@@ -183,8 +183,7 @@ def test_the_deck(name, angle):
 
 def test_a_run_that_takes_too_long(ccx, tmp_path):
     solver = CalculixSolver(scratch=tmp_path)
-    with pytest.raises(SolverFailure, match=r"did not end within 0\.5 s"):
-        solver.run(model("bias"), LAW, timeout=0.5)
+    raised(SolverFailure, r"did not end within 0\.5 s", solver.run, model("bias"), LAW, timeout=0.5)
     assert len(list(tmp_path.iterdir())) == 1  # no second try
 
 

@@ -31,7 +31,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ... import needs
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...fortran_build import LAWS
 from ...marc_files import bending_marc
 from ...marc_stand_in.deck import Deck, DeckError, read_deck, set_members
@@ -386,9 +386,8 @@ def test_results_that_are_not_whole_are_failures(marc, model, grown, what):
     number = 3015 if what == "collapse" else 3004
     said = {"collapse": "time step could not get smaller", "missing": "holds 3 of 4 frames",
             "forces": "Reaction Force"}  # fmt: skip
-    with pytest.raises(SolverFailure, match=said[what]) as found:
-        marc(frames, number).run(model, LINEAR)
-    assert found.value.exit_number == number
+    found = raised(SolverFailure, said[what], marc(frames, number).run, model, LINEAR)
+    assert found.exit_number == number
 
 
 # The stand-in refuses decks that Marc would refuse, and takes every deck of ours
@@ -511,9 +510,8 @@ SPOILED = {
 @pytest.mark.parametrize("what", SPOILED)
 def test_a_spoiled_deck_is_refused(read, what):
     deck, pattern, new, match = SPOILED[what]
-    with pytest.raises(DeckError, match=match) as found:
-        read(first(pattern, DECKS[deck], new))
-    assert found.value.number == (1005 if "inside out" in what else 13)
+    found = raised(DeckError, match, read, first(pattern, DECKS[deck], new))
+    assert found.number == (1005 if "inside out" in what else 13)
 
 
 def test_moduli_that_are_not_positive_or_on_no_curve_have_no_law(read):
@@ -526,8 +524,7 @@ def test_moduli_that_are_not_positive_or_on_no_curve_have_no_law(read):
     }
     for match, text in spoiled.items():
         content = read(text)
-        with pytest.raises(DeckError, match=match):
-            law_of_tables(content)
+        raised(DeckError, match, law_of_tables, content)
 
 
 def test_the_parser_shares_no_code_with_what_writes_decks():

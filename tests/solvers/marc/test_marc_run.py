@@ -16,7 +16,7 @@ from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import diagnose, solver_named
 
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...marc_files import sts_text, t19_text
 from ...places import ROOT
 
@@ -69,11 +69,10 @@ def good(machine):
 
 
 def failure(solver, given=None, **options):
-    with pytest.raises(SolverFailure) as found:
-        solver.run(given or model(), LAW, **options)
-    assert found.value.solver == "marc"
-    assert (found.value.scratch / "job.dat").exists()
-    return found.value
+    found = raised(SolverFailure, "", solver.run, given or model(), LAW, **options)
+    assert found.solver == "marc"
+    assert (found.scratch / "job.dat").exists()
+    return found
 
 
 def test_a_bubble_comes_back_to_six_digits(fake, good):
@@ -218,13 +217,11 @@ def test_a_strip_without_forces_is_a_failure(machine, fake):
 
 
 def test_a_marc_that_cannot_be_run(machine):
-    with pytest.raises(SolverFailure, match="no run_marc on the PATH"):
-        MarcSolver().run(model(), LAW)
+    raised(SolverFailure, "no run_marc on the PATH", MarcSolver().run, model(), LAW)
     found = MarcSolver().check()
     assert not found.available and "bubblefit docs marc" in found.advice
     for words in ("no such file", "not executable"):
-        with pytest.raises(InputError, match=words):
-            MarcSolver(marc=machine / "marc").run(model(), LAW)
+        raised(InputError, words, MarcSolver(marc=machine / "marc").run, model(), LAW)
         (machine / "marc").write_text("#!/bin/sh\n")
 
 
@@ -239,8 +236,7 @@ def test_bars_that_carry_the_law_pass(machine, monkeypatch):
     stresses = proof.prove(Embedded())
     np.testing.assert_allclose(stresses, [bar.stress for bar in BARS], rtol=TOLERANCE)
     monkeypatch.setattr(proof, "bar_law", lambda _: LAW)
-    with pytest.raises(SolverFailure, match="does not carry the law"):
-        proof.prove(Embedded())
+    raised(SolverFailure, "does not carry the law", proof.prove, Embedded())
 
 
 @pytest.fixture(autouse=True)

@@ -16,6 +16,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...commands import in_process as bubblefit
 from ...commands import result_in
+from ...complaints import raised
 from ...fortran_build import BETA, LAWS
 from ...marc_stand_in_runs import marc
 from ...places import EXAMPLES
@@ -121,9 +122,8 @@ def test_ends_of_a_cylinder(marc):
     # What another end wrote before it was spoiled is not reported.
     for run, fault in ((4, "killed"), (6, "truncated")):
         marc.told(f"{fault}@{run}")
-        with pytest.raises(SolverFailure) as failed:
-            marc.solver().run(model, LAW)
-        assert len(marc.runs) == run and failed.value.scratch.is_dir()
+        failed = raised(SolverFailure, "", marc.solver().run, model, LAW)
+        assert len(marc.runs) == run and failed.scratch.is_dir()
 
 
 SITE = 'executable = "./run_marc"\nincrements = 0\n'

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from ... import needs
-from ...complaints import complaint
+from ...complaints import complaint, raised, refused
 from ...marc_files import sts_text, t19_text
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.5]], float)
@@ -126,8 +126,7 @@ def test_every_truncation_is_refused(tmp_path):
     path = tmp_path / "job.t19"
     for size in (*range(0, len(whole), 11), *range(len(whole) - 200, len(whole))):
         path.write_bytes(whole[:size])
-        with pytest.raises(InputError):
-            read(path)
+        refused(read, path)
     path.write_bytes(whole.replace(b"\n", b"  \r\n"))  # lines end as on Windows
     assert len(read(path)) == 2
 
@@ -151,9 +150,8 @@ def test_what_is_damaged_is_named(tmp_path, old, new, match):
     assert old in text
     path = tmp_path / "job.t19"
     path.write_text(text.replace(old, new, 1))
-    with pytest.raises(InputError, match=match) as found:
-        read(path)
-    assert str(path) in str(found.value)
+    found = raised(InputError, match, read, path)
+    assert str(path) in str(found)
     assert "cannot be read" in complaint(T19File, tmp_path / "none.t19")
 
 

@@ -32,7 +32,7 @@ from bubblefit.runs.verification.closed_forms import (
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
-from ...complaints import complaint
+from ...complaints import complaint, raised
 
 PRESSURES = (0.022, 0.097, 0.186)
 STEPS = default_increments(PRESSURES)
@@ -106,8 +106,7 @@ def test_parameters_and_modes_of_the_sheet():
 
 
 def test_bad_sheets():
-    with pytest.raises(InputError, match="slack: expected shares above -1"):
-        replace(FLAT, slack=(-1.0, 0.0))
+    raised(InputError, "slack: expected shares above -1", replace, FLAT, slack=(-1.0, 0.0))
 
 
 RATIO_LAW = HypoelasticLaw([12.0, 240.0, 120.0, 600.0, -150.0], 0.24, form=LoadRatio())

@@ -24,7 +24,7 @@ from bubblefit.solvers.membrane.newton import Membrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.membrane.strip import Pulling
 
-from ...complaints import complaint
+from ...complaints import complaint, raised
 from ...materials.forms.test_forms import integral
 from ...places import PUBLISHED
 from ...published_laws import TABLE_3_2
@@ -259,8 +259,7 @@ def test_guesses_and_earlier_runs_leave_the_result():
     first = solver.run(strip, LAW)
     bubble = BubbleModel(disk_mesh(100.0, 48, "quarter"), THICKNESS, [0.1, 0.2])
     inflated = solver.run(bubble, LAW)
-    with pytest.raises(SolverFailure):
-        solver.run(strip, HypoelasticLaw.linear(300.0, -200.0, 5.0))
+    raised(SolverFailure, "", solver.run, strip, HypoelasticLaw.linear(300.0, -200.0, 5.0))
     assert (solver.run(strip, LAW).load == first.load).all()
     assert (solver.run(bubble, LAW).path == inflated.path).all()
 
@@ -274,8 +273,7 @@ def test_newton_gets_past_moduli_that_jump(monkeypatch):
     history = MembraneSolver(TIGHT).run(bias(20), restless)
     assert (np.diff(history.load) > 0).all()
     monkeypatch.setattr(newton, "MOST_FRUITLESS", newton.MOST_ITERATIONS + 1)
-    with pytest.raises(SolverFailure, match="no equilibrium"):
-        MembraneSolver(TIGHT).run(bias(20), restless)
+    raised(SolverFailure, "no equilibrium", MembraneSolver(TIGHT).run, bias(20), restless)
 
 
 HOPELESS = {
@@ -302,8 +300,7 @@ def test_hopeless_moduli_raise_solver_failure(model, unit, law):
     if model is not BUBBLE and law in ("no stiffness at all", "limit load far below"):
         return  # a strip is pulled by its length
     where = unit if law == "negative on the way" else ""
-    with pytest.raises(SolverFailure, match=f"no equilibrium at.*{where}"):
-        MembraneSolver().run(model, HOPELESS[law])
+    raised(SolverFailure, f"no equilibrium at.*{where}", MembraneSolver().run, model, HOPELESS[law])
 
 
 @pytest.mark.parametrize(
