@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.experiments import registry
 from bubblefit.experiments.kinds import CardRun, Output, Simulation, Studied
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.strip_models import strip_mesh
 from bubblefit.project.schema import FitSection
+from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.base import History
 
 LENGTH, WIDTH, STRETCH = 40.0, 20.0, 0.1
@@ -106,6 +108,20 @@ class BarKind:
 def _said(run: CardRun) -> object:
     failed = isinstance(run.outcome, SolverFailure)
     return run.outcome.reason if failed else float(run.outcome.load[-1])
+
+
+def known_bars(patch: Any, solver: BarSolver) -> BarSolver:
+    """Make bars a kind of test, and this solver the one of that name."""
+    known, reports = {**registry.kinds(), "bars": BarKind()}, registry.report_of
+    patch.setattr("bubblefit.project.project.kinds", lambda: known)
+    for module in ("runs.simulation", "project.project"):
+        patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
+    patch.setattr(
+        "bubblefit.runs.simulation.report_of",
+        lambda name: BarKind() if name == "bars" else reports(name),
+    )
+    patch.setitem(solvers.SOLVERS, "bars", lambda: solver)
+    return solver
 
 
 def project_of(*tests: BarTest, cards: Mapping[str, Any] | None = None) -> Any:

@@ -2,11 +2,13 @@
 
 import contextlib
 import json
+import multiprocessing
 import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import click
 from bubblefit.cli.main import main
@@ -15,6 +17,7 @@ from click.testing import CliRunner
 
 from .golden_files import unbroken
 
+FORK = multiprocessing.get_context("fork")
 TIMEOUT_S = 300.0
 #: How long a command that is told to stop may take to end.
 ENDING_S = 30.0
@@ -80,8 +83,24 @@ def one_line(done, *words):
         assert word in done.stderr, done.stderr
 
 
-def wait_for(there):
-    end = time.monotonic() + 30
+def alive(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(there, seconds=30):
+    end = time.monotonic() + seconds
     while not there():
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def in_processes(count, work):
+    processes = [FORK.Process(target=work, args=(n,)) for n in range(count)]
+    for one in processes:
+        one.start()
+    for one in processes:
+        one.join(60)
+        assert one.exitcode == 0

@@ -5,15 +5,13 @@ import signal
 import sys
 
 import pytest
-from bubblefit.experiments import registry as experiments
 from bubblefit.reports import vega
-from bubblefit.solvers import registry as solvers
 from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from . import needs
-from .bars import BarKind, BarSolver
+from .bars import BarSolver, known_bars
 from .drawings import check_charts
 from .golden_files import Golden
 
@@ -89,14 +87,4 @@ def packages(tmp_path, monkeypatch):
 @pytest.fixture
 def bars(monkeypatch):
     """A solver and a kind of test, both named bars; the solver is the one that runs."""
-    solver, known = BarSolver(), {**experiments.kinds(), "bars": BarKind()}
-    monkeypatch.setattr("bubblefit.project.project.kinds", lambda: known)
-    for module in ("runs.simulation", "project.project"):
-        monkeypatch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
-    reports = experiments.report_of
-    monkeypatch.setattr(
-        "bubblefit.runs.simulation.report_of",
-        lambda name: BarKind() if name == "bars" else reports(name),
-    )
-    monkeypatch.setitem(solvers.SOLVERS, "bars", lambda: solver)
-    return solver
+    return known_bars(monkeypatch, BarSolver())

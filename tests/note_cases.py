@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
 from bubblefit.experiments import kinds
-from bubblefit.experiments import registry as experiments
 from bubblefit.experiments.bubble.findings import warnings_of
 from bubblefit.experiments.kinds import notes_of, state_said
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
@@ -47,12 +46,12 @@ from bubblefit.solvers.membrane.closed import ClosedMembrane
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from . import load_cycles
-from .bars import BarKind, BarSolver, BarTest, project_of
+from .bars import BarSolver, BarTest, known_bars, project_of
 from .inference import cases
 from .inference.cases import MODEL
 from .marc_files import bending_marc, t19_text
 from .places import KNOWN
-from .projects import constant_strips, small
+from .projects import constant_strips, set_up, small
 from .solvers.marc.test_marc_deck import frames_of
 from .solvers.membrane.test_bending import LINEAR, beam
 
@@ -124,8 +123,7 @@ def notes_of_certainty(*_: Any) -> Iterable[Note]:
 
 def notes_of_an_estimate(folder: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     """Return notes of a bubble at wrong pressures, beside a test that gives no estimate."""
-    project = bf.read_project(KNOWN)
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(KNOWN)
     (prepared,) = setup.tests
     pressures = tuple(p + 0.01 for p in prepared.test.pressures)
     test = replace(prepared.test, pressures=pressures, increments=pressures, noise=0.01)
@@ -229,17 +227,8 @@ class Saying(BarSolver):
 
 def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> bf.Project:
     """A project of one bar; what its solver `says` and `fails` at."""
-    solver, known = Saying(**fails), {**experiments.kinds(), "bars": BarKind()}
+    solver = known_bars(patch, Saying(**fails))
     solver.says = says or solver.says
-    patch.setattr("bubblefit.project.project.kinds", lambda: known)
-    for module in ("runs.simulation", "project.project"):
-        patch.setattr(f"bubblefit.{module}.kind_named", known.__getitem__)
-    reports = experiments.report_of
-    patch.setattr(
-        "bubblefit.runs.simulation.report_of",
-        lambda name: BarKind() if name == "bars" else reports(name),
-    )
-    patch.setitem(registry.SOLVERS, "bars", lambda: solver)
     return project_of(BarTest("a bar"))
 
 

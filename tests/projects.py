@@ -29,6 +29,12 @@ def edited(folder, old, new, source=KNOWN, **options):
     return read_project(project_file(folder, source.read_text(), (old, new)), **options)
 
 
+def set_up(project, tests=None):
+    """Return the tests of a project, or of its file, that are fitted, with their data."""
+    project = project if isinstance(project, bf.Project) else read_project(project)
+    return prepare_fit(project, project.chosen(tests, fitted=True))
+
+
 def small(folder, *changes):
     """The known-solution example with 48 quads, changed further by replacing text."""
     return project_file(folder, KNOWN.read_text(), ("elements = 800", "elements = 48"), *changes)

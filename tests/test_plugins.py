@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import sys
 
 import bubblefit
@@ -24,6 +23,7 @@ from bubblefit.solvers.registry import solver_named
 from .complaints import complaint
 from .places import ROOT
 from .plug_ins import by_pip, install
+from .programs import output_of
 
 GROUPS = ("bubblefit.laws", "bubblefit.tests", "bubblefit.readers", "bubblefit.solvers")
 
@@ -92,12 +92,19 @@ EXTRAS = PLUG_IN / "bubblefit_extras"
 OPTIMISER = ROOT / "inference" / "methods" / "slsqp.py"
 
 
-def test_the_code_is_that_of_the_example():
-    *_, text = TEXT.partition("\n## A form of the moduli")
+ADAPTER = ROOT / "examples" / "solver-adapter"
+GUIDE = (ROOT / "docs" / "how-to" / "writing-a-solver-adapter.md").read_text()
+OURS = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", OPTIMISER]
+
+
+@pytest.mark.parametrize(
+    ("text", "paths"),
+    [(TEXT.partition("\n## A form of the moduli")[2], OURS), (GUIDE, [*ADAPTER.glob("*.*")])],
+)
+def test_the_code_is_that_of_the_example(text, paths):
     blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
-    paths = [*EXTRAS.glob("*.py"), EXTRAS.parent / "pyproject.toml", OPTIMISER]
     sources = [plain(path.read_text()) for path in paths]
-    assert len(blocks) > 6
+    assert len(blocks) > 4
     for block in blocks:
         assert any(plain(block) in source for source in sources), block
     said = {name: int(lines) for name, lines in re.findall(r"(\w+\.py), (\d+) \|", TEXT)}
@@ -132,12 +139,8 @@ def here(plug_in, monkeypatch):
 def run(plug_in, *command):
     cwd = plug_in.parent / "source"
     path = os.pathsep.join([str(plug_in), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run(
-        [sys.executable, *map(str, command)], cwd=cwd, capture_output=True, text=True,
-        timeout=300, env={**os.environ, "PYTHONPATH": path},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr + done.stdout
-    return done.stdout
+    environment = {**os.environ, "PYTHONPATH": path}
+    return output_of(sys.executable, *map(str, command), cwd=cwd, timeout=300, env=environment)
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from bubblefit.solvers.process import run_process
 from bubblefit.solvers.registry import solver_sections
 
 from .places import PUBLISHED, ROOT
+from .programs import output_of
 from .projects import small, two_exports
 from .scripts import script
 
@@ -79,12 +80,8 @@ def without(program, folder, *arguments):
     (site / "program.py").write_text(program)
     paths = [str(site), *filter(None, sys.path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    command = [sys.executable, str(site / "program.py"), *map(str, arguments)]
-    done = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    command = (sys.executable, site / "program.py", *arguments)
+    return output_of(*command, cwd=folder, env=environment, timeout=300)
 
 
 def test_a_bubble_is_fitted_by_two_spawned_processes(tmp_path):
@@ -121,22 +118,16 @@ def run(cache, package=None):
     environment = {**os.environ, "BUBBLEFIT_CACHE": str(cache), "NUMBA_OPT": "0"}
     if package is not None:
         environment["PYTHONPATH"] = str(package)
-    done = subprocess.run(
-        [sys.executable, "-c", KERNEL], env=environment, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return output_of(sys.executable, "-c", KERNEL, env=environment)
 
 
 def test_where_the_cache_is(monkeypatch):
-    monkeypatch.setenv("BUBBLEFIT_CACHE", "/x")
-    assert files.cache_folder() == Path("/x")
-    monkeypatch.delenv("BUBBLEFIT_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", "/y")
-    assert files.cache_folder() == Path("/y/bubblefit")
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setenv("HOME", "/z")
-    assert files.cache_folder() == Path("/z/.cache/bubblefit")
+    named = {"BUBBLEFIT_CACHE": "", "XDG_CACHE_HOME": "bubblefit", "HOME": ".cache/bubblefit"}
+    for name in named:
+        monkeypatch.setenv(name, f"/{name}")
+    for name, below in named.items():
+        assert files.cache_folder() == Path(f"/{name}", below)
+        monkeypatch.delenv(name)
 
 
 def _compiles(file):
@@ -186,12 +177,6 @@ PACKAGES = {
     for folder in (f.parent.relative_to(ROOT) for f in ROOT.rglob("__init__.py"))
     if not {*folder.parts} & OUTSIDE and not any(p.startswith(".") for p in folder.parts)
 }
-
-
-def output_of(*command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def site_packages(python):

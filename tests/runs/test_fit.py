@@ -23,7 +23,7 @@ from bubblefit.solvers import registry
 from ..commands import in_process, result_in
 from ..complaints import raised
 from ..cylinder_cases import STOPS, Formula, write_project
-from ..projects import constant_strips, small
+from ..projects import constant_strips, set_up, small
 
 SECOND = """
 [[bubble]]
@@ -400,6 +400,6 @@ def test_thickness_is_in_the_units_of_the_file(tmp_path):
 def test_what_cannot_be_meant(tmp_path, unknowns, key, words):
     with pytest.raises(InputError) as told:
         own = project(tmp_path, unknowns)
-        prepare_fit(own, own.chosen(None, fitted=True))
+        set_up(own)
     assert told.value.field == f"fit.unknowns.{key}"
     assert words in told.value.problem

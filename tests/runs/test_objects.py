@@ -15,21 +15,15 @@ from bubblefit.project.objects import plain
 from bubblefit.project.schema import project_schema
 from bubblefit.readers.frames import QUANTITIES
 from bubblefit.readers.sections import in_base_units
-from bubblefit.runs.setup import prepare_fit
 
 from ..complaints import raised, refused
 from ..places import EXAMPLES, ROOT
-from ..projects import camera_arrays, constant_strips, two_exports
+from ..projects import camera_arrays, constant_strips, set_up, two_exports
 
 FABRIC = bf.Fabric("made", thickness=0.8)
 PRESSURES = np.linspace(0.005, 0.1, 20)
 #: Of `constant_strips`.
 ELONGATION = np.linspace(0.2, 3.0, 12)
-
-
-def prepared(project):
-    """The tests of a project with their data."""
-    return prepare_fit(project, project.chosen(None, fitted=True))
 
 
 def project_of(*tests, form="constant", **more):
@@ -76,7 +70,7 @@ def test_arrays_lists_and_tables_are_one_bubble(arrays):
         (table,),
         (numbered, None, loads),
     ):
-        (test,) = prepared(project_of(bf.Bubble(*args, radius=100.0, elements=48))).tests
+        (test,) = set_up(project_of(bf.Bubble(*args, radius=100.0, elements=48))).tests
         for field, u, p in zip(test.fields, moved, loads, strict=True):
             assert field.pressure == p
             np.testing.assert_array_equal(field.points, points[:, :2])
@@ -89,7 +83,7 @@ def test_lost_points_and_frames_of_other_points(arrays):
     moved[3, 5] = np.nan
     several = [points[: len(points) - k % 3] for k in range(20)]
     ragged = [u[: len(u) - k % 3] for k, u in enumerate(moved)]
-    (test,) = prepared(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
+    (test,) = set_up(project_of(bf.Bubble(several, ragged, loads, radius=100.0))).tests
     counts = [len(field.points) for field in test.fields]
     assert counts == [len(points) - k % 3 - (k == 3) for k in range(20)]
     assert test.dropped == 1
@@ -182,7 +176,7 @@ def test_strips_from_arrays_are_those_of_files(tmp_path):
 
 def objective(project):
     """The objective at the first point drawn that can be run: every residual counts."""
-    problem = prepared(project).problem()
+    problem = set_up(project).problem()
     for drawn in islice(problem.starts.candidates(problem.unknowns, 1, 0), 20):
         point = problem.evaluate(problem.unknowns.at(drawn), False)
         if point is not None:
@@ -464,7 +458,7 @@ def test_read_and_register_what_two_cameras_export(tmp_path):
     centre, _, _ = found.registration.placement.origin
     assert centre == pytest.approx(5.0, abs=0.1)
     assert abs(found.registration.warp_angle) == pytest.approx(20.0, abs=1.0)
-    (test,) = prepared(project_of(found.bubble)).tests
+    (test,) = set_up(project_of(found.bubble)).tests
     for mine, theirs in zip(test.fields, fields, strict=True):
         np.testing.assert_allclose(mine.points, theirs.points, atol=2.0)
     assert bf.register(found.bubble).registration.warp_angle == pytest.approx(0.0, abs=1.0)

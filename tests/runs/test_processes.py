@@ -35,7 +35,7 @@ from bubblefit.solvers.process import check, run_process
 from bubblefit.solvers.scratch import run_folder
 
 from .. import counted_program, needs
-from ..commands import in_process, wait_for
+from ..commands import alive, in_process, wait_for
 from ..complaints import complaint, raised
 from ..counted_program import CountedSolver, seen
 
@@ -137,13 +137,6 @@ def test_what_cannot_cross_is_told_in_words():
     raised(BubblefitError, "Own: of its own sort", list, run_tasks(lambda: task, [1], 1))
 
 
-def alive(process):
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 def test_workers_end_when_their_parent_is_killed(tmp_path):
     needs.linux("who is alive")
 
@@ -164,10 +157,7 @@ def test_workers_end_when_their_parent_is_killed(tmp_path):
         workers = [int(told.readline()) for _ in range(2)]
         os.kill(parent, signal.SIGKILL)
         os.waitpid(parent, 0)
-        deadline = time.monotonic() + 20
-        while any(map(alive, workers)) or list(tmp_path.iterdir()):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        wait_for(lambda: not any(map(alive, workers)) and not list(tmp_path.iterdir()), 20)
 
 
 def test_the_processes_end_when_the_reader_stops():
@@ -188,11 +178,14 @@ for module in (sys.modules[__name__], counted_program):
 NOBODY = "tcp://127.0.0.1:1"
 
 
+def local_cluster(**options):
+    distributed = needs.library("distributed")
+    return distributed.LocalCluster(dashboard_address=":0", silence_logs=50, **options)
+
+
 @pytest.fixture(scope="module")
 def scheduler():
-    distributed = needs.library("distributed")
-    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
-    with distributed.LocalCluster(n_workers=2, processes=True, **options) as local:
+    with local_cluster(n_workers=2, processes=True, threads_per_worker=1) as local:
         yield local.scheduler_address
 
 
@@ -285,9 +278,7 @@ def test_errors_cross_the_process_border_whole(request, where):
 
 
 def test_a_scheduler_that_goes_is_an_error_soon():
-    distributed = needs.library("distributed")
-    options = {"n_workers": 1, "processes": False, "dashboard_address": ":0", "silence_logs": 50}
-    with distributed.LocalCluster(**options) as local:
+    with local_cluster(n_workers=1, processes=False) as local:
         running = Executor(scheduler=local.scheduler_address).run_tasks(
             lambda: lambda number, tell: time.sleep(0.1) or number, range(1000), "parts"
         )
@@ -336,10 +327,8 @@ def test_a_worker_of_another_version_is_not_used(scheduler, monkeypatch):
 
 
 def test_workers_that_come_later_are_waited_for_and_used():
-    distributed = needs.library("distributed")
-    options = {"processes": False, "dashboard_address": ":0", "silence_logs": 50}
     heard = []
-    with distributed.LocalCluster(n_workers=0, **options) as local, hearing(heard.append):
+    with local_cluster(n_workers=0, processes=False) as local, hearing(heard.append):
         running = Executor(scheduler=local.scheduler_address).run_tasks(
             lambda: lambda number, tell: 10 * number, [1, 2, 3]
         )
@@ -423,10 +412,8 @@ def test_two_numbers_of_licences_are_one_too_many(scheduler, tmp_path):
 
 def test_no_licence_is_leased_where_nobody_answers(tmp_path, monkeypatch):
     monkeypatch.setattr(licences, "CONNECT_S", 1.0)
-    distributed = needs.library("distributed")
     given = licences.licence_settings("acme", {"licences": 1, "licence_folder": str(tmp_path)})
-    options = {"n_workers": 0, "dashboard_address": ":0", "silence_logs": 50}
-    with distributed.LocalCluster(**options) as local:
+    with local_cluster(n_workers=0) as local:
         address = local.scheduler_address
         with licences.held("acme", given, address):
             local.close()

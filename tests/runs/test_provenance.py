@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from bubblefit.inference.unknowns import ProposedStarts
 from bubblefit.materials.forms.spline import TriLinear
-from bubblefit.project.project import Project, read_project, settings_of
+from bubblefit.project.project import read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
 from bubblefit.runs.fit import facts_of
 from bubblefit.runs.folder import (
@@ -28,10 +28,10 @@ from bubblefit.runs.folder import (
     this_run,
     versions,
 )
-from bubblefit.runs.setup import fingerprints, prepare_fit, proposals
+from bubblefit.runs.setup import fingerprints, proposals
 
 from ..complaints import complaint
-from ..projects import constant_strips, project_file, with_form
+from ..projects import constant_strips, project_file, set_up, with_form
 
 PROJECT = """
 [fabric]
@@ -80,11 +80,6 @@ def written(folder, *changes):
     return project_file(folder, PROJECT, *changes)
 
 
-def prepared(path):
-    project = path if isinstance(path, Project) else read_project(path)
-    return prepare_fit(project, project.chosen(None, fitted=True))
-
-
 def begun(folder, setup, resume):
     problem = setup.problem()
     data = data_rows((test.test.name, test) for test in setup.tests)
@@ -95,7 +90,7 @@ def begun(folder, setup, resume):
 @pytest.fixture(scope="module")
 def first(tmp_path_factory):
     folder = tmp_path_factory.mktemp("first")
-    begun(folder / "out", prepared(written(folder / "here")), False)
+    begun(folder / "out", set_up(written(folder / "here")), False)
     return folder / "out"
 
 
@@ -123,7 +118,7 @@ def refused(first, setup):
     ],
 )  # fmt: skip
 def test_what_is_set_otherwise_is_named(first, tmp_path, old, new, words):
-    assert refused(first, prepared(written(tmp_path, (old, new)))) == words
+    assert refused(first, set_up(written(tmp_path, (old, new)))) == words
 
 
 def test_the_data_file_that_was_touched_is_named(first, tmp_path):
@@ -133,26 +128,26 @@ def test_the_data_file_that_was_touched_is_named(first, tmp_path):
     (tmp_path / "high.csv").write_text(text.replace(",21.0000,", ",21.0001,"))
     now = hashlib.sha256((tmp_path / "high.csv").read_bytes()).hexdigest()
     said = f"data file high.csv of 'first' (sha256 {was[:12]}, now {now[:12]})"
-    assert refused(first, prepared(path)) == said
+    assert refused(first, set_up(path)) == said
     # A remark, another name of the fabric, or more starts change no result.
     path = written(tmp_path, ("starts = 3", "starts = 5\njobs = 1"), ('"Made up"', '"Another"'))
     with (tmp_path / "low.csv").open("a") as stream:
         stream.write("# a remark\n")
-    begun(first, prepared(path), True)
+    begun(first, set_up(path), True)
 
 
 def test_everything_that_differs_is_named(first, tmp_path):
     path = written(tmp_path, ("nu12 = 0.24", "nu12 = 0.3"), ('"high.csv"]', '"other.csv"]'))
     text = (tmp_path / "high.csv").read_text()
     (tmp_path / "other.csv").write_text(text.replace("300,1", "301,1"))
-    said = refused(first, prepared(path))
+    said = refused(first, set_up(path))
     assert said.startswith("law.nu12 = 0.24, now 0.3; ")
     assert 'first.data.points.files[1] = "high.csv", now "other.csv"' in said
     assert "data file of 'first', by sha256: high.csv (" in said and said.count(";") == 2
 
 
 def test_another_version_is_named(first, tmp_path, monkeypatch):
-    setup = prepared(written(tmp_path))
+    setup = set_up(written(tmp_path))
     for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
@@ -163,14 +158,14 @@ def test_the_solver_is_named(first, tmp_path):
     project = read_project(written(tmp_path)).with_solver(
         "membrane", {}, ["wrinkle_stiffness=0.01"]
     )
-    said = refused(first, prepared(project))
+    said = refused(first, set_up(project))
     assert said.startswith("the solver membrane: wall = ") and "now " in said and ";" not in said
 
 
 def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     def setup(*changes):
         path = written(tmp_path, *changes)
-        return prepared(read_project(path).with_solver("calculix", {"ccx": str(ccx.path)}))
+        return set_up(read_project(path).with_solver("calculix", {"ccx": str(ccx.path)}))
 
     begun(tmp_path / "out", setup(), False)
     begun(tmp_path / "out", setup(), True)
@@ -180,7 +175,7 @@ def test_what_calculix_runs_with_is_named(ccx, tmp_path):
     (tmp_path / "decks" / "bubble.inp.j2").write_text("** another\n")
     said = refused(tmp_path / "out", other)
     assert re.fullmatch(r"the solver calculix: templates = sha256 \w{12}, now sha256 \w{12}", said)
-    said = refused(tmp_path / "out", prepared(written(tmp_path)))
+    said = refused(tmp_path / "out", set_up(written(tmp_path)))
     assert said == 'the solver = "calculix", now "membrane"'
 
 
@@ -198,10 +193,10 @@ def test_options_of_the_command_are_in_the_project_as_run(tmp_path):
         (tmp_path / "here" / name).rename(tmp_path / "measured" / name)
     project = read_project(path, tmp_path / "measured").with_fit(seed=9, method="slsqp", jobs=1)
     project = project.with_solver("membrane", {}, ["wrinkle_stiffness=0.01"])
-    setup = prepared(project)
+    setup = set_up(project)
     recorded(setup).write(tmp_path / "out")
     again = read_project(tmp_path / "out" / AS_RUN)
-    theirs = prepared(again)
+    theirs = set_up(again)
     assert again.fit == project.fit
     assert fingerprints(theirs, theirs.problem()) == fingerprints(setup, setup.problem())
     # Of the solver that runs, with paths in full.
@@ -218,7 +213,7 @@ def test_only_the_tests_of_the_run_are_in_it(tmp_path):
 
 
 def test_the_record_of_data_files(tmp_path):
-    low, high = data_rows([("first", prepared(written(tmp_path)).tests[0])])
+    low, high = data_rows([("first", set_up(written(tmp_path)).tests[0])])
     assert (low["test"], low["name"], high["name"]) == ("first", *FILES)
     assert low["file"] == str(tmp_path / "low.csv")
     assert low["sha256"] == hashlib.sha256((tmp_path / "low.csv").read_bytes()).hexdigest()
@@ -229,7 +224,7 @@ def test_the_record_of_data_files(tmp_path):
 
 
 def test_the_record_says_when_where_and_with_what(tmp_path):
-    setup, command = prepared(written(tmp_path, ("[law]", "# g/m²\n[law]"))), ["bubblefit", "fit"]
+    setup, command = set_up(written(tmp_path, ("[law]", "# g/m²\n[law]"))), ["bubblefit", "fit"]
     record = recorded(setup, command)
     record.write(tmp_path / "out")
     text = (tmp_path / "out" / PROVENANCE).read_text(encoding="utf-8")
@@ -307,7 +302,7 @@ def cubic(bubble):
 def regions(tmp_path_factory):
     breaks = "breaks = { warp = [0.03, 0.08], fill = [0.03, 0.08], shear = [0.03, 0.08] }"
     form = f'form = "trilinear"\n{breaks}'
-    return prepared(with_form(tmp_path_factory.mktemp("regions"), form))
+    return set_up(with_form(tmp_path_factory.mktemp("regions"), form))
 
 
 def changed(setup, **other):

@@ -21,7 +21,6 @@ from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
 from bubblefit.reports import fit_page
 from bubblefit.runs.estimate import GAP, estimate_of, with_start
 from bubblefit.runs.fit import agreement, check
-from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.starts import StartRecord
 from bubblefit.runs.verification import known_law
 from bubblefit.runs.verification.closed_forms import (
@@ -40,7 +39,7 @@ from bubblefit.solvers.run_cache import from_bytes, to_bytes
 from ..commands import in_process
 from ..complaints import raised
 from ..places import EXAMPLES, KNOWN
-from ..projects import edited, project_file, small
+from ..projects import edited, project_file, set_up, small
 
 LAW = known_law()
 PRESSURES = (0.022, 0.1, 0.3)
@@ -348,8 +347,7 @@ def test_fields_vanish_on_the_rim_and_are_symmetric():
 
 @pytest.fixture(scope="module")
 def known():
-    project = bf.read_project(KNOWN)
-    return prepare_fit(project, project.chosen(None, fitted=True))
+    return set_up(KNOWN)
 
 
 def noisy(setup, sigma, seed):
@@ -423,7 +421,7 @@ def test_no_shape_is_known_under_a_first_pressure(tmp_path):
     raised(InputError, "from_pressure", bf.estimate, project)
     # Then all starts are random.
     project = project.with_fit(starts_from="estimate")
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(project)
     assert with_start(setup) is setup
 
 
@@ -438,8 +436,7 @@ def test_real_tests_start_a_fit_and_doubt_it(shared_data, tmp_path):
 
 def test_a_finer_mesh_begins_at_the_equilibrium_of_the_coarse_one(tmp_path):
     sheet = "[bubble.sheet]\nmodes = 1\n\n[bubble.nuisance]"
-    project = bf.read_project(small(tmp_path, ("[bubble.nuisance]", sheet)))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(small(tmp_path, ("[bubble.nuisance]", sheet)))
     problem, (prepared,) = setup.problem(), setup.tests
     (own,) = problem.comparisons
     (finer,) = replace(prepared, by_this_model=False).finer(

@@ -4,7 +4,6 @@ The program that is run counts its copies itself (`counted_program`).
 """
 
 import json
-import multiprocessing
 import os
 import signal
 import stat
@@ -23,12 +22,11 @@ from bubblefit.solvers.scratch import OWNER, claim, clear, run_folder, sweep
 from bubblefit.solvers.settings import LicenceSettings, licence_settings, split
 
 from .. import needs
-from ..commands import wait_for
+from ..commands import FORK, in_processes, wait_for
 from ..complaints import complaint, raised
 from ..counted_program import CountedSolver, seen
 from ..plug_ins import install
 
-FORK = multiprocessing.get_context("fork")
 LAW = None
 PROJECT = Path("/somewhere/project.toml")
 
@@ -39,15 +37,6 @@ def settings(folder, licences=2, **more):
 
 def licensed(solver, given):
     return licences.licensed(solver, solver.name, given.model_dump(exclude_unset=True))
-
-
-def in_processes(count, work):
-    processes = [FORK.Process(target=work, args=(n,)) for n in range(count)]
-    for one in processes:
-        one.start()
-    for one in processes:
-        one.join(60)
-        assert one.exitcode == 0
 
 
 @pytest.mark.parametrize("count", [2, None])
@@ -79,21 +68,17 @@ def test_a_licence_is_free_again_when_its_holder_was_killed(tmp_path):
     assert holder.pid is not None
     os.kill(holder.pid, signal.SIGKILL)
     holder.join()
-    heard = []
-    with hearing(heard.append):
-        licensed(CountedSolver(folder), settings(tmp_path, 1)).run("next", LAW)
+    licensed(CountedSolver(folder), settings(tmp_path, 1)).run("next", LAW)
     found = seen(folder)
     assert found.most == 1 and found.ended == {"next": 1}
 
 
 def test_the_program_holds_the_licence_until_it_has_ended_itself(tmp_path):
-    from bubblefit.solvers.process import run_process
-
     def work(_):
         with held("acme", settings(tmp_path, 1)):
             # As a wrapper script leaves a program behind: in a session of its own.
             script = "setsid sleep 0.8 & sleep 0.2"
-            run_process(["sh", "-c", script], tmp_path, tmp_path / "log")
+            process.run_process(["sh", "-c", script], tmp_path, tmp_path / "log")
 
     in_processes(1, work)
     begun, heard = time.monotonic(), list[Announcement]()
@@ -282,10 +267,8 @@ def begun(place):
         [sys.executable, "-c", BEGIN, place], stdout=subprocess.PIPE, text=True
     )
     folder = Path(process.stdout.readline().strip())
-    deadline = time.monotonic() + 20
-    while not ((folder / "group").exists() and (folder / "group").read_text().endswith("\n")):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    group = folder / "group"
+    wait_for(lambda: group.exists() and group.read_text().endswith("\n"), 20)
     return process, folder
 
 
@@ -310,10 +293,7 @@ def test_after_a_kill_no_program_lives_and_the_next_sweep_removes_the_folder(tmp
     running.kill()
     running.wait()
     running.stdout.close()
-    deadline = time.monotonic() + 10
-    while members(group):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_for(lambda: not members(group), 10)
     assert sweep([tmp_path]) == [folder]
     assert list(tmp_path.iterdir()) == []
 

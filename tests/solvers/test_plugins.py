@@ -3,9 +3,7 @@
 import csv
 import json
 import os
-import re
 import shutil
-import subprocess
 import sys
 
 import numpy as np
@@ -13,24 +11,14 @@ import pandas as pd
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError, SolverFailure
-from bubblefit.files import environment
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.solvers.bars import BARS, INCREMENTS, bar_law, strip_stresses
+from bubblefit.solvers.bars import BARS, strip_stresses
 from bubblefit.solvers.calculix.executable import carries_external, every_ccx, find_ccx
-from bubblefit.solvers.calculix.library import (
-    MATERIAL,
-    STATE_VARIABLES,
-    constants,
-    law_files,
-    law_number,
-    material_library,
-)
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from bubblefit.solvers.registry import checked, solver_named
 from click.testing import CliRunner
-from jinja2 import BaseLoader
 
 from ..commands import in_process
 from ..complaints import complaint, raised
@@ -44,7 +32,6 @@ STRIPS = EXAMPLES / "uniaxial-valmex7318"
 LAW = HypoelasticLaw(BETA, strain_range=np.array([0.16, 0.24, 0.9]))
 SIMULATE = ("simulate", "uniaxial", "project.toml", "--card", "material.toml", "--overwrite")
 GROUP = "bubblefit.solvers"
-DECK = ROOT / "tests/solvers/calculix/bars.inp.j2"
 DIAGNOSE = "bubblefit.solvers.calculix.solver.diagnose"
 
 
@@ -155,15 +142,6 @@ def test_options_come_from_the_project_file(example, strips, monkeypatch):
         assert code == 0 or done.output.count("\n") == 1
 
 
-def test_the_code_in_the_documentation_is_that_of_the_example():
-    text = (ROOT / "docs" / "how-to" / "writing-a-solver-adapter.md").read_text()
-    blocks = re.findall(r"```(?:toml|python)\n(.*?)```", text, re.DOTALL)
-    sources = [path.read_text() for path in ADAPTER.iterdir() if path.is_file()]
-    assert len(blocks) > 4
-    for block in blocks:
-        assert any(block in source for source in sources), block
-
-
 WORKING = """
 class THING:
     name, external, progress, identity = "acme", True, None, "acme 9"
@@ -249,52 +227,6 @@ def test_the_bars_are_the_published_ones():
         antiderivative = np.polyint(1e3 * np.array(bar.modulus[::-1]))
         exact = np.polyval(antiderivative, np.log1p(bar.elongation))
         assert abs(exact / bar.stress - 1) < 6e-5
-
-
-def bar_deck():
-    """Every bar pulled along x, its direction of the fabric turned there."""
-    ways = [constants(bar_law(b.model), angle=-90.0 * (b.direction == "fill")) for b in BARS]
-    rows = enumerate(zip(BARS, ways, strict=True))
-    return environment(BaseLoader()).from_string(DECK.read_text()).render(
-        bars=[{"index": i, "elongation": b.elongation, "constants": c} for i, (b, c) in rows],
-        nodes=[(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))],
-        increments=INCREMENTS, material=MATERIAL, states=STATE_VARIABLES,
-    )  # fmt: skip
-
-
-def end_stresses(printed):
-    rows = map(str.split, printed.splitlines())
-    return {int(row[0]): float(row[2]) for row in rows if len(row) == 8 and row[0].isdigit()}
-
-
-def run_deck(ccx, folder, deck):
-    (folder / "job.inp").write_text(deck)
-    for bar in BARS:
-        for name, text in law_files(bar_law(bar.model)).items():
-            (folder / name).write_text(text)
-    done = subprocess.run(
-        [ccx.path, "job"], cwd=folder, capture_output=True, text=True, timeout=120,
-        env={**os.environ, "LD_LIBRARY_PATH": str(material_library().parent)},
-    )  # fmt: skip
-    return done, (folder / "job.dat").read_text() if (folder / "job.dat").exists() else ""
-
-
-def test_a_modulus_that_runs_out_makes_ccx_cut_its_increments(ccx, tmp_path):
-    law = bar_law("direct")
-    beta = law.beta.copy()
-    beta[8:] = 0, 0, -1e4, 500.0  # E1 is gone at 5 % strain
-    gone = law.with_beta(beta)
-    for name, text in law_files(gone).items():
-        (tmp_path / name).write_text(text)
-    number = f"{law_number(law):.12e}"
-    assert bar_deck().count(number) == 2
-    deck = bar_deck().replace(number, f"{law_number(gone):.12e}")
-    done, printed = run_deck(ccx, tmp_path, deck.replace("*STATIC, DIRECT", "*STATIC"))
-    assert "requested by a material user routine" in done.stdout
-    assert done.returncode != 0 and not end_stresses(printed)
-    done, _ = run_deck(ccx, tmp_path, bar_deck().replace("*DEPVAR\n6", "*DEPVAR\n3"))
-    assert done.returncode == 201
-    assert "*ERROR in HYPOELASTIC: 9 constants and *DEPVAR 6 are needed" in done.stdout
 
 
 def test_every_ccx_by_preference(bare, monkeypatch):

@@ -4,10 +4,10 @@ import hashlib
 import io
 import json
 import logging
-import multiprocessing
 import os
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,7 +31,7 @@ from bubblefit.solvers.run_cache import (
 )
 
 from ..bars import BarModel
-from ..commands import in_process
+from ..commands import in_process, in_processes
 from ..complaints import raised
 from ..programs import program
 
@@ -195,13 +195,7 @@ def write_many(folder, seed):
 
 
 def test_many_may_write_at_once(cache, caplog):
-    context = multiprocessing.get_context("fork")
-    several = [context.Process(target=write_many, args=(cache.folder, k)) for k in range(4)]
-    for process in several:
-        process.start()
-    for process in several:
-        process.join()
-    assert [process.exitcode for process in several] == [0] * 4
+    in_processes(4, partial(write_many, cache.folder))
     assert there(cache, 20) == list(range(20)) and not list(cache.folder.glob("*/.*"))
 
 

@@ -18,7 +18,6 @@ from bubblefit.project.project import read_project
 from bubblefit.runs import compare, validation, verification
 from bubblefit.runs.compare import folds
 from bubblefit.runs.result import Fit
-from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import FAILED
 from bubblefit.runs.validation import fit_without, held_out, parts_of
 from bubblefit.runs.verification import SUBJECTS, Number, verify
@@ -27,7 +26,7 @@ from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..commands import in_process
 from ..complaints import raised
-from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, small
+from ..projects import BUBBLE, ELONGATION, MODULI, constant_strips, project_file, set_up, small
 from ..published_laws import TABLE_4_2
 
 #: Logarithmic strains of the points of "one", whose gauges end at 22.9 mm.
@@ -46,7 +45,7 @@ def off_by(modulus, true):
 
 
 def test_a_fold_errs_by_what_the_specimens_differ_by(project):
-    setup = prepare_fit(project, project.chosen("one", fitted=True))
+    setup = set_up(project, "one")
     found = compare.errors_of_folds(setup, 5, 1)
     assert [fold.fold for fold in found] == [0, 1]
     expected = {f"one: {name}": off_by(*both)[0] for name, both in MODULI["one"].items()}
@@ -100,8 +99,7 @@ def three_specimens(folder, factor=1.0, objective="N"):
             points = zip(u, load.tolist(), strict=True)
             lines += [f"{direction},{'abc'[number]},{a:.4f},{b!r}" for a, b in points]
     (folder / "one.csv").write_text("\n".join(lines) + "\n")
-    project = read_project(path)
-    return prepare_fit(project, project.chosen("one", fitted=True))
+    return set_up(path, "one")
 
 
 def without_the_last(setup):
@@ -197,8 +195,7 @@ def test_a_direction_is_foretold_by_the_other_test(project, tmp_path):
 @pytest.fixture(scope="module")
 def bubble(tmp_path_factory):
     """A computed bubble of two frames, the second of which is 10 % too large."""
-    project = read_project(project_file(tmp_path_factory.mktemp("bubble"), BUBBLE))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(project_file(tmp_path_factory.mktemp("bubble"), BUBBLE))
     (test,) = setup.tests
     first, second = test.fields
     off = replace(second, displacement=1.1 * second.displacement)
@@ -318,7 +315,7 @@ def test_a_card_is_judged_without_a_fit(project, tmp_path):
 def test_what_is_no_law_is_fitted_to_the_test_left_out(tmp_path):
     offset = ("displacement_offset = false", "displacement_offset = true")
     project = read_project(small(tmp_path, offset))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(project)
     (prepared,) = setup.tests
     up = np.array([0.0, 0.0, 1.5])
     moved = tuple(replace(f, displacement=f.displacement + up) for f in prepared.fields)
@@ -336,7 +333,7 @@ def test_a_law_that_cannot_be_run_is_told(project, monkeypatch):
     def tired(*_, **__):
         raise SolverFailure("too tired", "membrane")
 
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(project)
     monkeypatch.setattr(MembraneSolver, "run", tired)
     found = held_out(setup.tests[1], LAW, setup.make_solver)
     (note,) = found.notes

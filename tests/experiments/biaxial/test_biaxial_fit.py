@@ -19,13 +19,13 @@ from bubblefit.runs import setup
 from bubblefit.runs.compare import candidates as candidate_laws
 from bubblefit.runs.fit import check
 from bubblefit.runs.result import Fit
-from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers.registry import solver_named
 
 from ...biaxial_files import BENT, FIVE, HEAD, THICKNESS, biaxial_project, rows_of, write_rows
 from ...commands import in_process
 from ...complaints import complaint_with
+from ...projects import set_up
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +86,7 @@ def test_numbers_tables_and_files_say_the_strains_in_percent(fitted, folder):
 
 
 def test_residuals_and_their_derivatives(folder):
-    project = bf.read_project(folder / "project.toml")
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(folder / "project.toml")
     (prepared,) = setup.tests
     comparisons = prepared.comparisons(setup.make_solver, Weighting())
     assert [c.name for c in comparisons] == [f"biaxial: {ratio}" for ratio in FIVE]
@@ -127,8 +126,7 @@ def test_residuals_and_their_derivatives(folder):
 )
 def test_noise_is_what_the_section_says_in_percent(tmp_path, line, noise, how):
     write_rows(tmp_path / "test.csv", rows_of(BENT, ["1:1"]))
-    project = bf.read_project(biaxial_project(tmp_path, line))
-    (prepared,) = prepare_fit(project, project.chosen(None, fitted=True)).tests
+    (prepared,) = set_up(biaxial_project(tmp_path, line)).tests
     (comparison,) = prepared.comparisons(lambda *a: None, Weighting())
     assert comparison.objective.least_noise == pytest.approx(noise)
     assert comparison.objective.noise_is == how and comparison.objective.unit == "%"
@@ -213,8 +211,7 @@ def test_a_ratio_is_foretold_by_the_other(tmp_path, monkeypatch):
 
 def planning(tmp_path, noise=None, own=True) -> Planning:
     write_rows(tmp_path / "test.csv", rows_of(TRUE, ["1:1", "2:1"]))
-    project = bf.read_project(biaxial_project(tmp_path, form="constant"))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(biaxial_project(tmp_path, form="constant"))
     (prepared,) = setup.tests
     law = HypoelasticLaw(TRUE.beta, 0.24, [0.03, 0.04, 0.1], form=TRUE.form)
     precision = {"biaxial: 1:1": Precision(0.02, 2.0, 29), "biaxial: 2:1": Precision(0.03, 4.0, 29)}

@@ -33,7 +33,6 @@ from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
-from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare
 from bubblefit.solvers.membrane.newton import Asked
@@ -45,7 +44,7 @@ from ...complaints import complaint, raised
 from ...drawings import caught
 from ...inference.cases import MODEL as CASE
 from ...inference.cases import reference, targets
-from ...projects import changed, small
+from ...projects import changed, set_up, small
 
 BETA = np.zeros(12)
 BETA[[11, 7, 3]] = 500.0, 200.0, 40.0
@@ -171,8 +170,7 @@ def test_the_same_places_from_other_nodes():
 
 @pytest.mark.parametrize("factor", [2.0, 1.6])
 def test_quads_and_increments_are_divided(tmp_path, factor):
-    project = read_project(small(tmp_path))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(small(tmp_path))
     (prepared,) = setup.tests
     (own,) = prepared.comparisons(setup.make_solver, Weighting())
     found = prepared._refined(own, factor)
@@ -505,7 +503,7 @@ def cubic(tmp_path_factory):
     """Cubic moduli on a full disk of 192 quads, and its fields inside 90 mm with 1 um of noise."""
     folder, random = tmp_path_factory.mktemp("causes"), np.random.default_rng(0)
     project = read_project(small(folder, ("elements = 48", "elements = 192"), FULL, FRAMES))
-    (prepared,) = prepare_fit(project, project.chosen(None, fitted=True)).tests
+    (prepared,) = set_up(project).tests
     seen = []
     for one in prepared.matched:
         some = np.hypot(*one.points[:, :2].T) < 90
@@ -537,8 +535,7 @@ def test_the_residual_points_to_its_cause(cubic, tmp_path, name, change, words, 
     _, seen = cubic
     frames = () if change is LATE else (FRAMES,)
     changes = (FULL, *frames) if change is FULL else (FULL, *frames, change)
-    project = read_project(small(tmp_path, ("elements = 48", "elements = 192"), *changes))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(small(tmp_path, ("elements = 48", "elements = 192"), *changes))
     (own,) = setup.tests
     fields = [
         replace(given(name)(one), pressure=p)

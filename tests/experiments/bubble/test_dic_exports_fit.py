@@ -16,14 +16,14 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import Facet
-from bubblefit.runs.setup import law_of, prepare_fit
+from bubblefit.runs.setup import law_of
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
 from ...camera import camera_project
 from ...commands import in_process, result_in
 from ...complaints import complaint
-from ...projects import small
+from ...projects import set_up, small
 
 ONE_START = ("--starts", 1, "--jobs", 1)
 
@@ -227,7 +227,7 @@ def test_a_fit_begins_where_the_fields_are_symmetric_and_rise():
     bubble = bf.Bubble(points, seen, PRESSURES, radius=100.0, elements=300, noise=NOISE,
                        nuisance={"registration": "fitted"})  # fmt: skip
     project = bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(project)
     unknowns = setup.problem().unknowns
     begin = dict(zip(unknowns.nuisance.names, unknowns.nuisance.begin, strict=True))
     assert begin["turn"] == pytest.approx(YARNS_TURN, abs=1.5)

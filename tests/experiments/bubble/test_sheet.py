@@ -29,12 +29,11 @@ from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.fit import fit
-from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint, raised
-from ...projects import small
+from ...projects import set_up, small
 from ...scripts import script
 
 PRESSURES = (0.02, 0.09, 0.19)
@@ -83,11 +82,6 @@ def project(folder: Path, sheet: str, **what: float) -> Path:
     path = folder / "project.toml"
     path.write_text(UNEVEN.project_text(PRESSURES, 112, sheet))
     return path
-
-
-def prepared(path: Path):
-    one = read_project(path)
-    return prepare_fit(one, one.chosen(None, fitted=True))
 
 
 def field_of(heights, count: int = 900) -> DisplacementField:
@@ -190,7 +184,7 @@ def loaded(folder: Path, pressures: Sequence[float]) -> Path:
 
 def test_priors_are_a_block_of_their_own(tmp_path):
     path = project(tmp_path, "modes = 3\nprior = 2.0\nslack = true\nslack_prior = 0.1")
-    problem = prepared(path).problem()
+    problem = set_up(path).problem()
     y = problem.unknowns.at(UNEVEN.law().beta[[2, 3, 6, 7, 10, 11]])
     assert problem.unknowns.nuisance.names == ("z0_1", "z0_x", "z0_y", "slack_warp", "slack_fill")
     y[-5:] = 1.0, -2.0, 0.5, 0.05, 0.1
@@ -326,8 +320,7 @@ def test_offsets_are_what_was_fitted_in_the_units_said(tmp_path):
     on = [
         (f"{name} = false", f"{name} = true") for name in ("displacement_offset", "pressure_offset")
     ]
-    project = read_project(small(tmp_path, *on))
-    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    setup = set_up(small(tmp_path, *on))
     (prepared,), problem = setup.tests, setup.problem()
     law = prepared.known
     y = problem.unknowns.at(law.beta)

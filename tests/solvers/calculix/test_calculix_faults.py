@@ -4,7 +4,6 @@ import os
 import re
 import signal
 import time
-from pathlib import Path
 
 import pytest
 from bubblefit.errors import InputError, SolverFailure
@@ -17,7 +16,7 @@ from bubblefit.solvers.calculix.executable import increments
 from bubblefit.solvers.calculix.library import law_number
 from bubblefit.solvers.calculix.solver import CalculixSolver
 
-from ...commands import interrupted
+from ...commands import alive, interrupted, wait_for
 from ...complaints import raised
 from ...projects import BUBBLE
 
@@ -54,19 +53,6 @@ def failure(solver, **options):
     assert found.scratch.is_dir()
     assert (found.scratch / "job.inp").exists()
     return found
-
-
-def gone(pid, seconds=5.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-        except OSError:
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def test_a_program_of_another_machine(tmp_path, monkeypatch):
@@ -117,7 +103,7 @@ def test_no_child_goes_on_writing(fake, tmp_path, end, timeout):
     pids = tmp_path / "pids"
     found = failure(fake(f"sleep 1000 & echo $! $$ > {pids}; {end}", timeout=timeout))
     assert (found.reason == "did not end within 1 s: killed at once") == (end == "wait")
-    assert all(gone(pid) for pid in pids.read_text().split())
+    wait_for(lambda: not any(map(alive, pids.read_text().split())), 5)
 
 
 @pytest.fixture(scope="module")
@@ -233,5 +219,5 @@ def test_interruption_ends_calculix(ccx, tmp_path, jobs):
 
     ended = interrupted(*arguments, cwd=tmp_path, when=all_run)
     assert ended.returncode == 130 and "--resume" in ended.stderr
-    assert all(gone(pid) for pid in pids.read_text().split())
+    wait_for(lambda: not any(map(alive, pids.read_text().split())), 5)
     assert not list((tmp_path / "scratch").iterdir())

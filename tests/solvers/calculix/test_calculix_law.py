@@ -25,7 +25,7 @@ from bubblefit.solvers.calculix.library import (
 
 from ... import needs
 from ...complaints import raised
-from ...fortran_build import BETA, LAWS, SIZES, increments_everywhere, spline
+from ...fortran_build import BETA, GONE, LAWS, SIZES, increments_everywhere, spline
 
 KNOTTED, ENDS = spline(), np.full(3, 0.13)
 #: Laws of strain, and those that also know the loads of both yarns.
@@ -483,12 +483,16 @@ WAVES = np.concatenate([size * (1 + 0.3 * np.sin(40 * KNOTS)) for size in (20, 1
 MANY = HypoelasticLaw(WAVES, strain_range=[0.13] * 3, form=Spline.at([KNOTS.tolist()] * 3))
 
 
-def check_patch(ccx, folder, deck, gradient, increments, law, warp_at, libraries):
-    """Run the deck; compare its Cauchy stresses, printed with seven digits, with the law's."""
+def run_patch(ccx, folder, deck, libraries):
     (folder / "patch.inp").write_text(deck)
     environment = {**os.environ, "LD_LIBRARY_PATH": str(libraries)}
-    done = subprocess.run([ccx.path, "patch"], cwd=folder, env=environment, capture_output=True,
+    return subprocess.run([ccx.path, "patch"], cwd=folder, env=environment, capture_output=True,
                           text=True, timeout=60)  # fmt: skip
+
+
+def check_patch(ccx, folder, deck, gradient, increments, law, warp_at, libraries):
+    """Run the deck; compare its Cauchy stresses, printed with seven digits, with the law's."""
+    done = run_patch(ccx, folder, deck, libraries)
     assert done.returncode == 0, done.stdout[-2000:]
     printed = [line.split() for line in (folder / "patch.dat").read_text().splitlines()]
     found = np.array([row[2:] for row in printed if len(row) == 8 and row[0] == "1"], float)
@@ -520,3 +524,15 @@ def test_a_patch_in_ccx_has_the_stress_of_the_python_law(ccx, tmp_path, element,
     deck = patch_deck(element, law, gradient, increments, angle, orientation)
     libraries = material_library().parent
     check_patch(ccx, tmp_path, deck, gradient, increments, law, warp_at, libraries)
+
+
+def test_a_modulus_that_runs_out_makes_ccx_cut_its_increments(ccx, tmp_path):
+    gradient, libraries = np.diag([1.1, 1.0, 1.0]), material_library().parent
+    deck = patch_deck("C3D8I", GONE, gradient, 10, 0.0, "")
+    done = run_patch(ccx, tmp_path, deck.replace("*STATIC, DIRECT", "*STATIC"), libraries)
+    assert "requested by a material user routine" in done.stdout and done.returncode != 0
+    assert "stresses" not in (tmp_path / "patch.dat").read_text()
+    deck = patch_deck("C3D8I", LAWS["cubic"], gradient, 10, 0.0, "")
+    done = run_patch(ccx, tmp_path, deck.replace("*DEPVAR\n6", "*DEPVAR\n3"), libraries)
+    assert done.returncode == 201
+    assert "*ERROR in HYPOELASTIC: 9 constants and *DEPVAR 6 are needed" in done.stdout

@@ -31,7 +31,6 @@ def model():
 
 @pytest.fixture
 def machine(tmp_path, monkeypatch):
-    monkeypatch.delenv("BUBBLEFIT_MARC", raising=False)
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:/usr/bin:/bin")
     return tmp_path

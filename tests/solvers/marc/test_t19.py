@@ -1,6 +1,5 @@
 """Marc's post and status files: six digits, and nothing partial taken for whole."""
 
-import subprocess
 import sys
 
 import meshio
@@ -23,6 +22,7 @@ from hypothesis.extra.numpy import arrays
 from ... import needs
 from ...complaints import complaint, raised, refused
 from ...marc_files import sts_text, t19_text
+from ...programs import output_of
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0.5]], float)
 QUADS = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
@@ -69,8 +69,7 @@ def test_meshio_reads_mesh_and_last_frame(tmp_path):
     last = given[-1][1]["Displacement"]
     np.testing.assert_allclose(mesh.point_data["Displacement"], last, rtol=ROUNDING)
     code = f"import bubblefit, meshio; print(len(meshio.read({str(path)!r}).points))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "6", done.stderr
+    assert output_of(sys.executable, "-c", code).strip() == "6"
     assert "of type 999" in complaint(meshio.read, written(path, given, element=999))
 
 
