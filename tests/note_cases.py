@@ -160,8 +160,7 @@ def notes_of_bending(*_: Any) -> Iterable[Note]:
 
 def notes_of_inflation(_: Path, patch: pytest.MonkeyPatch) -> Iterable[Note]:
     patch.setattr(bending, "MOST_GROWTH_INFLATED", 0.0)
-    model = replace(beam(across=4), bending=None)
-    return MembraneSolver(1e-6).run(model, LINEAR).remarks
+    return MembraneSolver(1e-6).run(replace(beam(across=4), bending=None), LINEAR).remarks
 
 
 def notes_of_analysis(*_: Any) -> list[Note]:

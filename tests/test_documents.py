@@ -173,8 +173,7 @@ def test_the_site_has_every_document_the_notebook_and_the_interface(tmp_path):
     notebook = (site / "examples/notebook/first-fit.html").read_text()
     assert "A first fit from Python" in notebook and "bf.read_project(" in notebook
     assert "start 0: converged" in notebook
-    gallery = list((site / "examples/gallery").glob("*.html"))
-    assert len(gallery) == 9  # with the list of them
+    assert len(list((site / "examples/gallery").glob("*.html"))) == 9  # with the list of them
     beam = (site / "examples/gallery/a-beam.html").read_text()
     assert beam.count("data:image/svg+xml;base64,") == 2 and "<caption>uniaxial" in beam
     listed = (site / "index.html").read_text()

@@ -146,12 +146,10 @@ def run(plug_in, *command):
 @pytest.mark.slow
 def test_one_project_with_all_of_them_is_fitted(plug_in, tmp_path):
     run(plug_in, "-m", "bubblefit.cli", "fit", "project.toml", "--starts", 1, "--out", tmp_path)
-    result = json.loads((tmp_path / "result.json").read_text())
-    assert result["objective"] < 1e-3
+    assert json.loads((tmp_path / "result.json").read_text())["objective"] < 1e-3
     card = (tmp_path / "material.toml").read_text()
     assert 'form = "saturating"' in card and "[scale]" in card
-    residuals = pd.read_csv(tmp_path / "residuals.csv")
-    assert set(residuals.test) == {"strips", "supplier"}
+    assert set(pd.read_csv(tmp_path / "residuals.csv").test) == {"strips", "supplier"}
     # The card in both kinds of test, by the plug-in's solver.
     simulated = tmp_path / "simulated"
     out = run(plug_in, "-m", "bubblefit.cli", "simulate", "test", "project.toml", "--card",

@@ -99,8 +99,7 @@ def test_the_files_of_a_study_agree(study, golden):
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_finished_run_is_not_repeated(tmp_path, formula, monkeypatch):
-    project = write_project(tmp_path)
-    run = (project, "--out", "out", "--jobs")
+    run = (write_project(tmp_path), "--out", "out", "--jobs")
     bend(*run, 2, cwd=tmp_path)
     before = result_in(tmp_path / "out")
     kept = sorted((tmp_path / "out" / "runs").glob("*.npz"))

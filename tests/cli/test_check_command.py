@@ -50,8 +50,7 @@ def folder(tmp_path_factory):
 
 
 def test_good_data_are_said_to_be_fine(folder, golden):
-    done = in_process("check", "project.toml", cwd=folder)
-    golden("check", done.stdout, folder)
+    golden("check", in_process("check", "project.toml", cwd=folder).stdout, folder)
     out = folder / "out" / f"{folder.name}-check"
     page = (out / "report.html").read_text()
     assert "The data are fit to be fitted." in page and "Equilibrium of the apex" in page
@@ -170,8 +169,7 @@ def bubble(tmp_path):
 def test_mesh_of_a_bubble(bubble, drawn, golden):
     run = ("mesh", "--levels", 3, "--coarser", 0, "--out", "out")
     done = study(*run, cwd=bubble)
-    result = result_in(bubble / "out")
-    model = result["models"]["bubble"]
+    model = result_in(bubble / "out")["models"]["bubble"]
     counts = [level["elements"] for level in model["levels"]]
     assert counts[2] == 4 * counts[1]
     assert all(level["seconds"] > 0 and level["iterations"] > 0 for level in model["levels"])
@@ -371,8 +369,7 @@ def test_the_form_behind_the_data_is_found(project, tmp_path, drawn, golden):
     in_process(*arguments, cwd=tmp_path, code=2)
     before = (out / "linear" / "starts.jsonl").read_text()
     (out / "result.json").unlink()
-    again = in_process(*arguments, "--resume", cwd=tmp_path)
-    golden("compare", again.stdout, tmp_path)
+    golden("compare", in_process(*arguments, "--resume", cwd=tmp_path).stdout, tmp_path)
     assert (out / "linear" / "starts.jsonl").read_text() == before
     assert result_in(out) == result
 

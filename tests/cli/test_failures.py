@@ -110,8 +110,7 @@ def quick(monkeypatch):
 
 
 def of(text):
-    found = re.escape(text).replace(r"\.\.\.", ".*?")
-    return re.compile(re.sub(r"\bN\b", r"[0-9.]+", found))
+    return re.compile(re.sub(r"\bN\b", r"[0-9.]+", re.escape(text).replace(r"\.\.\.", ".*?")))
 
 
 @pytest.mark.parametrize(

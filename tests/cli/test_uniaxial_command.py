@@ -71,8 +71,7 @@ def write_points(path, law=None):
             if direction == "bias"
             else straight_strip(direction, *lengths, 0.81, increments=10)
         )
-        load = MembraneSolver(1e-10).run(model, law).load
-        rows = zip(model.elongations, load, strict=True)
+        rows = zip(model.elongations, MembraneSolver(1e-10).run(model, law).load, strict=True)
         lines += [f"{direction},{float(u)!r},{float(p)!r}" for u, p in rows]
     path.write_text("\n".join(lines) + "\n")
 
@@ -229,8 +228,7 @@ def together(tmp_path_factory):
     law = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.153, 0.232, 0.883])
     write_points(folder / "points.csv", law)
     options = ("--out", "out", "--starts", 1, "--jobs", 1)
-    done = quick("fit", project_in(folder), *options, cwd=folder)
-    return folder, done.stdout
+    return folder, quick("fit", project_in(folder), *options, cwd=folder).stdout
 
 
 def test_the_law_of_both_is_found(together, golden):
@@ -346,11 +344,9 @@ def folder(tmp_path_factory):
 
 
 def test_the_usual_constants_are_those_of_the_last_cycles(folder, golden):
-    done = in_process("biaxial", "project.toml", cwd=folder)
-    golden("biaxial", done.stdout, folder)
+    golden("biaxial", in_process("biaxial", "project.toml", cwd=folder).stdout, folder)
     out = folder / "out" / f"{folder.name}-biaxial"
-    told = result_in(out)["tests"]["biaxial"]
-    first = told["constants"][0]
+    first = result_in(out)["tests"]["biaxial"]["constants"][0]
     assert first["what"] == "chosen" and first["paths"] == 8
     assert first["E_warp_kN_per_m"] == pytest.approx(800, rel=1e-9)
     assert first["A_warp_fill_kN_per_m"] == pytest.approx(400, rel=1e-9)

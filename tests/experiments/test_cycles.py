@@ -104,13 +104,11 @@ def test_small_cycles_beside_a_large_one_are_found_and_overshoot_is_none():
         np.linspace(204, 52, 30), np.linspace(52, 6680, 40), np.linspace(6680, 25, 40),
     ])  # fmt: skip
     load += np.random.default_rng(1).normal(0, 0.5, len(load))
-    tops = [load[c.peak] for c in find_cycles(load)]
-    assert tops == pytest.approx([330, 204, 6680], abs=3)
+    assert [load[c.peak] for c in find_cycles(load)] == pytest.approx([330, 204, 6680], abs=3)
 
 
 def test_slip_and_drift_are_named(tmp_path):
-    files = faulty(tmp_path)
-    found = cycles(list(files.values()))
+    found = cycles(list(faulty(tmp_path).values()))
     by = {kind: {n.of for n in found.notes if n.kind == kind} for kind in (SLIP, DRIFT)}
     assert by == {SLIP: {"negative.csv", "lost.csv"}, DRIFT: {"drifting.csv"}}
     assert found.histories[1].values[2].loss < 0

@@ -82,8 +82,7 @@ def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, t
         assert name not in kinds() and "bubble" in kinds()
     line = f"the plug-in {name!r} of acme-things 2.5 {words}"
     assert caplog.text.count(line) == 1
-    failure = raised(PlugInFailure, "", kind_named, name)
-    assert str(failure).startswith(line)
+    assert str(raised(PlugInFailure, "", kind_named, name)).startswith(line)
 
 
 def test_a_plug_in_does_not_replace_one_of_ours(packages):

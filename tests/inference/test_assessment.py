@@ -77,8 +77,7 @@ def test_certainty_predicts_the_scatter_of_noisy_fits():
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANT.to_coefficients @ scatter / moduli, rel=0.03)
     assert not predicted.undetermined
-    still = np.zeros_like(point.unknowns)
-    limit = Limit(still, 3 * point.residual, 0 * point.residual)
+    limit = Limit(np.zeros_like(point.unknowns), 3 * point.residual, 0 * point.residual)
     thrice = certainty(fit, point, FLAT_LAW, clean.strain_max, limit)
     assert thrice.sigma["G12"][0] == pytest.approx(3 * sigma[0])
     (words,) = thrice.undetermined
@@ -189,8 +188,7 @@ PLACES = STEP * np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1)
 
 def noise(width, count, seed=3):
     """Fields that are alike over a Gaussian of `width` steps: 4 pi width^2 err as one."""
-    random = np.random.default_rng(seed)
-    fields = random.standard_normal((count, SIDE, SIDE))
+    fields = np.random.default_rng(seed).standard_normal((count, SIDE, SIDE))
     if width:
         fields = np.array([gaussian_filter(field, width, mode="wrap") for field in fields])
     return [field.reshape(-1) for field in fields]

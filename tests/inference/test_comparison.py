@@ -264,8 +264,7 @@ def scattered(count, random):
 
 
 def found(residuals, places=None):
-    count = len(residuals)
-    own = places or [PLACES] * count
+    own = places or [PLACES] * len(residuals)
     return alike_in_all(list(residuals), own, [SLOPES[: len(p)] for p in own], "N")
 
 
@@ -293,8 +292,7 @@ def test_of_three_specimens_it_is_the_square_of_students_t():
 def test_a_wrong_form_is_told():
     random = np.random.default_rng(8)
     bend = 60.0 * ((PLACES / 1.5 - 1.0) ** 2 - 0.4)
-    told = [found(bend + scattered(5, random)).significant for _ in range(100)]
-    assert sum(told) > 70
+    assert sum([found(bend + scattered(5, random)).significant for _ in range(100)]) > 70
     ten = [found(bend + scattered(10, random)) for _ in range(50)]
     assert all(one.significant for one in ten)
     # Without what another modulus would follow.

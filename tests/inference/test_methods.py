@@ -165,8 +165,7 @@ def test_restarts_that_lead_back_end_early_and_change_nothing(monkeypatch, numbe
     assert early.analyses <= late.analyses - 5
     assert early.value == pytest.approx(late.value, rel=1e-6)
     law, other = (LAW.with_beta(end.coefficients) for end in ends)
-    apart = moduli_error(law, other, reference().strain_max)
-    assert max(apart.values()) < 1e-3
+    assert max(moduli_error(law, other, reference().strain_max).values()) < 1e-3
 
 
 def test_reweighting_lowers_e_on_noisy_data():
@@ -363,8 +362,7 @@ def test_the_other_side_tells_the_same_curvature(wrong, monkeypatch):
         return evaluate(*given) if sides[0] else None
 
     monkeypatch.setattr(fit, "evaluate", down_alone)
-    down = second_of(fit, best, noise).added
-    assert down == pytest.approx(up, abs=0.02 * np.abs(up).max())
+    assert second_of(fit, best, noise).added == pytest.approx(up, abs=0.02 * np.abs(up).max())
 
 
 def test_which_order_a_fit_is_of(wrong, monkeypatch):
@@ -416,8 +414,7 @@ def test_no_analysis_is_spent_where_noise_is_left(monkeypatch):
 
 def led(solver):
     fields = solver.membrane.run(replace(MODEL, thickness=1.02 * MODEL.thickness), LAW)
-    objective = FieldObjective(targets(fields.displacement))
-    fit = single(MODEL, solver, LAW, objective, CUBIC)
+    fit = single(MODEL, solver, LAW, FieldObjective(targets(fields.displacement)), CUBIC)
     fit.surrogate = fit.with_solvers([MembraneSolver()])
     return fit
 

@@ -137,8 +137,7 @@ def test_bands_hold_their_share_and_the_law_itself():
     y = np.append(UNKNOWNS.at(np.array([1.0, 250.0, 400.0]))[:3], 0.0)
     posterior = Posterior(UNKNOWNS, y, y, np.diag([0.02, 1e-2, 1e-2, 0.1]) ** 2)
     strains = {name: np.array([0.0, 0.05]) for name in ("E1", "E2", "G12")}
-    law = HypoelasticLaw.linear(400.0, 250.0, 1.0)
-    bands = bands_of(posterior, law, strains)
+    bands = bands_of(posterior, HypoelasticLaw.linear(400.0, 250.0, 1.0), strains)
     sizes = dict(zip(("G12", "E2", "E1"), np.diag(UNKNOWNS.to_coefficients), strict=True))
     for name, value in (("E1", 400.0), ("E2", 250.0)):
         wide = 1.96 * 1e-2 * sizes[name]

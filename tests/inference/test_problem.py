@@ -87,8 +87,7 @@ def test_inequalities_say_what_bounds_and_positivity_say(unknowns):
         coefficients = lower + (upper - lower) * random.uniform(-0.02, 1.02, unknowns.size)
         y = unknowns.at(coefficients)
         y[unknowns.size :] = random.uniform(-21, 21, len(unknowns.nuisance.names))
-        full = unknowns.beta(y)
-        law = HypoelasticLaw(full, 0.24, RANGE)
+        law = HypoelasticLaw(unknowns.beta(y), 0.24, RANGE)
         x = np.linspace(0, 0.13, 31)
         low, high = unknowns.nuisance.bounds
         nuisance = y[unknowns.size :]

@@ -75,8 +75,7 @@ def run(command):
         files.error("could not obtain license: license server is down or has none free")
         return 1, "could not obtain license for MARC"
     try:
-        content = read_deck(Path(f"{command.job}.dat"))
-        solve(content, command, files, fault)
+        solve(read_deck(Path(f"{command.job}.dat")), command, files, fault)
         number = NORMAL
     except DeckError as error:
         where = f" in line {error.line} of the input" if error.line else ""

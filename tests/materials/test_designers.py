@@ -287,8 +287,7 @@ def test_loads_are_forces_over_the_width_before_the_test(change):
     found = biaxial_response(law, loads, T)
     stretch = np.exp(found.strain)
     thickness = T if change == "constant" else T / stretch.prod(axis=1)
-    across = stretch[:, ::-1]
-    force = found.stress * across * np.reshape(thickness, (-1, 1))
+    force = found.stress * stretch[:, ::-1] * np.reshape(thickness, (-1, 1))
     np.testing.assert_allclose(force, loads, rtol=1e-11)
 
 

@@ -123,8 +123,7 @@ def test_what_is_held_stops_every_rigid_motion_and_no_other(symmetry):
     rigid /= np.linalg.norm(rigid, axis=0)
     bottom = 3 * model.mesh.node_sets["support_bottom"] + 1
     fixed = model.mesh.unknowns(model.guides)
-    held = np.union1d(fixed, bottom)
-    assert np.linalg.matrix_rank(rigid[held], tol=1e-6) == 6
+    assert np.linalg.matrix_rank(rigid[np.union1d(fixed, bottom)], tol=1e-6) == 6
     free = rigid[fixed]
     assert np.linalg.matrix_rank(free, tol=1e-6) == 5
     assert np.abs(free[:, 1]).max() == 0

@@ -103,8 +103,7 @@ def test_one_missing_point_at_the_gauge_is_lost_correlation(how, jitter):
 
 def test_what_lies_outside_is_not_extrapolated():
     points = grid()
-    short = points[points[:, 1] < 38]
-    frames = [stretched(points, 1.0, 0.0), stretched(short, 1.1, 0.0)]
+    frames = [stretched(points, 1.0, 0.0), stretched(points[points[:, 1] < 38], 1.1, 0.0)]
     record = virtual_strain_gauge(frames, LOWER, UPPER)
     assert record.lost == (1,) and "outside the correlated points" in record.warnings[0]
     line = Frame(points[points[:, 0] == 12], np.zeros((61, 3)))

@@ -143,8 +143,7 @@ def test_which_frame_is_near_enough():
     ):
         assert complaint(choose_frames, seen, asked, None, tolerance).startswith(words)
     # A millionth of the largest apart is one; more is two.
-    one = choose_frames(np.array([0.1, 0.1 - 0.9e-7, 0.05]))
-    assert one == ((2, 1), {REPEATED: 1})
+    assert choose_frames(np.array([0.1, 0.1 - 0.9e-7, 0.05])) == ((2, 1), {REPEATED: 1})
     assert choose_frames(np.array([0.1, 0.1 - 1.1e-7, 0.05]))[0] == (2, 1, 0)
     seen = np.array([0.010, 0.011, 0.012, 0.060])
     assert choose_frames(seen, count=4)[0] == (0, 1, 2, 3)
@@ -216,8 +215,7 @@ def test_surfaces_that_cannot_be(tmp_path):
 
 
 def test_the_height_of_the_apex():
-    r = np.linspace(0, 1, 2001)
-    up = np.outer(50 * (1 - r), [0.6, 0.0, -0.8])
+    up = np.outer(50 * (1 - np.linspace(0, 1, 2001)), [0.6, 0.0, -0.8])
     up[7] = 900.0
     up[3] = np.nan
     frame = Frame(np.zeros_like(up), up)

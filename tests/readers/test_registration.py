@@ -207,8 +207,7 @@ def elliptic(angle: float, reach: float = 1.0) -> list[Frame]:
     Its shape follows the edge and nothing else: it has no other axes.
     """
     points = grid(7.0, reach)
-    turn = rotation("z", angle)
-    u, v = (points @ turn)[:, :2].T / [[100.0], [70.0]]
+    u, v = (points @ rotation("z", angle))[:, :2].T / [[100.0], [70.0]]
     on = np.clip(1 - u**2 - v**2, 0.0, None)
     kept = (on > 0) | (reach > 1)
     frames = []

@@ -69,8 +69,7 @@ def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
     assert "'csv'" not in complaint(read_frames, [path], format="csv")
     assert format_of("machine table", path).name == "text"
     register_format(starred("other"))
-    message = complaint(read_frames, [path])
-    assert f"{path}: the format may be 'other' or 'starred'" in message
+    assert f"{path}: the format may be 'other' or 'starred'" in complaint(read_frames, [path])
     assert len(read_frames([path], format="other")) == 1
     twice = Format("twice", "frame", "two", lambda *a: read_starred(*a) * 2)
     register_format(twice)

@@ -41,8 +41,7 @@ def on_a_disk(count: int, seed: int, radius: float = 100.0) -> np.ndarray:
 
 
 def test_coefficients_stand_in_the_order_of_equation_4_4():
-    random = np.random.default_rng(4)
-    c = random.standard_normal((3, 25))
+    c = np.random.default_rng(4).standard_normal((3, 25))
     points = on_a_disk(300, 1, radius=1.5)
     u = np.stack([equation_4_4(row, *points.T) for row in c], axis=1)
     surface = fit_surface(DisplacementField(0.3, points, u), 4)
@@ -59,8 +58,7 @@ def test_coefficients_stand_in_the_order_of_equation_4_4():
     radius=st.sampled_from([1e-2, 1.0, 100.0, 1e4]),
 )
 def test_a_polynomial_of_the_degree_is_met_exactly(degree, extra, seed, radius):
-    random = np.random.default_rng(seed)
-    terms = random.standard_normal((3, degree + 1, degree + 1))
+    terms = np.random.default_rng(seed).standard_normal((3, degree + 1, degree + 1))
 
     def exact(points):
         return np.polynomial.polynomial.polyval2d(*(points / radius).T, terms.transpose(1, 2, 0)).T

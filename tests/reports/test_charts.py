@@ -319,8 +319,7 @@ def test_the_page(full, tmp_path):
 
 def test_a_picture_that_is_not_there_is_named(tmp_path):
     (tmp_path / "out").mkdir()
-    outside = drawn(tmp_path)
-    names = ["lost.png", "../figures/sorted optima.png", str(outside)]
+    names = ["lost.png", "../figures/sorted optima.png", str(drawn(tmp_path))]
     report = Report("x", sections=[Section("s", [Picture(n, "Fig") for n in names])])
     page = write_report(tmp_path / "out", report).read_text()
     assert "<img" not in page

@@ -244,8 +244,7 @@ def test_loads_and_what_the_models_miss():
     assert shown(low)[:2] == ("gauge elongation, mm", "difference, N")
     names = ["load polynomial", "measured", "Table 3.2", "bubble", "scatter of specimens (±)"]
     assert legend(charts) == names
-    other = strip(models=[("bubble", U, 95 * U)], rms=())
-    drawn = load_charts("l", [strip(), other]).charts
+    drawn = load_charts("l", [strip(), strip(models=[("bubble", U, 95 * U)], rms=())]).charts
     assert len({named(chart)["bubble"].colour for chart in drawn}) == 1
 
 
@@ -253,8 +252,7 @@ def draw_strip(shear):
     mesh = strip_mesh(4.0, 8.0, 4, 8, 3.0)
     u = np.zeros_like(mesh.points)
     u[:, 1] = 0.5 * (mesh.points[:, 1] - 8.0)
-    gauge = mesh.node_sets["gauge"]
-    return strips.strip_charts(mesh.points, mesh.quads, u, shear, gauge)
+    return strips.strip_charts(mesh.points, mesh.quads, u, shear, mesh.node_sets["gauge"])
 
 
 def test_deformed_strip():
@@ -286,8 +284,7 @@ def test_orders():
     orders, rmse = [1, 2, 3, 4, 5], [70.0, 60.0, 30.0, 21.0, 20.0]
     left = order_chart("warp", orders, rmse, [72.0, 64.0, 33.0, 23.0, 800.0], 4)
     right = order_chart("fill", orders, rmse, rmse, 2)
-    charts = Charts("orders", [left, right], "")
-    check_charts(charts)
+    check_charts(Charts("orders", [left, right], ""))
     assert (left.log_y, right.log_y) == (True, False)
     assert (left.title, right.title) == ("warp: order 4", "fill: order 2")
     assert shown(left)[:2] == ("order of the polynomial", "error of the load, N")

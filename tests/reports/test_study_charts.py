@@ -103,8 +103,7 @@ def test_nu12():
     assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
     first, _, shear = others.charts
     assert [s.y for s in first.series] == [[90, 100, 110], [100], [50, 60, 70], [60], [9, 9, 9]]
-    bars = [(s.lower, s.upper) for s in first.series[1:4:2]]
-    assert bars == [([90], [110]), ([57], [63])]
+    assert [(s.lower, s.upper) for s in first.series[1:4:2]] == [([90], [110]), ([57], [63])]
     assert first.series[1].x == [1.0] and [s.y for s in shear.series] == 3 * [[0.01, 0.02, 0.03]]
     assert first.log_x and first.x_label == "weight of strip, times that of the project"
 

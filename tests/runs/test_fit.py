@@ -151,8 +151,7 @@ def maps_and_surface_say_what_the_table_says(fit, folder):
 
 
 def test_two_bubbles_with_offsets_of_their_own(tmp_path):
-    project = bf.read_project(small(tmp_path, ("[fit]", SECOND)))
-    fit = bf.fit(project, starts=1, jobs=1)
+    fit = bf.fit(bf.read_project(small(tmp_path, ("[fit]", SECOND))), starts=1, jobs=1)
     assert list(fit.findings) == ["bubble 1", "softer reading"]
     assert fit.objective < 1e-5
     assert fit.tests["bubble 1"].nuisance == {}
@@ -310,8 +309,7 @@ def test_a_step_keeps_the_moduli_positive(tmp_path):
     around, laws = laws_around(card(np.array([[-30.0, 0, 0], [-15.0, 0, 0]])), None)
     assert around.steps == [-1.0, 1.0]
     assert [float(law.G12(0.0)) for law in laws] == pytest.approx([50.0, 5.0])
-    torn = card(np.array([[-300.0, 1000.0, 0], [300.0, 0, 0]]))
-    around, laws = laws_around(torn, None)
+    around, laws = laws_around(card(np.array([[-300.0, 1000.0, 0], [300.0, 0, 0]])), None)
     assert all(float(law.E2(0.0)) > 0 and float(law.G12(0.0)) > 0 for law in laws)
     hopeless = card(np.array([[-3000.0, 2e5, 0]]))
     with pytest.raises(InputError, match="card 'sure': a modulus is not positive next to"):
@@ -365,8 +363,7 @@ def test_what_is_shared_stands_before_each_comparisons_own(tmp_path):
     ]
     assert thickness.weight == pytest.approx(np.median(weights))
     # The start of every comparison's model is its own thickness.
-    y = problem.unknowns.at(np.array([10.0, 200.0, 300.0]))
-    assert y[3:].tolist() == [0.0, 0.8]
+    assert problem.unknowns.at(np.array([10.0, 200.0, 300.0]))[3:].tolist() == [0.0, 0.8]
 
 
 def test_thickness_is_in_the_units_of_the_file(tmp_path):

@@ -47,8 +47,7 @@ def test_twelve_lines_from_arrays_to_moduli(camera, monkeypatch):
     script = ROOT / "tests" / "typed" / "first_fit.py"
     assert len(script.read_text().splitlines()) <= 12
     monkeypatch.chdir(camera.parent)
-    found = runpy.run_path(str(script))
-    at_rest = found["moduli"].query("strain == 0").set_index("modulus")
+    at_rest = runpy.run_path(str(script))["moduli"].query("strain == 0").set_index("modulus")
     assert at_rest["MPa"].loc[["E1", "E2"]].tolist() == pytest.approx(
         [400.0, 200.0], rel=0.06
     )  # 48 quads
@@ -117,8 +116,7 @@ def test_the_wrong_argument_is_named(arrays, change, argument, words):
 
 def test_what_only_a_project_can_say_names_the_argument_too(arrays):
     def complaint(*tests, law="constant", **more):
-        caught = refused(bf.fit, tests, bf.Law(law), fabric=FABRIC, starts=1, **more)
-        return caught
+        return refused(bf.fit, tests, bf.Law(law), fabric=FABRIC, starts=1, **more)
 
     odd = bf.Bubble(**arrays, radius=100.0, symmetry="quarter", sheet=bf.Sheet(modes=2))
     error = complaint(odd)

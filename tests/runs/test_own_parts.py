@@ -288,8 +288,7 @@ def test_among_several_tests_a_function_weighs_as_the_built_in_objective(tmp_pat
     assert twice.evaluate(y, False).value == pytest.approx(first.value, rel=1e-12)
     refused(project.with_objective, "three", np.subtract)
     changing = project.with_objective("one", lambda m, d: np.resize(m - d, 3 if m.any() else 4))
-    error = refused(set_up(changing).problem)
-    assert error.field == "objective"
+    assert refused(set_up(changing).problem).field == "objective"
     cruciform = read_project(EXAMPLES / "biaxial-computed" / "project.toml")
     with pytest.raises(InputError, match="biaxial tests have an objective of their own"):
         set_up(cruciform.with_objective("biaxial", np.subtract)).problem()
@@ -337,8 +336,7 @@ def with_torsion(project, times=1.0):
 
 def test_a_test_of_ones_own_is_fitted_beside_a_bubble(tmp_path):
     heard = []
-    alone = easy(tmp_path, starts=1)
-    fit = bf.fit(with_torsion(alone), jobs=1, progress=heard.append)
+    fit = bf.fit(with_torsion(easy(tmp_path, starts=1)), jobs=1, progress=heard.append)
     g12, known = (law.G12(SHEAR) for law in (fit.law, fit.setup.tests[0].known))
     assert np.abs(g12[2:] / known[2:] - 1).max() < 0.06
     sure = {name: own["G12"].max() for name, own in fit.pinned.items()}

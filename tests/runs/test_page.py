@@ -398,8 +398,7 @@ LEAST = {"E1": 5.0, "E2": 6.0, "G12": 0.5}
 
 def test_expected_moduli_of_bounds():
     def expected(bounds):
-        setup = SimpleNamespace(bounds=bounds, law=LAW)
-        return dict(expected_of(setup).moduli)
+        return dict(expected_of(SimpleNamespace(bounds=bounds, law=LAW)).moduli)
 
     ranges = {"E1": (20.0, 2000.0), "E2": (20.0, 1000.0), "G12": (0.5, 200.0)}
     assert expected(LawBounds.of_moduli(ranges)) == ranges

@@ -236,8 +236,7 @@ def test_tests_have_names_and_are_chosen_by_name_or_kind(edit):
 
 def test_defaults_hold_for_every_test_that_says_nothing_else(edit):
     text = "[defaults.bubble]\nelements = 48\nnuisance = { pressure_offset = true }\n"
-    project = edit("[fit]", SECOND + text + "[fit]")
-    one, two = project.tests.values()
+    one, two = edit("[fit]", SECOND + text + "[fit]").tests.values()
     assert (one.elements, two.elements) == (800, 48)
     assert (one.pressure_offset, two.pressure_offset) == (False, True)
 

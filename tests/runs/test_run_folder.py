@@ -279,8 +279,7 @@ def test_start_records_survive_json(value, unknowns, status):
 def test_resume_keeps_finished_starts_and_drops_the_unfinished(tmp_path):
     study(tmp_path)
     folder = Folder(tmp_path)
-    done = begin(folder, resume=True)
-    assert done == {0: finished(0), 1: finished(1)}
+    assert begin(folder, resume=True) == {0: finished(0), 1: finished(1)}
     assert {r["start"] for r in rows(tmp_path)} == {"0", "1"}
     folder.add(evaluation(2, 1))
     folder.add(finished(2))

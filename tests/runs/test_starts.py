@@ -155,8 +155,7 @@ def test_one_start_of_an_optimum_goes_on_to_the_full_mesh(fitted):
     assert all(r.analyses == r.coarse_analyses for r in others)
     assert [r.status for r in others] == ["as start 0"] * (STARTS - 1)
     assert len(fitted.laws) == 1
-    error = fitted.result["moduli_error"]
-    assert max(error.values()) < 1e-3
+    assert max(fitted.result["moduli_error"].values()) < 1e-3
 
 
 def when_it_is(mesh, analyses):
@@ -209,11 +208,9 @@ def test_the_same_data_on_larger_quads(fitted):
     assert few.model.increments == many.model.increments
     with pytest.raises(InputError, match="12 quads are too few for a disk"):
         setup.tests[0].finer(lambda name=None: None, Weighting(), 0.25)
-    y = full.unknowns.at(fitted.law.beta[list(full.unknowns.free)])
-    point = coarse.evaluate(y, True)
+    point = coarse.evaluate(full.unknowns.at(fitted.law.beta[list(full.unknowns.free)]), True)
     assert point is not None and point.jacobian.shape == (len(full.scale), 3)
-    off = np.abs(point.residual * full.scale)
-    assert 1e-3 < off.max() < 2.0  # mm, of an apex of 20 mm
+    assert 1e-3 < np.abs(point.residual * full.scale).max() < 2.0  # mm, of an apex of 20 mm
 
 
 def ended(fit, number, value, moduli=(80.0, 400.0, 800.0)):
@@ -237,8 +234,7 @@ def test_optima_are_told_apart_by_moduli_and_by_what_they_leave(fitted):
         ended(fitted, 5, None),
         ended(fitted, 6, None),
     ]
-    groups = distinct(fitted.problem, records, 1e-7)
-    assert numbers(groups) == [[1, 4], [2], [3], [5], [6]]
+    assert numbers(distinct(fitted.problem, records, 1e-7)) == [[1, 4], [2], [3], [5], [6]]
     # Below the tolerance nothing that is left tells them apart.
     fine = [ended(fitted, 0, 1e-9), ended(fitted, 1, 9e-8)]
     assert numbers(distinct(fitted.problem, fine, 1e-7)) == [[0, 1]]
@@ -371,8 +367,7 @@ def test_what_the_mesh_leaves_is_no_noise(off):
     (test,) = off.setup.tests
     finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
     limit = limit_of(problem, best, residual_of(problem, finer, best, off.law), 2.0)
-    after = float(np.sqrt(np.mean((limit.residual * problem.scale) ** 2)))
-    assert after < 0.5 * before
+    assert float(np.sqrt(np.mean((limit.residual * problem.scale) ** 2))) < 0.5 * before
     with pytest.raises(SolverFailure, match="does not give what was matched"):
         residual_of(problem, problem.comparisons * 2, best, off.law)
 

@@ -344,8 +344,7 @@ def test_a_linear_modulus_has_the_ends_of_its_sigma(project):
     assert one.below.why == one.above.why == BOUND
     assert one.allowed == pytest.approx((5.0, 200.0), rel=1e-6)
     assert [one.below.values[-1], one.above.values[-1]] == pytest.approx([5.0, 200.0], rel=1e-6)
-    kinds = [note.kind for note in found.notes]
-    assert kinds == [NOT_THE_CARD, NOT_CLOSED, NOT_CLOSED]
+    assert [note.kind for note in found.notes] == [NOT_THE_CARD, NOT_CLOSED, NOT_CLOSED]
     assert "moved E1 by -8.3 %" in found.notes[0] and "5 MPa" in found.notes[1]
 
 

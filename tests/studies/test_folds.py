@@ -45,8 +45,7 @@ def off_by(modulus, true):
 
 
 def test_a_fold_errs_by_what_the_specimens_differ_by(project):
-    setup = set_up(project, "one")
-    found = compare.errors_of_folds(setup, 5, 1)
+    found = compare.errors_of_folds(set_up(project, "one"), 5, 1)
     assert [fold.fold for fold in found] == [0, 1]
     expected = {f"one: {name}": off_by(*both)[0] for name, both in MODULI["one"].items()}
     for fold in found:

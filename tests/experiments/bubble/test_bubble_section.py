@@ -71,8 +71,7 @@ def test_units_of_the_file_do_not_matter(edit):
 def test_an_ellipse_in_place_of_the_radius(edit):
     p = bubble(edit("radius = 100.0", "ellipse = { major = 120, minor = 80, angle = 90 }"))
     assert (p.outline.major, p.outline.minor, p.outline.angle) == (120.0, 80.0, 90.0)
-    mesh = p.model().mesh
-    np.testing.assert_allclose(mesh.points.max(axis=0), (80.0, 120.0, 0.0))
+    np.testing.assert_allclose(p.model().mesh.points.max(axis=0), (80.0, 120.0, 0.0))
     assert str(p.settings()) != str(bubble(read_project(KNOWN)).settings())
 
 
@@ -334,8 +333,7 @@ def test_times_of_frames(tmp_path):
     ],
 )  # fmt: skip
 def test_times_that_cannot_be_had(tmp_path, said, words):
-    found = complaint(times, tmp_path, **said)
-    assert found.removeprefix(f"{tmp_path}/").startswith(words)
+    assert complaint(times, tmp_path, **said).removeprefix(f"{tmp_path}/").startswith(words)
 
 
 class Other(MembraneSolver):

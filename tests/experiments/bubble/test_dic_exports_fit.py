@@ -226,8 +226,7 @@ def test_a_fit_begins_where_the_fields_are_symmetric_and_rise():
     points, seen = camera()
     bubble = bf.Bubble(points, seen, PRESSURES, radius=100.0, elements=300, noise=NOISE,
                        nuisance={"registration": "fitted"})  # fmt: skip
-    project = bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81))
-    setup = set_up(project)
+    setup = set_up(bf.Project.of([bubble], LAW, fabric=bf.Fabric("turned", 0.81)))
     unknowns = setup.problem().unknowns
     begin = dict(zip(unknowns.nuisance.names, unknowns.nuisance.begin, strict=True))
     assert begin["turn"] == pytest.approx(YARNS_TURN, abs=1.5)

@@ -190,8 +190,7 @@ def test_priors_are_a_block_of_their_own(tmp_path):
     y[-5:] = 1.0, -2.0, 0.5, 0.05, 0.1
     point = problem.evaluate(y, True, warm=False)
     # 0.5 mm against sqrt(points / 20) of it.
-    points = len(disk_mesh(100.0, 112).points)
-    weight = 0.5 * np.sqrt(20 / points)
+    weight = 0.5 * np.sqrt(20 / len(disk_mesh(100.0, 112).points))
     expected = weight * np.array([0.5, -1.0, 0.25, 0.5, 1.0])
     np.testing.assert_allclose(point.residual[-5:], expected)
     assert problem.blocks.norms(point.residual)[-1] == pytest.approx(np.linalg.norm(expected))

@@ -230,8 +230,7 @@ def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
     banded, tmp_path, drawn, monkeypatch
 ):
     shown = dict(report.draw_figures(banded, Output(tmp_path)))
-    panel = drawn["saved"][0][1][0]
-    soft, hard = panel.lines
+    soft, hard = drawn["saved"][0][1][0].lines
     np.testing.assert_array_equal([soft.deflection, soft.load], [WAY, LOAD])
     assert hard.other is None
     np.testing.assert_array_equal(soft.other, [WAY, 1.5 * LOAD])

@@ -275,8 +275,7 @@ def test_the_modulus_at_rest_of_a_file_with_crosshead_and_extensometer(small, tm
 
 def test_rows_after_failure_are_cut_where_asked(small, tmp_path):
     u = np.linspace(0, 4, 21)
-    load = np.where(u < 3.5, 200.0 * u, 20.0)
-    (tmp_path / "w1.csv").write_text(HEAD + rows(",", u, load))
+    (tmp_path / "w1.csv").write_text(HEAD + rows(",", u, np.where(u < 3.5, 200.0 * u, 20.0)))
     one = ('["w1.csv", "w2.csv"]', '["w1.csv"]')
     assert len(small(one).strips["warp"].points[0]) == 21
     said = ("[data]", "[data]\nuntil_largest_load = true")

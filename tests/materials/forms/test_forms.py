@@ -277,8 +277,7 @@ def test_the_mean_is_the_integral_over_the_increment(form, name, x, x_old):
     room = 1e-3 * moduli.max()
     assert moduli.min() - room <= mean <= moduli.max() + room
     # d(stress)/d(strain) is the modulus at the end of the increment.
-    end = float(law.modulus(name, x))
-    assert mean + (x - x_old) * ahead == pytest.approx(end, rel=1e-9)
+    assert mean + (x - x_old) * ahead == pytest.approx(float(law.modulus(name, x)), rel=1e-9)
     assume(x_old not in turning_points(law, name))  # there it may jump, and the way tells
     start = float(law.modulus(name, x_old))
     assert mean - (x - x_old) * behind == pytest.approx(start, rel=1e-9)
@@ -288,8 +287,7 @@ def test_the_mean_is_the_integral_over_the_increment(form, name, x, x_old):
 @given(forms, names, strains, strains)
 def test_derivatives_against_finite_differences(form, name, x, x_old):
     law, step = OF_STRAIN[form], 1e-6
-    near = turning_points(law, name)
-    assume(np.abs(np.subtract.outer([x, x_old], near)).min() > 2 * step)
+    assume(np.abs(np.subtract.outer([x, x_old], turning_points(law, name))).min() > 2 * step)
     assume(abs(x - x_old) > 1e-3)
     _, *slopes = mean_of(form, name, x, x_old)
     size = 1e-5 * float(law.pieces[COMPONENTS[name], 0, 4]) / abs(x - x_old)

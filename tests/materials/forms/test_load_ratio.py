@@ -69,8 +69,7 @@ def test_ratios_are_of_tension_and_go_on_where_yarns_are_pressed():
     # Both pressed: the one that is pressed less is that which carries; no jump on the way there.
     assert load_angle(-1.0, -3.0)[0] == pytest.approx(np.arctan2(1.0, 3.0))
     turn = np.linspace(0.0, 2 * np.pi, 4001)[1:-1]
-    way = [load_angle(np.cos(t), np.sin(t))[0] for t in turn]
-    assert np.abs(np.diff(way)).max() < 2e-3
+    assert np.abs(np.diff([load_angle(np.cos(t), np.sin(t))[0] for t in turn])).max() < 2e-3
 
 
 @pytest.mark.parametrize("stress", [(3.0, 1.0), (-1.0, -3.0), (2.0, -1.0)])
@@ -202,8 +201,7 @@ def test_strain_is_that_of_the_yarns_and_of_their_slopes(warp, fill, increments)
     strain = np.array([*(compliance @ stress + lengthened(stress)), 0.0])
     way = np.outer(np.linspace(0.0, 1.0, increments + 1), strain)
     way[1:-1] += np.random.default_rng(increments).normal(0.0, 0.01, (increments - 1, 3))
-    found = follow(crimped(STIFF), way)
-    np.testing.assert_allclose(found[:2], stress, atol=1e-8)
+    np.testing.assert_allclose(follow(crimped(STIFF), way)[:2], stress, atol=1e-8)
 
 
 def test_a_yarn_pulled_alone_gains_what_it_has_and_two_stiffen_each_other():
@@ -242,8 +240,7 @@ def test_the_crimp_of_a_closed_path_of_stress_returns():
 
 
 def test_cards_bounds_and_what_has_no_crimp(tmp_path):
-    card = MaterialCard(crimped(), 0.8, "crimp")
-    card.write(tmp_path / "card.toml", "MPa")
+    MaterialCard(crimped(), 0.8, "crimp").write(tmp_path / "card.toml", "MPa")
     back = read_card(tmp_path / "card.toml").law
     assert back.form == FORM and positive(back) and back.of_load_ratio
     assert not positive(crimped([*CRIMP[:-3], -1.5, 2.5, 12.0]))

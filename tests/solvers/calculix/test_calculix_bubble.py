@@ -121,8 +121,7 @@ def test_steep_shells_are_named():
     model = uneven(432, (0.022,))
     shells = without_stress(shell_mesh(model.mesh, "S8R"), model)
     assert not tilt_remarks(shells) and not tilt_remarks(shell_mesh(bubble(64).mesh, "S4"))
-    steep = replace(shells, points=shells.points * [1, 1, 2])
-    (words,) = tilt_remarks(steep)
+    (words,) = tilt_remarks(replace(shells, points=shells.points * [1, 1, 2]))
     assert re.search(r"slopes of up to 0\.(18|19) lower .* up to (6|7)\.\d %", words), words
 
 
@@ -248,8 +247,7 @@ def context(**changes):
 )
 def test_a_template_error_names_template_line_and_variable(tmp_path, text, where, what):
     (tmp_path / "bubble.inp.j2").write_text(text)
-    found = refused(render, "calculix", "bubble.inp.j2", context(), tmp_path)
-    message = str(found)
+    message = str(refused(render, "calculix", "bubble.inp.j2", context(), tmp_path))
     assert str(tmp_path / "bubble.inp.j2") in message
     assert where in message and what in message
     assert "\n" not in message

@@ -163,8 +163,7 @@ def test_the_deck(name, angle):
     coarse = model(name, 5)
     shells = shell_mesh(coarse.mesh, "S8R")
     pulls = np.array([1.0, 2.0, 3.0, 4.0, 5.1])
-    files = sheets.strip_decks(coarse, LAW, shells, "S8R", pulls)
-    lines = files["job.inp"].splitlines()
+    lines = sheets.strip_decks(coarse, LAW, shells, "S8R", pulls)["job.inp"].splitlines()
     constants = ", ".join(lines[lines.index("*USER MATERIAL, CONSTANTS=9") + 1 :][:2]).split(", ")
     assert float(constants[4]) == pytest.approx(angle, abs=1e-12)
     assert float(constants[6]) == 1

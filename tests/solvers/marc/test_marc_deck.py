@@ -523,8 +523,7 @@ def test_moduli_that_are_not_positive_or_on_no_curve_have_no_law(read):
         "on no cubics": first(r"(  5.0{11}\dE-03 )( 8)\.0", DECKS["bubble"], r"\1\2.1"),
     }
     for match, text in spoiled.items():
-        content = read(text)
-        raised(DeckError, match, law_of_tables, content)
+        raised(DeckError, match, law_of_tables, read(text))
 
 
 def test_the_parser_shares_no_code_with_what_writes_decks():

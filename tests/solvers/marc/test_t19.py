@@ -149,8 +149,7 @@ def test_what_is_damaged_is_named(tmp_path, old, new, match):
     assert old in text
     path = tmp_path / "job.t19"
     path.write_text(text.replace(old, new, 1))
-    found = raised(InputError, match, read, path)
-    assert str(path) in str(found)
+    assert str(path) in str(raised(InputError, match, read, path))
     assert "cannot be read" in complaint(T19File, tmp_path / "none.t19")
 
 

@@ -112,8 +112,7 @@ def test_wall_and_cords_share_the_thrust_of_the_pressure(symmetry):
 
 
 def ring_area(at, symmetry):
-    order = np.argsort(np.arctan2(at[:, 0], -at[:, 1]))
-    x, y = at[order, :2].T
+    x, y = at[np.argsort(np.arctan2(at[:, 0], -at[:, 1])), :2].T
     area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
     return 2 * area if symmetry == "quarter" else area
 

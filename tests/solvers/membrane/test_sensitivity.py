@@ -177,8 +177,7 @@ def test_a_bubble_that_is_stable_at_the_last_pressure_and_not_before():
     assert history.unstable == differentiated.unstable == ("22 kPa", "59 kPa")
     assert history.stable is False
     assert instability(history.unstable) == "unstable equilibrium at 22 kPa, 59 kPa"
-    last = replace(LOOSE, pressures=(0.251, 0.3))
-    assert MembraneSolver().run(last, EVEN).unstable == ()
+    assert MembraneSolver().run(replace(LOOSE, pressures=(0.251, 0.3)), EVEN).unstable == ()
     places = named(np.arange(1.0, 6.0), "mm")
     assert instability(places[:3]).endswith("at 1 mm, 2 mm, 3 mm")
     assert "at 5 of the reported loads, from 1 mm to 5 mm" in instability(places)
