@@ -6,9 +6,10 @@ python docs/make_own_strips.py FOLDER [DATA]   # DATA: the folder with strips_di
 from __future__ import annotations
 
 import csv
-import subprocess
 import sys
 from pathlib import Path
+
+from make_own_bubble import run
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 DEGREES = {"0": "warp", "90": "fill", "45": "bias"}
@@ -25,18 +26,8 @@ CHANGES = (
 
 def write(folder: Path, data: Path = DATA) -> Path:
     """Write the project that `init --own` writes, with the changes of the document; its path."""
-    arguments = [
-        "init",
-        str(folder),
-        "--own",
-        "--strips",
-        "1",
-        "--bubble",
-        "0",
-        "--thickness",
-        "0.17",
-    ]
-    subprocess.run([sys.executable, "-m", "bubblefit", *arguments], check=True)
+    tests = "--own", "--strips", "1", "--bubble", "0", "--thickness", "0.17"
+    run(Path(), "init", str(folder), *tests)
     with open(data / "strips_directions" / "strips.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     (folder / "data").mkdir()
@@ -55,8 +46,8 @@ def write(folder: Path, data: Path = DATA) -> Path:
 
 def main() -> None:
     project = str(write(Path(sys.argv[1]), *map(Path, sys.argv[2:])))
-    for command in (["check", project], ["fit", project, "--starts", "3", "--jobs", "2"]):
-        subprocess.run([sys.executable, "-m", "bubblefit", *command], check=True)
+    run(Path(), "check", project)
+    run(Path(), "fit", project, "--starts", "3", "--jobs", "2")
 
 
 if __name__ == "__main__":

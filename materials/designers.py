@@ -12,6 +12,7 @@ regression lines over the larger load; constants have the least squares of strai
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Literal, Self
@@ -187,16 +188,13 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
     return Evaluation(options, constants, count, squares, rms)
 
 
-def evaluate_or_none(paths: Sequence[LinearPath], options: Options) -> Evaluation | None:
-    try:
-        return evaluate(paths, options)
-    except InputError:
-        return None
-
-
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
-    others = (evaluate_or_none(paths, o) for o in every_option(paths) if o != options)
-    return [one for one in others if one is not None]
+    """Return the evaluations by all other options that the paths settle."""
+    found = []
+    for other in every_option(paths):
+        with suppress(InputError):
+            found += [evaluate(paths, other)] if other != options else []
+    return found
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:

@@ -6,6 +6,7 @@ after the last one, less that of the first row, under the prestress: known at th
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -126,13 +127,11 @@ def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation |
     section, data = test.section, test.data
     ratios = [path.ratio for path in data.paths]
     paths = evaluated_paths(data.tables, data.cycles, which, section.conditioning, ratios)
-    if section.range is not None:
-        try:
+    with suppress(InputError):
+        if section.range is not None:
             paths = [path.between(*section.range) for path in paths]
-        except InputError:
-            return None
-    lines = [line_of(path.ratio, path.load, path.since) for path in paths]
-    return designers.evaluate_or_none(lines, options)
+        return designers.evaluate([line_of(p.ratio, p.load, p.since) for p in paths], options)
+    return None
 
 
 CONVENTION = (

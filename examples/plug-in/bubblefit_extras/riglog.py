@@ -25,12 +25,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
-    """The table; which column means what, and its units, bubblefit finds out by itself.
-
-    Raises
-    ------
-    InputError : naming file and line.
-    """
+    """The table; bubblefit finds its quantities and units by itself. InputError names the line."""
     lines = read_lines(path, comment="")
     channels = [(n, text.split()) for n, text in lines if text.startswith("channel ")]
     if not channels or any(len(words) != 3 for _, words in channels):

@@ -22,12 +22,7 @@ ENDS = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0])
 
 @dataclass(frozen=True)
 class Saturating:
-    """Moduli at rest and far away: G12, then E2, then E1.
-
-    Parameters
-    ----------
-    scale : the strain s of eps1, of eps2 and of gamma12.
-    """
+    """Moduli at rest and far away: G12, then E2, then E1; scale: s of eps1, eps2, gamma12."""
 
     scale: tuple[float, float, float]
 
@@ -91,8 +86,6 @@ def _share_at_rest(scale: float) -> Array:
 def make(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Saturating:
     """The form of the setting scale = { warp = ..., fill = ..., shear = ... }.
 
-    Raises
-    ------
     InputError : a direction without a strain above zero.
     """
     given = settings.get("scale")
