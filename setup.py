@@ -45,7 +45,10 @@ class Modules(build_py):
     def made(self, *arguments):
         """Run Python on the modules that are built; return the last line that it prints."""
         python = [sys.executable, *arguments]
-        path = {"PYTHONPATH": os.path.abspath(self.build_lib)}
+        # pip names its isolated environment by this variable, too.
+        before = os.environ.get("PYTHONPATH")
+        paths = [os.path.abspath(self.build_lib), *([before] if before else [])]
+        path = {"PYTHONPATH": os.pathsep.join(paths)}
         done = subprocess.run(python, env=os.environ | path, capture_output=True, text=True)
         return done.stdout.strip().rpartition("\n")[2] if done.returncode == 0 else ""
 
