@@ -234,9 +234,8 @@ def bars(patch: pytest.MonkeyPatch, says: Sequence[str] = (), **fails: Any) -> b
 def notes_of_simulation(folder: Path, patch: pytest.MonkeyPatch) -> list[Note]:
     """A thick card that is valid nowhere, and one whose bar breaks."""
     project = bars(patch, law_fails=lambda law: law.nu12 == 0.3)
-    short = replace(LAW, strain_range=np.array([0.05, 1.0, 1.0]))
     cards = {
-        "thick": MaterialCard(short, 1.0),
+        "thick": MaterialCard(replace(LAW, strain_range=np.array([0.05, 1.0, 1.0])), 1.0),
         "stiff": MaterialCard(HypoelasticLaw.linear(600.0, 120.0, 15.0, nu12=0.3), 0.5),
     }
     done = simulate_cards(project, [BarTest("a bar")], cards, folder / "out")

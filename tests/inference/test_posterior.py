@@ -263,8 +263,7 @@ def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
         point = own.evaluate(np.array([held, *others]), False)
         return np.inf if point is None else float(point.residual @ point.residual)
 
-    start = best.unknowns[1:]
-    found = minimize(squares, start, method="Nelder-Mead",
+    found = minimize(squares, best.unknowns[1:], method="Nelder-Mead",
                      options={"xatol": 1e-5, "fatol": 1e-3, "maxfev": 60})  # fmt: skip
     seen = own.seen(best).residual
     assert found.fun - seen @ seen == pytest.approx(ratio, abs=0.03)

@@ -173,8 +173,7 @@ def test_derivatives_by_the_solver_or_a_surrogate(together):
     again = best_fit(problem, together.best.records, 0.0)
     assert again.differentiated is again.point and again.point.jacobian is not None
     assert again.certainty is None
-    sure = with_certainty(together.setup, problem, again).certainty
-    for name, sigma in sure.sigma.items():
+    for name, sigma in with_certainty(together.setup, problem, again).certainty.sigma.items():
         np.testing.assert_allclose(sigma, known.sigma[name], rtol=1e-12)
     problem.surrogate = together.setup.problem()
     again = best_fit(problem, together.best.records, 0.0)

@@ -72,10 +72,9 @@ def test_numbers_alone_come_back_to_the_last_digit(cache):
         more: str = ""
 
     plain = history()
-    objects = np.array([{}, None], dtype=object)
     bad = [
         replace(plain, load=np.array([1.0, np.nan])),
-        replace(plain, displacement=objects),
+        replace(plain, displacement=np.array([{}, None], dtype=object)),
         Own(plain.load, plain.displacement, plain.strain_min, plain.strain_max),
     ]
     for one in bad:

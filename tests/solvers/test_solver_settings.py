@@ -71,8 +71,7 @@ def test_the_command_line_takes_the_place_of_a_setting(tmp_path, monkeypatch):
     options = solver_settings(PROJECT, {"calculix": {"element": "S4", "threads": 3}})["calculix"]
     given = {"ccx": None, "marc": None, "element": "S8R"}
     settings = ("timeout=60", "scratch=runs", 'ccx = "my ccx"')
-    found = overridden("calculix", options, given, settings)
-    assert found == {
+    assert overridden("calculix", options, given, settings) == {
         **options, "element": "S8R", "timeout": 60.0, "scratch": tmp_path / "runs", "ccx": "my ccx"
     }  # fmt: skip
     assert overridden("acme", {"a": 1}, {"ccx": None}, ("b=[1, 2]", "c=text")) == {

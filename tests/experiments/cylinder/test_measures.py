@@ -71,8 +71,7 @@ def test_a_bilinear_curve():
     # Everything a tenth: the same curve, read at places a tenth as far.
     small = knee_point(0.1 * WAY, load, 40.0, 0.1 * OVER)
     assert small == pytest.approx((0.1 * place, force))
-    places = curve_reading(15.0).places
-    assert places == pytest.approx(
+    assert curve_reading(15.0).places == pytest.approx(
         {"0.25 diameters": 3.75, "0.5 diameters": 7.5, "1 diameters": 15.0}
     )
 

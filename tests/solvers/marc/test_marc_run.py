@@ -115,8 +115,7 @@ def test_the_subroutine_goes_along(fake, good):
                   arguments=["-q", "long"], environment={"MARC_X": "1"})  # fmt: skip
     solver.run(model(), LAW)
     assert "subroutine hypela2" in (folder / "hypela2.f").read_text()
-    words = (folder / "words").read_text()
-    assert words.split() == (
+    assert (folder / "words").read_text().split() == (
         "-jid job -v no -b no -nprocd 2 -nthread 3 -u hypela2.f -q long".split()
     )
 

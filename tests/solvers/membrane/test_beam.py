@@ -177,8 +177,7 @@ def test_a_braid_that_no_cord_holds_is_refused():
 
 
 def test_the_published_walls_and_cord_forces_come_out_of_braid_and_pressure():
-    beams = pd.read_csv(measured_data() / "beams" / "beams.csv")
-    for _, row in beams.iterrows():
+    for _, row in pd.read_csv(measured_data() / "beams" / "beams.csv").iterrows():
         wall = BraidedWall(
             row["braid_angle_deg"], row["E1_braid_N_mm"], row["G12_braid_N_mm"],
             row["E_bladder_N_mm"], row["G_bladder_N_mm"], 0.001 * 0.175127,
