@@ -13,8 +13,6 @@ from pydantic import BaseModel, Field
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison, NoiseIs
-from ...meshes.beam_model import BeamModel
-from ...meshes.cylinder_model import CylinderModel
 from ...readers.sections import Positive
 from ...solvers.base import History
 from .. import kinds
@@ -92,18 +90,12 @@ class BendingObjective(LoadObjective):
             test.deflections, way, load, scale, weighting.weight, noise, noise_is, alike
         )
 
+        self.sample, self.steep = (np.insert(a, 0, 0.0, axis=1) for a in (self.sample, self.steep))
+
     def modelled(self, history: History) -> Array:
-        if len(history.load) <= self.sample.shape[1]:
+        if len(history.load) < self.sample.shape[1]:
             raise SolverFailure(history.early or "the bending ended early", "membrane")
-        return np.asarray(self.sample @ history.load[1:])
-
-    def jacobian(self, history: History, slope: Array) -> Array:
-        assert history.load_slope is not None
-        return super().jacobian(replace(history, load_slope=history.load_slope[1:]), slope)
-
-    def shifted(self, here: History, there: History) -> LoadObjective:
-        loads = (replace(one, load=one.load[1:]) for one in (here, there))
-        return super().shifted(*loads)
+        return super().modelled(history)
 
 
 class PreparedBending(PreparedWhole):
@@ -112,19 +104,17 @@ class PreparedBending(PreparedWhole):
     objective_is = "RMS error of the collar's load, N"
 
     def comparisons(
-        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None,
-        models: Mapping[str, CylinderModel | BeamModel] | None = None,
-    ) -> tuple[Comparison, ...]:  # fmt: skip
-        model = (self.test.models() if models is None else models)[PART]
-        objective = BendingObjective(self.test, weighting)
+        self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
+    ) -> tuple[Comparison, ...]:
+        model, objective = self.test.models()[PART], BendingObjective(self.test, weighting)
         # Wrinkles come and go, and tubes snap: an unstable frame is no reason to refuse a law.
         return (Comparison(self.test.name, model, make_solver(), objective, must_be_stable=False),)
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        models = self.test.models(what="elements", factor=factor)
-        return self.comparisons(make_solver, weighting, models=models)
+        (own,) = self.comparisons(make_solver, weighting)
+        return (replace(own, model=self.test.models(what="elements", factor=factor)[PART]),)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         return self.test.data_files()
