@@ -17,12 +17,29 @@ from setuptools.command.build_py import build_py
 APART = ("tests", "benchmarks", "examples", "docs", "build", "out")
 
 
-#: Compiles what fits use, in the user's cache as a first fit would; prints the folder.
-COMPILE = """
+#: A short tube, whose wall wrinkles.
+TUBE = """
+fabric = { thickness = 0.8 }
+[[cylinder]]
+diameter = 150.0
+pressure = 60.0
+length = 800.0
+span = 600.0
+element_size = 75.0
+deflections = [2.0]
+"""
+#: Compiles what fits and cylinders use, in the user's cache as a run would; prints the folder.
+COMPILE = f"""
+import pathlib, tempfile
 import bubblefit as bf
 from bubblefit import files
 for name in ("biaxial-computed", "bubble-known-solution"):
-    bf.fit(bf.read_project(f"{bf.__path__[0]}/examples/{name}/project.toml"), starts=1)
+    fit = bf.fit(bf.read_project(bf.__path__[0] + f"/examples/{{name}}/project.toml"), starts=1)
+with tempfile.TemporaryDirectory() as place:
+    file = pathlib.Path(place, "project.toml")
+    file.write_text({TUBE!r})
+    for tube in bf.read_project(file).tests.values():
+        bf.simulate(tube, fit.card)
 print(files._kernel_folder() or "")
 """
 
