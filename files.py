@@ -455,7 +455,8 @@ class Compiled:
                 names[name] = other.dispatcher
         made = numba.njit(**self.options)(self.function)
         if folder := _kernel_folder():
-            made._cache = _kernel_cache(folder)(self.function)
+            with suppress(AttributeError):  # another numba, without these classes: not cached
+                made._cache = _kernel_cache(folder)(self.function)
         names[self.function.__name__] = made
         return made
 
