@@ -89,8 +89,7 @@ class BendingObjective(LoadObjective):
         super().__init__(
             test.deflections, way, load, scale, weighting.weight, noise, noise_is, alike
         )
-
-        self.sample, self.steep = (np.insert(a, 0, 0.0, axis=1) for a in (self.sample, self.steep))
+        self.sample = np.insert(self.sample, 0, 0.0, axis=1)
 
     def modelled(self, history: History) -> Array:
         if len(history.load) < self.sample.shape[1]:

@@ -33,7 +33,6 @@ from ...readers.curves import DIRECTIONS, LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
 from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
-from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
 from ..measured import MeasuredKind, PreparedParts
@@ -245,10 +244,6 @@ class HistoryObjective(LoadObjective):
     def places(self) -> tuple[Array, ...]:
         """Return the numbers of the readings: neighbours may err as one."""
         return (self.rows[:, None].astype(float),)
-
-    def causes(self, history: History) -> dict[str, Array]:
-        """Return nothing: offsets are in the passage of the reference load."""
-        return {}
 
 
 @dataclass(frozen=True, eq=False)

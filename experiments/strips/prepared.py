@@ -94,6 +94,18 @@ class LoadObjective:
         return np.asarray(self.sample @ history.load_slope / self.scale[:, None])
 
     def causes(self, history: History) -> dict[str, Array]:
+        """Return causes of a misfit by their words, none known of loads in general."""
+        return {}
+
+    def rms(self, history: History) -> float:
+        """Return RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
+        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
+
+
+class StripObjective(LoadObjective):
+    """Residuals of a strip's loads, with what may be wrong in such a test."""
+
+    def causes(self, history: History) -> dict[str, Array]:
         """Return (n, 1) a cause, by its words, the slope of the residual by one unit of it."""
         slope = self.steep @ history.load / self.scale
         return {
@@ -102,10 +114,6 @@ class LoadObjective:
             "elongations off by {:+.2g} mm (count them from the preload)": -slope[:, None],
             "a gauge length off by {:+.1%} (measure it)": (slope * self.elongation)[:, None],
         }  # fmt: skip
-
-    def rms(self, history: History) -> float:
-        """Return RMS error in N (Eqs 3.4-3.6), whatever the scale and the weight."""
-        return float(np.sqrt(np.mean((self.modelled(history) - self.measured) ** 2)))
 
 
 #: Independent places along the curve of a specimen, where there are no two to compare: those of
@@ -233,7 +241,7 @@ class PreparedStrips(PreparedParts):
 
     def _objective(
         self, model: UniaxialModel, direction: str, relative: bool, share: float, masks: Masks
-    ) -> LoadObjective:
+    ) -> StripObjective:
         test, strip = self.test, self.test.strips[direction]
         elongation, load = loads_to_match(test, strip, model)
         alike = loads_alike(strip, len(load), test.noise, test.specimens)
@@ -247,7 +255,7 @@ class PreparedStrips(PreparedParts):
             raise test.place.error(direction, "the measured load is zero")
         scale, weight = largest if relative else 1.0, share * test.weights[direction]
         noise = strip.noise(largest, test.noise)
-        return LoadObjective(
+        return StripObjective(
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 

@@ -26,10 +26,14 @@ from .newton import Asked, Membrane
 
 
 class Analysis(NamedTuple):
-    """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results."""
+    """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results.
+
+    differentiates : else derivatives are differences of whole runs.
+    """
 
     prepare: Callable[..., Membrane | strip.Patch | beam.Beam]
     analyse: Callable[..., tuple[History, Array]]
+    differentiates: bool = True
 
 
 #: By class of a model; the wall is None where none was given.
@@ -37,8 +41,8 @@ ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
     MeasuredShape: Analysis(bubble.prepare, bubble.balance),
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
-    InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
-    CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
+    InflatedModel: Analysis(closed.prepare, bending.analyse_inflated, False),
+    CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder, False),
     PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
     TubeModel: Analysis(strip.prepare_tube, strip.analyse_tube),
     BeamModel: Analysis(beam.prepare, beam.analyse),
@@ -108,7 +112,7 @@ class MembraneSolver:
         unknown = [name for name in parameters if name not in known]
         if unknown:
             raise InputError(None, "parameters", f"{unknown} not among {known}")
-        if isinstance(model, (CylinderModel, InflatedModel)):
+        if not analysis_of(ANALYSES, model, self.name).differentiates:
             return self._differences(model, law, parameters)
         return self._analyse(model, law, parameters, guess)
 

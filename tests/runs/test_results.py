@@ -1,4 +1,4 @@
-"""What a fit or a forward analysis gives: meshes, strains, laws, drawings; estimates before it."""
+"""Meshes, strains, laws and drawings of a fit or a forward analysis; estimates before it."""
 
 import json
 from dataclasses import replace

@@ -32,7 +32,7 @@ from bubblefit.experiments.measured import (
     compared,
     errors_of_cards,
 )
-from bubblefit.experiments.strips.prepared import LoadObjective
+from bubblefit.experiments.strips.prepared import StripObjective
 from bubblefit.inference.comparison import Comparison
 from bubblefit.materials.card import MaterialCard
 from bubblefit.meshes.strip_models import UniaxialModel, straight_strip
@@ -107,7 +107,7 @@ class PreparedDatasheet(PreparedWhole):
         (model,) = self.test.models().values()
         load, weight = self.test.load, weighting.weight if weighting.relative else 1.0
         given = model.elongations, model.elongations[-1:], [load], load, weight, ROUNDED * load
-        objective = LoadObjective(*given)
+        objective = StripObjective(*given)
         return (Comparison(self.test.name, model, make_solver(), objective, contracts=True),)
 
 

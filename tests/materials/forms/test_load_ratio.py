@@ -195,7 +195,7 @@ def lengthened(stress, beta=CRIMP):
 @settings(max_examples=50, deadline=None)
 @given(st.floats(0.0, 60.0), st.floats(0.0, 60.0), st.integers(1, 4))
 def test_strain_is_that_of_the_yarns_and_of_their_slopes(warp, fill, increments):
-    """Of constant moduli in any number of increments, on any path."""
+    """Check it for constant moduli in any number of increments, on any path."""
     stress = np.array([warp, fill])
     compliance = np.array([[1 / 500, -0.2 / 500], [-0.2 / 500, 1 / 300]])
     strain = np.array([*(compliance @ stress + lengthened(stress)), 0.0])
