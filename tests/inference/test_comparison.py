@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
-from bubblefit.experiments.strips.prepared import LoadObjective
+from bubblefit.experiments.strips.prepared import LoadObjective, StripObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
 from bubblefit.inference.linear import posteriors_of
@@ -317,7 +317,7 @@ def judged_strips(off, load, elongation):
 
 def differences(knots, places, measured, count, slopes, model):
     """Return what specimens (their numbers in `count`) read alike beside a model's load."""
-    objective = LoadObjective(knots, places, measured, specimens=count)
+    objective = StripObjective(knots, places, measured, specimens=count)
     problem = SimpleNamespace(
         comparisons=[SimpleNamespace(name="warp", objective=objective)],
         rows=lambda _: slice(None), scale=objective.scale,
