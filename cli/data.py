@@ -30,14 +30,12 @@ from ..project.project import read_project
 from ..readers.fields import Sphere, fit_sphere, points_of
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
-from ..readers.tables import write_table
 from ..reports.bubbles import sphere_charts
 from ..reports.run_pages import write_constants
 from ..reports.strips import cycle_charts
 from ..reports.vega import save
 from ..runs.fit import check
-from ..runs.folder import Record, Store, data_rows, this_run
-from ..runs.folder import write_table as write_frame
+from ..runs.folder import Record, Store, data_rows, this_run, write_table
 from . import options as given
 from .options import check_out, columns_named, frame_options
 from .progress import LiveLine
@@ -267,7 +265,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         click.echo(f"note: {said}", err=True)
     if out is not None:
         with replacing(out) as path:
-            write_table(path, list(rows[0]), [list(row.values()) for row in rows])
+            pd.DataFrame(rows).to_csv(path, index=False, lineterminator="\n")
         drawn = [
             (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
             for name, one in zip(names, found, strict=True)
@@ -394,7 +392,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}
     for name, table in tables.items():
-        write_frame(table, folder / f"{name}.csv")
+        write_table(table, folder / f"{name}.csv")
     drawn = []
     for k, one in enumerate(found.histories):
         strain, model = one.history.strain - one.zero, None

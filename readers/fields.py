@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..files import pandas as pd
 from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
-from .tables import TextTable, read_table, write_table
 
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
@@ -68,14 +68,6 @@ def read_fields(
     return tuple(_field_of(*one) for one in zip(read, map(float, pressures), strict=True))
 
 
-def read_field(
-    path: Path | str, pressure: float, options: FrameOptions | None = None,
-    format: str | None = None,
-) -> DisplacementField:  # fmt: skip
-    """Read the field of one file, at a pressure in MPa."""
-    return read_fields([path], [pressure], options=options, format=format)[0]
-
-
 def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     """Return the field of a frame, at a pressure in MPa, without points of lost correlation."""
     z = frame.points[:, 2]
@@ -108,7 +100,6 @@ def total_power(degree: int) -> NDArray[np.intp]:
     return (falling[:, None] + falling).ravel()
 
 
-AXES = ("x", "y", "z")
 MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
 LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfaces.csv
 
@@ -164,44 +155,15 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
     return DisplacementSurface(field.pressure, degree, coefficients, scale, 1.0 - share)
 
 
-def write_surfaces(surfaces: Sequence[DisplacementSurface], path: Path | str) -> None:
-    """Write surfaces.csv: R^2, degree, scale, C0 ... of Eq. 4.4, with x, y and F in mm."""
-    most = max((surface.coefficients.shape[1] for surface in surfaces), default=0)
-    rows: list[list[object]] = []
-    for s in surfaces:
-        for direction, r_squared, c in zip(AXES, s.r_squared, s.physical, strict=True):
-            lead = [float(s.pressure), direction, float(r_squared), s.degree, float(s.scale)]
-            rows.append(lead + c.tolist() + [""] * (most - len(c)))
-    write_table(path, [*LEADING, *(f"C{i}" for i in range(most))], rows)
-
-
-def read_surfaces(path: Path | str) -> tuple[DisplacementSurface, ...]:
-    """Read what `write_surfaces` wrote, equal to rounding."""
-    table = read_table(path)
-    direction = table.text("direction")
-    count = len(direction) // 3
-    if tuple(direction) != AXES * count:
-        problem = "expected three rows a pressure, in the order x, y, z"
-        raise InputError(table.path, "column 'direction'", problem)
-    which = np.arange(len(direction)) // 3
-    return tuple(_surface_of(table.rows(which == k)) for k in range(count))
-
-
-def _surface_of(table: TextTable) -> DisplacementSurface:
-    names = ("pressure_MPa", "degree", "scale_mm")
-    pressure, degree, scale = (table.constant(name) for name in names)
-    at = f"line {table.lines[0]}"
-    if degree not in range(MAX_DEGREE + 1):
-        raise InputError(table.path, at, f"expected a degree 0 to {MAX_DEGREE}, got {degree:g}")
-    if not scale > 0:
-        raise InputError(table.path, at, f"expected a scale above 0 mm, got {scale:g}")
-    falling = total_power(int(degree))
-    physical = np.stack([table.numbers(f"C{i}") for i in range(len(falling))], axis=1)
-    with np.errstate(over="ignore"):
-        coefficients = physical * scale**falling
-    if not np.isfinite(coefficients).all():
-        raise InputError(table.path, at, f"coefficients too large for a scale of {scale:g} mm")
-    return DisplacementSurface(pressure, int(degree), coefficients, scale, table.numbers("R2"))
+def surface_table(surfaces: Sequence[DisplacementSurface]) -> pd.DataFrame:
+    """Return a row a surface and direction: R^2, degree, scale, C0 ... of Eq. 4.4, in mm."""
+    rows = [
+        dict(zip(LEADING, (s.pressure, direction, r_squared, s.degree, s.scale), strict=True))
+        | {f"C{i}": value for i, value in enumerate(coefficients)}
+        for s in surfaces
+        for direction, r_squared, coefficients in zip("xyz", s.r_squared, s.physical, strict=True)
+    ]
+    return pd.DataFrame(rows)
 
 
 #: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.

@@ -6,7 +6,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from itertools import permutations
 from pathlib import Path
@@ -84,24 +84,11 @@ class TextTable:
                 raise InputError(self.path, f"column {column!r}", problem) from None
         return np.asarray(clock + 2 * HALF_A_DAY * day)
 
-    def constant(self, column: str) -> float:
-        """Return one column that holds the same number in each row."""
-        value = self.numbers(column)
-        if (value != value[0]).any():
-            line = self.lines[int(np.argmax(value != value[0]))]
-            problem = f"expected the same number as in line {self.lines[0]}"
-            raise InputError(self.path, f"line {line}, column {column!r}", problem)
-        return float(value[0])
-
     def text(self, column: str) -> pd.Series:
         """Return one column as it stands in the file."""
         names = [str(name) for name in self.cells.columns]
         check_one(self.path, names, column)
         return self.cells[column]
-
-    def rows(self, keep: NDArray[np.bool_]) -> TextTable:
-        """Return the table with only the rows where `keep` (rows,) is true."""
-        return replace(self, cells=self.cells[keep], lines=self.lines[keep])
 
 
 def check_one(path: Path, names: Sequence[str], column: str) -> None:
@@ -179,18 +166,6 @@ def read_lines(path: Path, comment: str = "#", any_encoding: bool = False) -> li
         raise InputError(path, "", f"is not a text file; {save}")
     kept = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1)
     return [(n, t) for n, t in kept if t.strip() and not (comment and t.startswith(comment))]
-
-
-def write_table(
-    path: Path | str, header: Sequence[str], rows: Sequence[Sequence[object]], comment: str = ""
-) -> None:
-    """Write a comma-separated table; floats so that they read back exactly."""
-    with open(path, "w", encoding="utf-8", newline="") as stream:
-        if comment:
-            stream.write(f"# {comment}\n")
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows([repr(c) if isinstance(c, float) else c for c in row] for row in rows)
 
 
 NUMBER = r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[eE][+-]?\d++)?"

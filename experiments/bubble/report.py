@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from ...errors import SolverFailure, percent
-from ...files import replacing
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
 from ...materials.card import MaterialCard
@@ -20,7 +19,7 @@ from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
-from ...readers.fields import DisplacementField, write_surfaces
+from ...readers.fields import DisplacementField, surface_table
 from ...readers.pressure_log import ClockOffset
 from ...reports import bubbles
 from ...reports.charts import Chart, Charts, dots
@@ -167,9 +166,8 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     figures, sheet_files = sheet_exhibit(prepared, fitted, out)
     files, tables = [], [misfit_table(prepared, fitted)]
     if prepared.surfaces:
-        with replacing(out.path("surfaces.csv")) as path:
-            write_surfaces(prepared.surfaces, path)
-        files.append((out.name("surfaces.csv"), "polynomial surfaces of the data"))
+        words = "polynomial surfaces of the data"
+        files.append(out.write("surfaces.csv", surface_table(prepared.surfaces), words, None))
         every = zip(prepared.test.pressures, prepared.surfaces, strict=True)
         rows: list[list[object]] = [[1e3 * p, *(f"{r:.5f}" for r in s.r_squared)] for p, s in every]
         title = f"R² of polynomial surfaces of degree {prepared.test.match_degree}"

@@ -1,4 +1,4 @@
-"""Text exports: ARAMIS, DaVis and MatchID, read by their headings alone, and DICe.
+"""Text exports: ARAMIS, DaVis, MatchID and VIC-3D, read by their headings alone, and DICe.
 
 GOM ARAMIS, GOM Correlate, ZEISS Correlate (lines of title, semicolons):
 
@@ -32,6 +32,16 @@ the motion), and what a point without correlation looks like, could not be confi
 German .NET writes it ("n. def."), is taken for one. Where the axes of the export were set by hand,
 `camera_axes = false` leaves them as they are.
 
+Correlated Solutions VIC-3D (quoted headings, a sigma, perhaps lines above):
+
+    "X [mm]","Y [mm]","Z [mm]","U [mm]","V [mm]","W [mm]","sigma [pixel]"
+
+Source: public scripts that write and read such files (with `,` and, from German systems, `;` and
+decimal commas and a line above the names), in which sigma is below zero where correlation was lost,
+X, Y, Z are added to U, V, W for the deformed state, and rejected points have empty cells. Files
+without units are older ones; there "x" in small letters is a place in the picture and "X" one in
+space.
+
 Solution files of DICe: lines of `***`, a row of names, SIGMA and STATUS_FLAG.
 
     *** Digital Image Correlation Engine (DICe), Copyright 2014 Sandia Corporation
@@ -55,6 +65,8 @@ from ..text_frames import read_text_rows, text_reader
 
 _ARAMIS = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
 _DAVIS = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
+_PLACE = re.compile(rb'"\s*X( \[\w+\])?\s*"')
+_MOVED = re.compile(rb'"\s*(W|sigma)( \[\w+\])?\s*"')
 
 
 def recognises_aramis(path: Path, head: bytes) -> bool:
@@ -71,6 +83,11 @@ def recognises_matchid(path: Path, head: bytes) -> bool:
     """Return whether the headings are those of either version."""
     top = head[:4096].lower()
     return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
+
+
+def recognises_vic3d(path: Path, head: bytes) -> bool:
+    """Return whether "X" and "W" or "sigma" are quoted headings."""
+    return bool(_PLACE.search(head[:4096]) and _MOVED.search(head[:4096]))
 
 
 #: The states of DICe.h in which a subset was found; all others are failures of some step.
@@ -103,6 +120,7 @@ for name, title, recognises, settings in (
     ("aramis", "text of ARAMIS or ZEISS Correlate", recognises_aramis, {}),
     ("davis", "CSV of LaVision DaVis", recognises_davis, {}),
     ("matchid", "CSV of MatchID Stereo, 2023 or 2024", recognises_matchid, {"camera_axes": True}),
+    ("vic3d", "CSV of VIC-3D", recognises_vic3d, {"upper": True}),
 ):
     register_format(Format(name, "frame", title, text_reader(name, **settings), recognises))
 register_format(Format("dice", "frame", "solution files of DICe", read_dice, recognises_dice))

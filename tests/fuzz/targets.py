@@ -18,13 +18,7 @@ from bubblefit.project.project import read_project
 from bubblefit.readers import mat_files, pressure_log
 from bubblefit.readers.bending import read_bending_curves
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
-from bubblefit.readers.fields import (
-    DisplacementField,
-    fit_surface,
-    read_fields,
-    read_surfaces,
-    write_surfaces,
-)
+from bubblefit.readers.fields import read_fields
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
 from bubblefit.readers.pressure_log import read_pressure_log, values_in_file
@@ -176,7 +170,6 @@ def _targets(folder: Path) -> dict[str, Target]:
         ("pressure in file", ".csv", _value, "# pressure [kPa] = 35.5\nx,y\n1,2\n", SAME),
         ("bending", ".csv", read_bending_curves, BENDING),
         ("biaxial", ".csv", read_biaxial_table, biaxial),
-        ("surfaces", ".csv", read_surfaces, _surfaces(folder)),
         ("polynomials", ".csv", read_published_polynomials, curves),
         ("t19", ".t19", _result(T19File), _t19()),
         ("sts", ".sts", _status, sts_text([0.1, 0.2, 1.0])),
@@ -212,14 +205,6 @@ def _cards(folder: Path) -> list[bytes]:
 
 def _value(path: Path) -> float:
     return float(values_in_file(path, Channel("pressure"), PRESSURE_UNITS)[0])
-
-
-def _surfaces(folder: Path) -> str:
-    angle = np.linspace(0, 60, 60)
-    points = np.stack([angle * np.cos(angle), angle * np.sin(angle)], axis=1)
-    field = DisplacementField(0.3, points, 0.01 * np.stack([*points.T, points[:, 0]], axis=1))
-    write_surfaces([fit_surface(field, 2)], folder / "s.csv")
-    return (folder / "s.csv").read_text()
 
 
 def _frd(folder: Path, flag: int) -> bytes:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from bubblefit.readers import mat_files
 from bubblefit.readers.fields import read_fields
-from bubblefit.readers.formats import pyaldic as npz_files
-from bubblefit.readers.formats.pyaldic import array_names, read_arrays
+from bubblefit.readers.formats import array_exports as npz_files
+from bubblefit.readers.formats.array_exports import array_names, read_arrays
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.mat_files import (
     MatrixParts,

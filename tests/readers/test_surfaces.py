@@ -1,6 +1,5 @@
 """Surfaces, spheres, outlines and regions of measured points."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from bubblefit.experiments.bubble.registration import apex_shape
 from bubblefit.experiments.strips.data import strain_regions
 from bubblefit.meshes.disk import Outline
 from bubblefit.readers.fields import (
-    AXES,
     DisplacementField,
     DisplacementSurface,
     _linear,
@@ -18,8 +16,7 @@ from bubblefit.readers.fields import (
     fit_surface,
     points_of,
     read_fields,
-    read_surfaces,
-    write_surfaces,
+    surface_table,
 )
 from bubblefit.readers.frames import Frame
 from hypothesis import given, settings
@@ -99,45 +96,19 @@ def surfaces() -> tuple[DisplacementSurface, ...]:
     )
 
 
-def test_surface_files_come_back(tmp_path, surfaces):
-    path, points = tmp_path / "surfaces.csv", on_a_disk(50, 6)
-    write_surfaces(surfaces, path)
-    for read, written in zip(read_surfaces(path), surfaces, strict=True):
-        assert (read.pressure, read.degree) == (written.pressure, written.degree)
-        assert read.scale == written.scale
-        np.testing.assert_array_equal(read.r_squared, written.r_squared)
-        np.testing.assert_allclose(read.coefficients, written.coefficients, rtol=1e-14)
-        np.testing.assert_allclose(read.evaluate(points), written.evaluate(points), atol=1e-11)
-    with open(path, newline="") as stream:
-        rows = list(csv.DictReader(stream))[:3]
-    assert [row["direction"] for row in rows] == list(AXES)
-    assert list(rows[0])[:6] == ["pressure_MPa", "direction", "R2", "degree", "scale_mm", "C0"]
+def test_the_table_of_surfaces_has_equation_4_4(surfaces):
+    points, table = on_a_disk(50, 6), surface_table(surfaces)
+    assert list(table)[:6] == ["pressure_MPa", "direction", "R2", "degree", "scale_mm", "C0"]
+    assert table["direction"].tolist() == [*"xyz"] * 3 and table["degree"].tolist()[::3] == [
+        4,
+        0,
+        8,
+    ]
     by_hand = [
-        equation_4_4(np.array([float(row[f"C{i}"]) for i in range(25)]), *points.T) for row in rows
+        equation_4_4(table.loc[row, "C0":"C24"].to_numpy(float), *points.T) for row in (0, 1, 2)
     ]
     np.testing.assert_allclose(np.transpose(by_hand), surfaces[0].evaluate(points), atol=1e-10)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("direction", "way", "column 'direction': this column is missing"),
-        ("0.022,y", "0.022,x", "in the order x, y, z"), ("pressure_MPa", "pressure_MPa\n#", ""),
-        ("0.022,y", "0.023,y", "line 3, column 'pressure_MPa': expected the same number"),
-        ("C24", "C25", "column 'C24': this column is missing"),
-        ("C0,C1", "C0,C0", "column 'C0': this column appears twice"),
-        ("0.022,x", "nan,x", "line 2, column 'pressure_MPa':"), ("0.022,x", "-1,x", "pressure"),
-        (",4,", ",,", "line 2, column 'degree':"), (",4,", ",2.5,", "degree"),
-    ],
-)  # fmt: skip
-def test_a_damaged_surface_file_is_refused(tmp_path, surfaces, old, new, words):
-    path = tmp_path / "surfaces.csv"
-    write_surfaces(surfaces[:1], path)
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-    message = complaint(read_surfaces, path)
-    assert "surfaces.csv" in message and words in message
+    assert table.loc[3, "C1":].isna().all() and table.loc[6].notna().all()
 
 
 CENTRE = np.array([12.0, -7.0, 610.0])

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bubblefit.readers.frames import FrameOptions, columns_of, heading_of, read_frames
-from bubblefit.readers.tables import decimal_mark, is_number, read_table, write_table
+from bubblefit.readers.tables import decimal_mark, is_number, read_table
 from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
 
 from ..complaints import complaint, complaint_with
@@ -210,9 +210,6 @@ def test_numbers_that_are_none(tmp_path):
     assert "line 3, column 'b': expected a number, found nothing; so in 2 more rows" in said
     said = complaint(read.numbers, "b", holes=True)
     assert "line 4, column 'b': expected a number, found 'x'" in said and "more" not in said
-    said = complaint(read.constant, "c")
-    assert "line 6, column 'c': expected the same number as in line 3" in said
-    assert read.rows(np.array([True, True, False])).constant("c") == 7
     long = read_table(table(tmp_path, f"a\n{'y' * 60}\n5\nz\n"))
     assert complaint(long.numbers, "a").endswith(f"found '{'y' * 40}'; so in 1 more row")
     read = read_table(table(tmp_path, "name,load\nNA,1\nnull,2\n,3\n nan ,4\n5\n"))
@@ -220,7 +217,3 @@ def test_numbers_that_are_none(tmp_path):
     assert read.lines.tolist() == [2, 3, 4, 5, 6]
     assert read.numbers("load", holes=True)[:4].tolist() == [1, 2, 3, 4]
     assert "line 2, column 'name': expected a number, found 'NA'" in complaint(read.numbers, "name")
-    path, values = tmp_path / "b.csv", [0.1 + 0.2, 1e-300, -3.0]
-    write_table(path, ["v", "n"], [[v, i] for i, v in enumerate(values)], comment="mm")
-    assert path.read_text().startswith("# mm\nv,n\n0.30000000000000004,0\n")
-    np.testing.assert_array_equal(read_table(path).numbers("v"), values)

@@ -1,0 +1,304 @@
+"""Exports as arrays: MAT-files of VIC-3D, Ncorr, MultiDIC; HDF5 of Istra4D; archives of pyALDIC-3D.
+
+VIC-3D: a grid of X, Y, Z, U, V, W and sigma. Source: public scripts that load such files: X, Y, Z,
+U, V, W are lengths, x, y, u, v in small letters pixels, and points with a sigma of -1 are bad. The
+unit is not in the file: mm unless `length_unit` says otherwise (could not be confirmed).
+
+Ncorr: displacements u, v on a grid of pixels. Source: MultiDIC's public reader of Ncorr
+(`data_dic_save.displacements(i)`: plot_u_ref_formatted, plot_v_ref_formatted, plot_corrcoef_dic,
+zero outside the region of interest; grid points are `dispinfo.spacing` + 1 pixels apart,
+`dispinfo.pixtounits` is a pixel in `dispinfo.units`) and scripts on version 7.3. Rows count
+downwards. There is no dz: a bubble needs `multidic`.
+
+MultiDIC. Source: a public script that fills their `DIC3DPPresults`: for each frame a cell of
+Points3D (n, 3), places in the frame as MultiDIC uses them, Disp.DispVec (n, 3) and corrComb, in the
+calibration's unit, mm unless `length_unit` says otherwise.
+
+Dantec Istra4D: coordinates/coordinate_x, mask, displacements/displacement_x. Source: the public
+reader istra2py of the planar export (coordinates of the deformed state; mask is 0 where correlation
+was lost). The third components are named alike by inference. Unit: mm unless `length_unit` says
+otherwise.
+
+pyALDIC-3D: .npz with all frames, .mat alike, and .csv, one a frame.
+
+    points3D (frames, points, 3), U, V, W (frames, points), ref_coords, reproj_error, source
+    x_px,y_px,X_mm,Y_mm,Z_mm,U,V,W
+
+Source: pyALDIC-3D's own export (tables.py) and reconstruction (points3D and X_mm are the places in
+the frame itself, displacements those since the first frame, NaN where correlation was lost; the
+left camera's axes, so that y points down and z away from it). Its .mat cannot be recognised by its
+names alone unless points3D is among them.
+"""
+
+import math
+import zipfile
+import zlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from ...errors import InputError
+from ...files import reading
+from .. import mat_files
+from ..frames import Array, Frame, FrameOptions, FrameRows, frame_of
+from ..mat_files import LARGEST, RATIO, SMALL, is_mat, numbers_of, read_variables
+from ..registry import Format, register_format
+from ..text_frames import read_text_rows
+
+PLACES, MOVED = [f"{axis} deformed" for axis in "xyz"], [f"d{axis}" for axis in "xyz"]
+
+
+def _variables(path: Path, head: bytes) -> Collection[str] | None:
+    """Return the names in a MAT-file; None of a damaged one, none of another file."""
+    return mat_files.variable_names(path, head) if is_mat(head) else ()
+
+
+def _frames(
+    path: Path, options: FrameOptions, format: str, names: Mapping[str, str],
+    tables: Iterable[Array], **more: Any,
+) -> list[Frame]:  # fmt: skip
+    """Return a frame a table (points, names)."""
+    rows = (FrameRows(dict(zip(names, one.T, strict=True)), names, **more) for one in tables)
+    return [frame_of(one, options, path, format) for one in rows]
+
+
+VIC3D = {"x": "X", "y": "Y", "z": "Z", "dx": "U", "dy": "V", "dz": "W", "sigma": "sigma"}
+
+
+def recognises_vic3d(path: Path, head: bytes) -> bool:
+    """Return whether X, Y, U, V and W are among the variables of a MAT-file, and no frames."""
+    there = _variables(path, head) or ()
+    return {*"XYUVW"} <= {*there} and "points3D" not in there
+
+
+def read_vic3d(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read the one frame of a file."""
+    names = VIC3D | dict(options.columns or {})
+    there = read_variables(path, [*names.values()])
+    values = {
+        key: numbers_of(path, there, name).ravel(order="F")
+        for key, name in names.items()
+        if name in there or key in options.quantities
+    }
+    if len({value.size for value in values.values()}) != 1:
+        raise InputError(path, "", "X, Y, Z, U, V, W and sigma are not of one size")
+    sigma = values.pop("sigma", None)
+    names = {key: names[key] for key in values}
+    return [frame_of(FrameRows(values, names, sigma=sigma), options, path, "vic3d-mat")]
+
+
+SAVED = "data_dic_save"
+
+
+def recognises_ncorr(path: Path, head: bytes) -> bool:
+    """Return whether a MAT-file holds what Ncorr saves, or cannot be inspected."""
+    there = _variables(path, head)
+    return there is None or SAVED in there
+
+
+def read_ncorr(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read a frame for each picture."""
+    saved = _only(path, read_variables(path, [SAVED]), SAVED)
+    about = _only(path, saved, "dispinfo")
+    frames = saved.get("displacements")
+    if not isinstance(frames, list) or not frames or not isinstance(frames[0], dict):
+        raise InputError(path, SAVED, "expected displacements of frames")
+    spacing, scale = (_number(path, about, name) for name in ("spacing", "pixtounits"))
+    unit, step = about.get("units"), (spacing + 1) * scale
+    names = {"x": "column", "y": "row", "dx": "plot_u_ref_formatted", "dy": "plot_v_ref_formatted"}
+    units = dict.fromkeys(names, unit if isinstance(unit, str) else "")
+    tables = (_correlated(path, one, step) for one in frames)
+    return _frames(path, options, "ncorr", names, tables, units=units, camera_axes=True)
+
+
+def _correlated(path: Path, one: Mapping[str, Any], step: float) -> Array:
+    """Return x, y, u, v (points, 4) of a frame where it was correlated."""
+    u, v = (numbers_of(path, one, f"plot_{name}_ref_formatted") for name in "uv")
+    if u.shape != v.shape or u.ndim != 2:
+        raise InputError(path, "displacements", f"u and v are {u.shape} and {v.shape}")
+    correlated = (u != 0) | (v != 0)
+    if isinstance(one.get("plot_corrcoef_dic"), np.ndarray):
+        coefficient = numbers_of(path, one, "plot_corrcoef_dic")
+        correlated = coefficient != 0 if coefficient.shape == u.shape else correlated
+    row, column = np.nonzero(correlated)
+    return np.column_stack([column * step, row * step, u[row, column], v[row, column]])
+
+
+def _only(path: Path, where: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    if not (found := _struct(where.get(name))):
+        raise InputError(path, name, "this struct is missing; is it a file that Ncorr saved?")
+    return found
+
+
+def _struct(value: Any) -> Mapping[str, Any]:
+    one = value[0] if isinstance(value, list) and len(value) == 1 else None
+    return one if isinstance(one, dict) else {}
+
+
+def _number(path: Path, where: Mapping[str, Any], name: str) -> float:
+    value = numbers_of(path, where, name)
+    if value.size != 1 or not 0 <= value.flat[0] < 1e6:
+        raise InputError(path, f"dispinfo.{name}", "expected one number, not below zero")
+    return float(value.flat[0])
+
+
+RESULTS = ("DIC3DPPresults", "DIC3DpairResults", "DIC3DAllPairsResults")
+
+
+def recognises_multidic(path: Path, head: bytes) -> bool:
+    """Return whether a MAT-file holds one of the results."""
+    return not {*RESULTS}.isdisjoint(_variables(path, head) or ())
+
+
+def read_multidic(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read a frame for each cell."""
+    there = read_variables(path, RESULTS)
+    results = next((_struct(there[name]) for name in RESULTS if name in there), {})
+    points, moved = results.get("Points3D"), _struct(results.get("Disp")).get("DispVec")
+    if not isinstance(points, list) or not isinstance(moved, list) or len(points) != len(moved):
+        raise InputError(path, "", "expected cells of Points3D and Disp.DispVec, one a frame")
+    for place, move in zip(points, moved, strict=True):
+        if not isinstance(place, np.ndarray) or not isinstance(move, np.ndarray):
+            raise InputError(path, "", "expected arrays in Points3D and DispVec")
+        if place.shape != move.shape or place.ndim != 2 or place.shape[1] != 3:
+            raise InputError(path, "", f"Points3D and DispVec are {place.shape} and {move.shape}")
+    names = dict.fromkeys(PLACES, "Points3D") | dict.fromkeys(MOVED, "DispVec")
+    tables = (np.hstack(pair).astype(float) for pair in zip(points, moved, strict=True))
+    return _frames(path, options, "multidic", names, tables)
+
+
+ISTRA = {
+    **{f"{axis} deformed": f"coordinates/coordinate_{axis}" for axis in "xyz"},
+    **{f"d{axis}": f"displacements/displacement_{axis}" for axis in "xyz"},
+    "mask": "coordinates/mask",
+}
+
+
+def recognises_istra4d(path: Path, head: bytes) -> bool:
+    """Return whether the file is plain HDF5, not MATLAB's."""
+    return head.startswith(mat_files.SIGNATURE)
+
+
+def read_istra4d(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read the one frame of a file."""
+    mat_files.check_readable(path, partial(_datasets, path))
+    there = _datasets(path)
+    if len({value.size for value in there.values()}) > 1:
+        raise InputError(path, "", "coordinates, displacements and mask are not of one size")
+    mask = there.pop("mask", None)
+    if not {"x deformed", "y deformed", "dx", "dy"} <= {*there}:
+        problem = "expected coordinates/coordinate_x and so on: export coordinates, displacements"
+        raise InputError(path, "", problem)
+    valid = None if mask is None else np.asarray(mask != 0)
+    rows = FrameRows(there, {key: ISTRA[key] for key in there}, valid=valid)
+    return [frame_of(rows, options, path, "istra4d")]
+
+
+def _datasets(path: Path) -> dict[str, Array]:
+    """Read the arrays that there are, flat."""
+    with mat_files.open_hdf5(path) as file:
+        found = {key: mat_files.member(path, file, name) for key, name in ISTRA.items()}
+        return {
+            key: mat_files.array_of(path, item, ISTRA[key]).ravel()
+            for key, item in found.items()
+            if item is not None
+        }
+
+
+ARCHIVE = b"PK\x03\x04"
+
+
+def array_names(path: Path) -> list[str]:
+    """Return names of the arrays; none of what is no archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return [name[:-4] for name in archive.namelist() if name.endswith(".npy")]
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return []
+
+
+def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
+    """Read the arrays of these names, those that there are; no Python objects."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            there = {one.filename: one for one in archive.infolist()}
+            members = {name: there[f"{name}.npy"] for name in wanted if f"{name}.npy" in there}
+            return {name: _array(path, archive, one, name) for name, one in members.items()}
+    except FileNotFoundError:
+        raise InputError(path, "", "no such file") from None
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError) as error:
+        raise InputError(path, "", f"is not a whole .npz archive ({str(error)[:100]})") from None
+    except (ValueError, NotImplementedError, RuntimeError, TypeError, MemoryError) as error:
+        why = " ".join(str(error).split())[:100]
+        raise InputError(path, "", f"cannot be read; is it damaged? ({why})") from None
+
+
+def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str) -> np.ndarray:
+    with archive.open(one) as stream:
+        version = npy.read_magic(stream)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+        if dtype.kind not in "fiubU":
+            problem = "holds Python objects or records, which are not read: save plain numbers"
+            raise InputError(path, f"array {name!r}", problem)
+        size = math.prod(shape) * dtype.itemsize
+        most = min(LARGEST, one.file_size, max(SMALL, RATIO * one.compress_size))
+        if min(shape, default=0) < 0 or size > most:
+            problem = f"says {shape} numbers, more than the file holds; is it damaged?"
+            raise InputError(path, f"array {name!r}", problem)
+        content = stream.read(size)
+    if len(content) < size:
+        raise InputError(path, f"array {name!r}", "ends early; is the file damaged?")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran else "C")
+
+
+def recognises_pyaldic(path: Path, head: bytes) -> bool:
+    """Return whether points3D is among the arrays, or x_px and X_mm among the headings."""
+    if head.startswith(ARCHIVE):
+        return "points3D" in array_names(path)
+    return "points3D" in (_variables(path, head) or ()) or head.startswith(b"x_px,y_px,X_mm")
+
+
+def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
+    """Read all frames of a file."""
+    with reading(path), path.open("rb") as file:
+        head = file.read(128)
+    if not head.startswith(ARCHIVE) and not is_mat(head):
+        deformed = options if options.coordinates else replace(options, coordinates="deformed")
+        every = read_text_rows(path, deformed, camera_axes=True)
+        return [frame_of(rows, deformed, path, "pyaldic") for rows in every]
+    there = (read_variables if is_mat(head) else read_arrays)(path, ("points3D", *"UVW"))
+    points = there.get("points3D")
+    if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:
+        raise InputError(path, "points3D", "expected places (frames, points, 3)")
+    if points.dtype.kind not in "fiu" or not points.size:
+        raise InputError(path, "points3D", "expected numbers, found none")
+    points = points.astype(float)
+    moved = points - points[0]
+    for i, name in enumerate("UVW"):
+        given = there.get(name)
+        if given is not None and given.shape != points.shape[:2]:
+            problem = f"is {given.shape}, points3D {points.shape}: expected one a point and frame"
+            raise InputError(path, name, problem)
+        if given is not None:
+            moved[:, :, i] = given.astype(float)
+    names = dict.fromkeys(PLACES, "points3D") | dict(zip(MOVED, "UVW", strict=True))
+    tables, units = np.concatenate([points, moved], axis=2), dict.fromkeys(names, "mm")
+    return _frames(path, options, "pyaldic", names, tables, units=units, camera_axes=True)
+
+
+for one in (
+    Format("vic3d-mat", "frame", "MAT-files of VIC-3D", read_vic3d, recognises_vic3d),
+    Format("ncorr", "frame", "MAT-files of Ncorr (planar)", read_ncorr, recognises_ncorr),
+    Format(
+        "multidic", "frame", "MAT-files of MultiDIC, DuoDIC", read_multidic, recognises_multidic
+    ),
+    Format("istra4d", "frame", "HDF5 of Istra4D", read_istra4d, recognises_istra4d),
+    Format("pyaldic", "frame", "npz, mat or CSV of pyALDIC-3D", read_pyaldic, recognises_pyaldic),
+):
+    register_format(one)
