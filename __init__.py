@@ -53,41 +53,32 @@ __all__ = ["Biaxial", "Bubble", "Cylinder", "Fabric", "Fit", "Form", "Law", "Mat
            "read_card", "read_project", "refine", "register", "simulate", "validate", "verify",
            "weights"]  # fmt: skip
 
-#: Where the public names are: imported when they are asked for, so that `import bubblefit` is
-#: quick.
-_PLACES = {
-    "Biaxial": "project.objects",
-    "Bubble": "project.objects",
-    "Cylinder": "project.objects",
-    "Fabric": "experiments.kinds",
-    "Fit": "runs.result",
-    "Form": "materials.forms.spline",
-    "Law": "project.objects",
-    "MaterialCard": "materials.card",
-    "OwnTest": "experiments.own",
-    "Project": "project.project",
-    "Registration": "project.objects",
-    "Sheet": "project.objects",
-    "Strips": "project.objects",
-    "bootstrap": "runs.bootstrap",
-    "check": "runs.fit",
-    "compare": "runs.compare",
-    "cycles": "experiments.cycles.evaluation",
-    "estimate": "runs.estimate",
-    "fit": "runs.fit",
-    "plan": "runs.plan",
-    "predict": "runs.predictions",
-    "profile": "runs.profile",
-    "read": "project.measured",
-    "read_card": "materials.card",
-    "read_project": "project.project",
-    "refine": "runs.refinement",
-    "register": "project.measured",
-    "simulate": "runs.simulation",
-    "validate": "runs.validation",
-    "verify": "runs.verification",
-    "weights": "runs.weights",
+#: Names by the module where they are: imported when they are asked for, so that `import bubblefit`
+#: is quick.
+_NAMES = {
+    "experiments.cycles.evaluation": "cycles",
+    "experiments.kinds": "Fabric",
+    "experiments.own": "OwnTest",
+    "materials.card": "MaterialCard read_card",
+    "materials.forms.spline": "Form",
+    "project.measured": "read register",
+    "project.objects": "Biaxial Bubble Cylinder Law Registration Sheet Strips",
+    "project.project": "Project read_project",
+    "runs.bootstrap": "bootstrap",
+    "runs.compare": "compare",
+    "runs.estimate": "estimate",
+    "runs.fit": "check fit",
+    "runs.plan": "plan",
+    "runs.predictions": "predict",
+    "runs.profile": "profile",
+    "runs.refinement": "refine",
+    "runs.result": "Fit",
+    "runs.simulation": "simulate",
+    "runs.validation": "validate",
+    "runs.verification": "verify",
+    "runs.weights": "weights",
 }
+_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 if not TYPE_CHECKING:  # so that a type checker knows which names there are

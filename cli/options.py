@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import InputError, OutputError
-from ..readers.frames import QUANTITIES
 from ..readers.sections import LENGTH_UNITS
 from ..solvers.registry import ANY
 from ..solvers.registry import command_line as solver_options
@@ -210,15 +209,13 @@ def check_out(out: Path, inputs: Sequence[Path | None], overwrite: bool) -> None
 
 def columns_named(given: str | None) -> dict[str, str] | None:
     """Return the columns of some of x, y, z, dx, dy, dz, given as in "x=X,dz=W".
-    Raises InputError for another form, an unknown quantity, one column for two quantities."""
+    Raises InputError for another form, or one column for two quantities."""
     names: dict[str, str] = {}
     for part in [] if given is None else given.split(","):
         quantity, equals, name = (piece.strip() for piece in part.partition("="))
         problem = ""
         if not (equals and name):
             problem = f"expected such as x=X,y=Y,z=Z,dx=U,dy=V,dz=W, got {part.strip()!r}"
-        elif quantity not in QUANTITIES:
-            problem = f"unknown quantity {quantity!r}; expected {', '.join(QUANTITIES)}"
         elif name in (other := {n: q for q, n in names.items() if q != quantity}):
             problem = f"column {name!r} is named for {other[name]} and for {quantity}"
         if problem:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -336,17 +336,9 @@ def usual_folder(project: Path) -> Path:
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
 
 
-@dataclass(frozen=True, eq=False)
-class NamedCard:
-    """A material card and, where it is known, the sort of test that it was fitted to."""
-
-    card: MaterialCard
-    test: str | None = None
-
-
-def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:
+def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, MaterialCard]:
     """Return the cards by name, in the order of the file; InputError."""
-    cards: dict[str, NamedCard] = {}
+    cards: dict[str, MaterialCard] = {}
     for i, section in enumerate(sections):
         at = f"card[{i}]"
         if (section.file is None) == (section.beta is None):
@@ -355,7 +347,7 @@ def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, Named
         if card.name in cards:
             problem = f"{card.name!r} is there twice; name one of them"
             raise InputError(place.path, f"{at}.name", problem)
-        cards[card.name] = NamedCard(card, section.test)
+        cards[card.name] = card
     return cards
 
 

@@ -10,15 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from .frames import Array, FrameSource
-from .machine_tables import (
-    AS_FOUND,
-    Channel,
-    TableOptions,
-    channel_values,
-    column_of,
-    read_machine_table,
-    source_of,
-)
+from .machine_tables import AS_FOUND, Channel, TableOptions, read_machine_table
 from .tables import LENGTH_UNITS, LOAD_UNITS
 
 Zero = Literal["none", "first", "line"]
@@ -68,12 +60,12 @@ def read_bending_curves(
     if repetition is not None:
         named["repetition"] = repetition
     found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
-    columns = {name: column_of(found, name, named, NEEDED) for name in (*NEEDED, "repetition")}
-    way = channel_values(found, columns["deflection"], deflection, LENGTH_UNITS)
-    force = channel_values(found, columns["load"], load, FORCE_UNITS) + preload
+    columns = {name: found.column(name) for name in (*NEEDED, "repetition")}
+    way = found.values(columns["deflection"], LENGTH_UNITS, deflection)
+    force = found.values(columns["load"], FORCE_UNITS, load) + preload
     which = columns["repetition"]
     asked = {"deflection": deflection.unit, "load": load.unit}
-    source = source_of(found, columns, asked, format)
+    source = found.source(columns, asked)
     names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
     curves = []
     for name in dict.fromkeys(names):

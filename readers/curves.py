@@ -13,9 +13,10 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from . import machine_tables, tables
+from ..errors import InputError, check_one_of
+from . import tables
 from .frames import Array, FrameSource
+from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 from .registry import read_file
 
 #: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
@@ -86,43 +87,36 @@ def read_load_curves(
     column; else the rows to keep. decimal : where 1,234 is in doubt. sheet : of a workbook.
     """
     path, named = Path(path), dict(columns or {})
-    unknown = [name for name in named if name not in QUANTITIES]
-    if unknown:
-        problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
-        raise InputError(None, "columns", problem)
-    if decimal not in (None, ".", ","):
-        raise InputError(None, "decimal", f"expected a point or a comma, got {decimal!r}")
+    for name in named:
+        check_one_of(name, QUANTITIES, "columns")
+    check_one_of(decimal, (".", ","), "decimal")
     wanted = None if direction is None else direction_named(direction)
-    options = machine_tables.TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
-    found = machine_tables.read_machine_table(path, options, format)
-    column = {quantity: machine_tables.column_of(found, quantity, named) for quantity in QUANTITIES}
-    said = column["elongation"]
-    elongation = machine_tables.measured(
-        found, said, "length", tables.LENGTH_UNITS | tables.STRAIN_UNITS, length_unit
-    )
+    options = TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
+    found = read_machine_table(path, options, format)
+    column = {quantity: found.column(quantity) for quantity in QUANTITIES}
+    said, units = column["elongation"], tables.LENGTH_UNITS | tables.STRAIN_UNITS
+    elongation = found.values(said, units, Channel(unit=length_unit), "length_unit")
     units, own = dict(tables.LOAD_UNITS), found.units[column["load"]]
     if own in tables.WIDTH_LOAD_UNITS or load_unit in tables.WIDTH_LOAD_UNITS:
         if width is None:
             problem = f"{own or load_unit} is a load per width; say the strip's width"
-            raise InputError(path, f"line {found.header}, column {column['load']!r}", problem)
+            raise found.error(column["load"], problem)
         units |= {name: scale * width for name, scale in tables.WIDTH_LOAD_UNITS.items()}
-    load = machine_tables.measured(found, column["load"], "load", units, load_unit)
-    notes = found.notes + machine_tables.choice_of(found, "elongation", named)
+    load = found.values(column["load"], units, Channel(unit=load_unit), "load_unit")
+    notes = found.notes + found.choice("elongation")
     if notes != found.notes and not np.ptp(elongation):
         problem = "does not move: name another column of elongation with columns"
-        raise InputError(path, f"line {found.header}, column {said!r}", problem)
+        raise found.error(said, problem)
     grips = said if tables.is_between_grips(said, "elongation" in named) else ""
     asked = {"elongation": length_unit, "load": load_unit}
-    time = machine_tables.called_times(found, named)
-    if column["time"]:
-        time = found.table.numbers(column["time"])
+    time = found.table.numbers(column["time"]) if column["time"] else found.times()
     labels = _labels(found, column, wanted)
     if (found.units[said] or length_unit) in tables.STRAIN_UNITS:
         gauges = gauge_length or {}
         lacks = [d for d, _ in labels if d not in gauges and wanted in (None, d)]
         if lacks:
             problem = f"is a strain, no elongation: say the {lacks[0]} strip's gauge_length"
-            raise InputError(path, f"line {found.header}, column {said!r}", problem)
+            raise found.error(said, problem)
         elongation = elongation * np.array([gauges.get(d, np.nan) for d, _ in labels])
         doubtful = "; its name does not say of what" if tables.distance_to_strip(said) else ""
         words = f"{path.name}: the elongation is the strain of column {said!r} times gauge_length"
@@ -130,7 +124,7 @@ def read_load_curves(
     places: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
         places.setdefault(label, []).append(row)
-    source = machine_tables.source_of(found, column, asked, format, notes)
+    source = found.source(column, asked, notes)
     curves = []
     for key, rows in places.items():
         if wanted in (None, key[0]):
@@ -162,12 +156,12 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
 
 
 def _labels(
-    found: machine_tables.MachineTable, column: Mapping[str, str], wanted: str | None
+    found: MachineTable, column: Mapping[str, str], wanted: str | None
 ) -> Sequence[tuple[str, str]]:
     """Return direction and specimen of each row."""
     table = found.table
     if not column["direction"] and wanted is None:
-        there = ", ".join(str(name) for name in table.cells.columns if name)[:300]
+        there = ", ".join(filter(None, found.names))[:300]
         problem = (
             "no column says the direction; say direction, in a project files = { warp = [...] }."
             f" The file has: {there}"

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Note, NoteKind
+from ..errors import InputError, Note, NoteKind, check_one_of
 from .registry import read_file
 from .tables import LONGEST, called, split_unit
 
@@ -88,10 +88,8 @@ class FrameOptions:
         if not 0 < self.length_scale < math.inf:
             problem = f"expected mm per unit, above 0, got {self.length_scale}"
             raise InputError(None, "length_scale", problem)
-        unknown = [name for name in self.columns or {} if name not in QUANTITIES]
-        if unknown:
-            problem = f"unknown quantity {unknown[0]!r}; expected {', '.join(QUANTITIES)}"
-            raise InputError(None, "columns", problem)
+        for name in self.columns or ():
+            check_one_of(name, QUANTITIES, "columns")
 
 
 def read_frames(

@@ -8,17 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, check_one_of
 from . import tables
 from .frames import Array
-from .machine_tables import (
-    MachineTable,
-    TableOptions,
-    called_times,
-    column_of,
-    measured,
-    read_machine_table,
-)
+from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
 
 QUANTITIES = ("load", "strain", "elongation", "travel", "time")
 #: Of the rise before it, the part that an unloading goes back; of the unloading, that a loading
@@ -57,34 +50,32 @@ def read_history(
     """
     path, named = Path(path), dict(columns or {})
     for name in named:
-        if name not in QUANTITIES:
-            problem = f"unknown quantity {name!r}; expected {', '.join(QUANTITIES)}"
-            raise InputError(None, "columns", problem)
+        check_one_of(name, QUANTITIES, "columns")
     if length is not None and not length > 0:
         raise InputError(None, "length", f"expected a length above 0 mm, got {length:g}")
     along = {**named, **({"elongation": named["strain"]} if "strain" in named else {})}
     found = read_machine_table(path, TableOptions(along, decimal=decimal, sheet=sheet), format)
-    load = measured(found, column_of(found, "load", named), "load", tables.LOAD_UNITS, load_unit)
-    names, notes = [str(name) for name in found.table.cells.columns], found.notes
+    force, way = Channel(unit=load_unit), Channel(unit=length_unit)
+    load = found.values(found.column("load"), tables.LOAD_UNITS, force, "load_unit")
+    names, notes = found.names, found.notes
     # A strain that is computed from the travel is the travel's.
     strains = [] if "elongation" in named else tables.strain_columns(names, found.units, named)
     strains = [n for n in strains if "strain" in named or not tables.is_between_grips(n, False)]
     grips = False
     if strains:
         column = strains[0]
-        strain, more = _strain(found, column, strain_unit)
+        strain, more = _strain(found, column, Channel(unit=strain_unit))
         others = f", not {' and '.join(map(repr, strains[1:]))}" if strains[1:] else ""
         notes += (f"{path.name}: the strain is column {column!r}{others}{more}",)
     else:
-        column = column_of(found, "elongation", along)
+        column = found.column("elongation")
         if found.units[column] in tables.STRAIN_UNITS:
-            strain = measured(found, column, "strain", tables.STRAIN_UNITS, strain_unit)
+            strain, _ = _strain(found, column, Channel(unit=strain_unit))
+        elif length is None:
+            problem = "is an elongation: say the length in mm that it is of, length"
+            raise found.error(column, problem)
         else:
-            at = f"line {found.header}, column {column!r}"
-            if length is None:
-                problem = "is an elongation: say the length in mm that it is of, length"
-                raise InputError(path, at, problem)
-            strain = measured(found, column, "length", tables.LENGTH_UNITS, length_unit) / length
+            strain = found.values(column, tables.LENGTH_UNITS, way, "length_unit") / length
         grips = tables.is_between_grips(column, "elongation" in named)
     machine = [
         n for n in names
@@ -92,20 +83,20 @@ def read_history(
         and found.units[n] in tables.LENGTH_UNITS
     ]  # fmt: skip
     moved = named.get("travel") or (machine[0] if machine else "")
-    travel = measured(found, moved, "length", tables.LENGTH_UNITS, length_unit) if moved else None
+    travel = found.values(moved, tables.LENGTH_UNITS, way, "length_unit") if moved else None
     if len(load) < 2 or not np.ptp(strain) > 0:
         raise InputError(path, f"column {column!r}", "the strain does not change: nothing to read")
     where: Literal["extensometer", "grips"] = "grips" if grips else "extensometer"
-    return LoadHistory(path, load, strain, called_times(found, named), travel, where, notes)
+    return LoadHistory(path, load, strain, found.times(), travel, where, notes)
 
 
-def _strain(found: MachineTable, column: str, unit: str | None) -> tuple[Array, str]:
-    if found.units[column] or unit:
-        return measured(found, column, "strain", tables.STRAIN_UNITS, unit), ""
+def _strain(found: MachineTable, column: str, channel: Channel) -> tuple[Array, str]:
+    if found.units[column] or channel.unit:
+        return found.values(column, tables.STRAIN_UNITS, channel, "strain_unit"), ""
     strain = found.table.numbers(column)
     if np.ptp(strain) > PLAIN:
         problem = f"changes by {np.ptp(strain):.3g} and names no unit; say strain_unit, % or mm/mm"
-        raise InputError(found.table.path, f"line {found.header}, column {column!r}", problem)
+        raise found.error(column, problem)
     return strain, ", which names no unit: mm/mm is taken"
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, check_one_of
 from . import tables
 from .frames import Array, FrameSource
 from .registry import format_of, read_file
@@ -27,148 +27,6 @@ class TableOptions:
     sheet: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class MachineTable:
-    """A table as the file has it: units by column, line of the names, notes of choices made."""
-
-    table: tables.TextTable
-    units: Mapping[str, str]
-    header: int
-    notes: tuple[str, ...] = ()
-
-
-def read_machine_table(
-    path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
-) -> MachineTable:
-    """Read the first table with a column of each quantity that `options` ask for."""
-    table: MachineTable = read_file("machine table", path, format, options)
-    return table
-
-
-def column_of(
-    found: MachineTable, quantity: str, named: Mapping[str, str], needed: Sequence[str] = NEEDED
-) -> str:
-    """Return the column of a quantity, the nearest to the strip; "" where it may be absent."""
-    names = [str(name) for name in found.table.cells.columns]
-    may_lack = quantity not in (*named, *needed)
-    if quantity == "time" and may_lack:
-        return ""
-    which = tables.columns_of(names, quantity, named)
-    if quantity == "elongation" and quantity not in named:
-        which = tables.nearest_to_strip(names, which)
-        lengths = [i for i in which if found.units[names[i]] not in tables.STRAIN_UNITS]
-        which = lengths or which
-    if len(which) == 1 or (not which and may_lack):
-        return names[which[0]] if which else ""
-    there = ", ".join(name for name in names if name)[:300]
-    several = " or ".join(repr(names[i]) for i in which[:6])
-    what = f"may be {several}; name one with columns" if which else "is missing"
-    if len(which) > len({names[i] for i in which}) == 1:
-        what = f"{names[which[0]]!r} appears twice, with other numbers; rename one in the file"
-    if quantity in named:
-        what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
-    problem = f"the column of {quantity} {what}; the file has: {there}"
-    raise InputError(found.table.path, f"line {found.header}", problem)
-
-
-def choice_of(found: MachineTable, quantity: str, named: Mapping[str, str]) -> tuple[str, ...]:
-    """Return a note where `column_of` chose one of several columns, else nothing."""
-    names = [str(name) for name in found.table.cells.columns]
-    which = [] if quantity in named else tables.columns_of(names, quantity, named)
-    if len(which) < 2:
-        return ()
-    chosen = column_of(found, quantity, named)
-    others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
-    why = "" if tables.distance_to_strip(chosen) else ", measured on the strip"
-    return (
-        f"the {quantity} is column {chosen!r}{why}, not {others};"
-        f" columns = {{ {quantity} = ... }} names another",
-    )
-
-
-def source_of(
-    found: MachineTable, columns: Mapping[str, str], asked: Mapping[str, str | None],
-    format: str | None, notes: Sequence[str] = (),
-) -> FrameSource:  # fmt: skip
-    """Return the record of what was read: columns by quantity, units of those that name none."""
-    taken = {quantity: column for quantity, column in columns.items() if column}
-    units = {q: found.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
-    name = format or format_of("machine table", found.table.path).name
-    return FrameSource(name, taken, {q: unit for q, unit in units.items() if unit}, tuple(notes))
-
-
-def measured(
-    found: MachineTable, column: str, kind: str, units: Mapping[str, float], asked: str | None
-) -> Array:
-    """Return a column (rows,) in mm or N; `asked`, the caller's unit, must be the file's."""
-    if asked is not None and asked not in units:
-        known = ", ".join(units)
-        raise InputError(None, f"{kind}_unit", f"expected one of {known}, got {asked!r}")
-    return channel_values(found, column, Channel(unit=asked), units, f"{kind}_unit")
-
-
-@dataclass(frozen=True, eq=False)
-class MachineLoads:
-    """Loads of a machine: load (k,) N; time (k,) s, None unless asked for; path of the file."""
-
-    load: Array
-    time: Array | None
-    path: Path
-
-
-def read_machine_loads(
-    path: Path | str,
-    *,
-    columns: Mapping[str, str] | None = None,
-    timed: bool = False,
-    load_unit: Literal["N", "kN", "lbf"] | None = None,
-    comment: str = "#",
-    decimal: Literal[".", ","] | None = None,
-    format: str | None = None,
-) -> MachineLoads:
-    """Read the loads of an export, with `timed` the times too; its table is found as for curves."""
-    path, named = Path(path), dict(columns or {})
-    needed = ("load", "time") if timed else ("load",)
-    found = read_machine_table(path, TableOptions(named, needed, comment, decimal), format)
-    load = measured(
-        found, column_of(found, "load", named, needed), "load", tables.LOAD_UNITS, load_unit
-    )
-    return MachineLoads(load, _times(found, named, needed) if timed else None, path)
-
-
-def read_times(
-    path: Path | str,
-    column: str | None = None,
-    comment: str = "#",
-    decimal: Literal[".", ","] | None = None,
-    format: str | None = None,
-) -> Array:
-    """Read times (n,) in s, one a row, such as those of pictures in the camera's log."""
-    named = {} if column is None else {"time": column}
-    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
-    return _times(found, named, ("time",))
-
-
-def _times(found: MachineTable, named: Mapping[str, str], needed: tuple[str, ...]) -> Array:
-    column = column_of(found, "time", named, needed)
-    return channel_values(found, column, AS_FOUND, tables.TIME_UNITS)
-
-
-def called_times(found: MachineTable, named: Mapping[str, str]) -> Array | None:
-    """Return the column of times in s that never falls, None where the table has none."""
-    names = [str(name) for name in found.table.cells.columns]
-    for i in tables.columns_of(names, "time", named):
-        try:
-            values = _times(found, {"time": names[i]}, ("time",))
-        except InputError:
-            if "time" in named:
-                raise
-            continue
-        if (np.diff(values) >= 0).all():
-            return values
-    return None
-
-
 @dataclass(frozen=True)
 class Channel:
     """A column of readings (None: by meaning): scale (per volt, or None) * reading + offset."""
@@ -183,19 +41,145 @@ class Channel:
 AS_FOUND = Channel()
 
 
-def channel_values(
-    found: MachineTable, column: str, channel: Channel, units: Mapping[str, float], key: str = ""
+@dataclass(frozen=True, eq=False)
+class MachineTable:
+    """A table as the file has it: units by column, line of the names, notes of choices made.
+
+    options, format : as `read_machine_table` was asked; a reader leaves them out.
+    """
+
+    table: tables.TextTable
+    units: Mapping[str, str]
+    header: int
+    notes: tuple[str, ...] = ()
+    options: TableOptions = TableOptions()
+    format: str | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the columns."""
+        return [str(name) for name in self.table.cells.columns]
+
+    def error(self, column: str, problem: str) -> InputError:
+        """Return an error about a column."""
+        return InputError(self.table.path, f"line {self.header}, column {column!r}", problem)
+
+    def column(self, quantity: str) -> str:
+        """Return the column of a quantity, the nearest to the strip; "" where it may be absent."""
+        names, named = self.names, self.options.columns
+        may_lack = quantity not in (*named, *self.options.quantities)
+        if quantity == "time" and may_lack:
+            return ""
+        which = tables.columns_of(names, quantity, named)
+        if quantity == "elongation" and quantity not in named:
+            which = tables.nearest_to_strip(names, which)
+            lengths = [i for i in which if self.units[names[i]] not in tables.STRAIN_UNITS]
+            which = lengths or which
+        if len(which) == 1 or (not which and may_lack):
+            return names[which[0]] if which else ""
+        there = ", ".join(name for name in names if name)[:300]
+        several = " or ".join(repr(names[i]) for i in which[:6])
+        what = f"may be {several}; name one with columns" if which else "is missing"
+        if len(which) > len({names[i] for i in which}) == 1:
+            what = f"{names[which[0]]!r} appears twice, with other numbers; rename one in the file"
+        if quantity in named:
+            what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
+        problem = f"the column of {quantity} {what}; the file has: {there}"
+        raise InputError(self.table.path, f"line {self.header}", problem)
+
+    def choice(self, quantity: str) -> tuple[str, ...]:
+        """Return a note where `column` chose one of several columns, else nothing."""
+        names, named = self.names, self.options.columns
+        which = [] if quantity in named else tables.columns_of(names, quantity, named)
+        if len(which) < 2:
+            return ()
+        chosen = self.column(quantity)
+        others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
+        why = "" if tables.distance_to_strip(chosen) else ", measured on the strip"
+        return (
+            f"the {quantity} is column {chosen!r}{why}, not {others};"
+            f" columns = {{ {quantity} = ... }} names another",
+        )
+
+    def source(
+        self, columns: Mapping[str, str], asked: Mapping[str, str | None], notes: Sequence[str] = ()
+    ) -> FrameSource:
+        """Return the record of what was read: columns by quantity, units where none is named."""
+        taken = {quantity: column for quantity, column in columns.items() if column}
+        units = {q: self.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
+        name = self.format or format_of("machine table", self.table.path).name
+        return FrameSource(name, taken, {q: unit for q, unit in units.items() if unit}, (*notes,))
+
+    def values(
+        self, column: str, units: Mapping[str, float], channel: Channel = AS_FOUND, key: str = ""
+    ) -> Array:
+        """Return a column (rows,), converted by the table `units`; times without a unit are in s.
+
+        key : the caller's argument that is the unit of the channel, which must be one of `units`.
+        """
+        if key:
+            check_one_of(channel.unit, units, key)
+        own = self.units[column]
+        if units is tables.TIME_UNITS:
+            if (stamps := self.table.stamps(column)) is not None:
+                return stamps
+            at_the_end = re.search(rf"[_\s]({'|'.join(units)})$", column)
+            own = own or (at_the_end[1] if at_the_end else "")
+            channel = channel if own or channel.unit else replace(channel, unit="s")
+        readings, at = self.table.numbers(column), f"line {self.header}, column {column!r}"
+        return in_unit(readings, own, channel, units, self.table.path, at, key)
+
+    def times(self) -> Array | None:
+        """Return the column of times in s that never falls, None where the table has none."""
+        for i in tables.columns_of(self.names, "time", self.options.columns):
+            try:
+                values = self.values(self.names[i], tables.TIME_UNITS)
+            except InputError:
+                if "time" in self.options.columns:
+                    raise
+                continue
+            if (np.diff(values) >= 0).all():
+                return values
+        return None
+
+
+def read_machine_table(
+    path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
+) -> MachineTable:
+    """Read the first table with a column of each quantity that `options` ask for."""
+    table: MachineTable = read_file("machine table", path, format, options)
+    return replace(table, options=options, format=format)
+
+
+def read_machine_loads(
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    timed: bool = False,
+    load_unit: Literal["N", "kN", "lbf"] | None = None,
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
+) -> tuple[Array, Array | None]:
+    """Read the loads (k,) N of an export, with `timed` the times (k,) s too, else None."""
+    needed = ("load", "time") if timed else ("load",)
+    found = read_machine_table(path, TableOptions(columns or {}, needed, comment, decimal), format)
+    unit = Channel(unit=load_unit)
+    load = found.values(found.column("load"), tables.LOAD_UNITS, unit, "load_unit")
+    return load, found.values(found.column("time"), tables.TIME_UNITS) if timed else None
+
+
+def read_times(
+    path: Path | str,
+    column: str | None = None,
+    comment: str = "#",
+    decimal: Literal[".", ","] | None = None,
+    format: str | None = None,
 ) -> Array:
-    """Return a column (rows,), converted by the table `units`; times without a unit are in s."""
-    own, at = found.units[column], f"line {found.header}, column {column!r}"
-    if units is tables.TIME_UNITS:
-        if (stamps := found.table.stamps(column)) is not None:
-            return stamps
-        at_the_end = re.search(rf"[_\s]({'|'.join(units)})$", column)
-        own = own or (at_the_end[1] if at_the_end else "")
-        channel = channel if own or channel.unit else replace(channel, unit="s")
-    readings = found.table.numbers(column)
-    return in_unit(readings, own, channel, units, found.table.path, at, key)
+    """Read times (n,) in s, one a row, such as those of pictures in the camera's log."""
+    named = {} if column is None else {"time": column}
+    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
+    return found.values(found.column("time"), tables.TIME_UNITS)
 
 
 def in_unit(

@@ -22,15 +22,7 @@ from ..files import ends
 from . import tables
 from .frames import Array, Frame, heading_of
 from .inflations import Which, branches_of
-from .machine_tables import (
-    AS_FOUND,
-    Channel,
-    TableOptions,
-    channel_values,
-    column_of,
-    in_unit,
-    read_machine_table,
-)
+from .machine_tables import AS_FOUND, Channel, TableOptions, in_unit, read_machine_table
 from .text_frames import SEPARATORS, TOP, Lines, cells_of
 
 #: The apex of a frame is what moved most; so large a share of the points moved less, lest a stray
@@ -56,9 +48,9 @@ def read_pressure_log(
     named = {key: c.column for key, c in channels.items() if c.column is not None}
     asked = TableOptions(named, ("time", "pressure"), comment, decimal)
     found = read_machine_table(path, asked, format)
-    column, of_log = (column_of(found, key, named, asked.quantities) for key in channels)
-    pressure = channel_values(found, of_log, of_pressure, tables.PRESSURE_UNITS)
-    time = channel_values(found, column, of_time, tables.TIME_UNITS)
+    column = found.column("time")
+    pressure = found.values(found.column("pressure"), tables.PRESSURE_UNITS, of_pressure)
+    time = found.values(column, tables.TIME_UNITS, of_time)
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         at = f"line {found.table.lines[back[0] + 1]}, column {column!r}"

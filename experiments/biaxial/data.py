@@ -15,10 +15,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, check_one_of
 from ...materials.designers import RATIOS, shares
-from ...readers import machine_tables as machine
 from ...readers.frames import FrameSource
+from ...readers.machine_tables import Channel, TableOptions, read_machine_table
 from ...readers.tables import LOAD_UNITS, PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 
 Array = NDArray[np.float64]
@@ -88,31 +88,30 @@ def read_biaxial_table(
     columns : the file's own names of `QUANTITIES` and `ratio`. load_unit, strain_unit : where the
     file names none. width : mm of the arms, for forces. sheet : of a workbook."""
     path, named = Path(path), dict(columns or {})
-    unknown = [name for name in named if name not in (*QUANTITIES, "ratio")]
-    if unknown:
-        problem = f"unknown quantity {unknown[0]!r}; expected {', '.join((*QUANTITIES, 'ratio'))}"
-        raise InputError(None, "columns", problem)
+    for name in named:
+        check_one_of(name, (*QUANTITIES, "ratio"), "columns")
     asked = {QUANTITIES.get(name, name): column for name, column in named.items()}
     wanted = tuple(QUANTITIES.values())
-    options = machine.TableOptions(asked, wanted, comment, decimal, sheet)
-    found = machine.read_machine_table(path, options, format)
-    column = {name: machine.column_of(found, name, asked, wanted) for name in (*wanted, "ratio")}
+    options = TableOptions(asked, wanted, comment, decimal, sheet)
+    found = read_machine_table(path, options, format)
+    column = {name: found.column(name) for name in (*wanted, "ratio")}
     loads, own = dict(WIDTH_LOAD_UNITS), found.units[column["warp load"]] or load_unit or ""
     if scale_of(own, LOAD_UNITS) is not None:
         if width is None:
             problem = f"{own} is a force; say the width of the arms, [biaxial] width"
-            at = f"line {found.header}, column {column['warp load']!r}"
-            raise InputError(path, at, problem)
+            raise found.error(column["warp load"], problem)
         loads |= {unit: scale / width for unit, scale in LOAD_UNITS.items()}
     load, strain = (
-        np.column_stack([machine.measured(found, column[f"{yarn} {kind}"], kind, units, unit)
-                         for yarn in ("warp", "fill")])
+        np.column_stack([
+            found.values(column[f"{yarn} {kind}"], units, Channel(unit=unit), f"{kind}_unit")
+            for yarn in ("warp", "fill")
+        ])
         for kind, units, unit in (
             ("load", loads, load_unit), ("strain", STRAIN_UNITS, strain_unit),
         )
     )  # fmt: skip
     units_asked = {name: load_unit if name.endswith("load") else strain_unit for name in wanted}
-    source = machine.source_of(found, column, units_asked, format, found.notes)
+    source = found.source(column, units_asked, found.notes)
     ratio = None
     if column["ratio"]:
         cells, lines = found.table.text(column["ratio"]), found.table.lines
@@ -124,7 +123,7 @@ def read_biaxial_table(
                 at = f"line {line}, column {column['ratio']!r}"
                 raise InputError(path, at, error.problem) from None
         ratio = tuple(names)
-    time = machine.called_times(found, asked)
+    time = found.times()
     return BiaxialTable(path, load, strain, ratio, found.table.lines, source, time)
 
 

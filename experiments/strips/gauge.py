@@ -248,17 +248,17 @@ def loads_at_frames(record: GaugeRecord, loads: PairedLoads) -> LoadCurve:
     named = {quantity: column for quantity, column in columns.items() if column is not None}
     own = {name: getattr(loads, name) for name in ("timed", "load_unit", "decimal", "format")}
     with _naming("load_column, time_column" if loads.timed else "load_column"):
-        machine = read_machine_loads(loads.path, columns=named, **own)
-    if not loads.timed and len(machine.load) != count:
+        machine, clock = read_machine_loads(loads.path, columns=named, **own)
+    if not loads.timed and len(machine) != count:
         problem = (
-            f"expected one load for each of the {count} frames, got {len(machine.load)};"
+            f"expected one load for each of the {count} frames, got {len(machine)};"
             " frame_times or frame_interval pair by time"
         )
         raise InputError(loads.path, "", problem)
     return gauge_load_curve(
-        record, machine.load, direction=loads.direction, specimen=loads.specimen.strip(),
+        record, machine, direction=loads.direction, specimen=loads.specimen.strip(),
         frame_times=None if times is None else times + (loads.time_offset or 0.0),
-        load_times=machine.time, path=loads.path,
+        load_times=clock, path=loads.path,
     )  # fmt: skip
 
 

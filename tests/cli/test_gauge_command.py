@@ -161,7 +161,7 @@ BAD = [
     ([*LOADS, "--load-column", "F"], "'F'; name them with --load-column; line 4, above"),
     ([*LOADS, "--frame-times", "{tmp}/none.csv"], "none.csv: no such file"),
     (["--columns", "x"], "--columns: expected such as x=X,y=Y"),
-    (["--columns", "w=W"], "--columns: unknown quantity 'w'; expected x, y, z, dx, dy, dz"),
+    (["--columns", "w=W"], "--columns: expected one of x, y, z, dx, dy, dz, got 'w'"),
     (["--columns", "x=dx,dx=dx"], "--columns: column 'dx' is named for x and for dx"),
     (["--columns", "x=X"], "f0.csv: column 'X': this column is missing; the file has: x, y"),
     (["--flag-column", "mask"], "f0.csv: column 'mask': this column is missing"),
