@@ -72,7 +72,7 @@ def noisy(test, noise, random):
         )
         return replace(test, test=replace(test.test, noise=max(noise, 1e-3)), fields=fields)
     if isinstance(test, PreparedBiaxial):
-        (path,) = test.test.data.paths
+        (path,) = test.test.paths
         off = (noise > 0) * OF_STRAIN * random.standard_normal(path.strain.shape)
         data = replace(test.test.data, paths=(replace(path, strain=path.strain + off),))
         return replace(test, test=replace(test.test, data=data, noise=OF_STRAIN))
@@ -126,7 +126,7 @@ def biaxial(sets=10):
         own = []
         for number in range(sets if noise else 1):
             random, paths = np.random.default_rng([number, 16]), []
-            for path in test.data.paths:
+            for path in test.paths:
                 strain = 100 * biaxial_response(known, path.load, thickness).elongation
                 larger = path.load.max(axis=1)
                 share = (larger - larger[0]) / (larger[-1] - larger[0])

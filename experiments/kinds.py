@@ -200,6 +200,20 @@ class Test(Protocol):
         """Return settings, without paths, on which a result depends beside data, law, solver."""
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SectionTest:
+    """The beginning of a test of a section. noise : of one value, where the section says it."""
+
+    name: str
+    place: Place
+    weight: float = 1.0
+    noise: float | None = None
+
+    def thick(self, given: float | None) -> float:
+        """Return a thickness that is given, else the fabric's, mm."""
+        return self.place.fabric.thickness if given is None else given
+
+
 @dataclass(frozen=True, eq=False)
 class Studied:
     """The quantities of a study with a card: under refinement, or with another nu12.
@@ -229,6 +243,11 @@ class CardRun:
 
     model: Any
     outcome: History | SolverFailure
+
+
+#: Cards by name, and their runs by card and part of a test.
+Cards = Mapping[str, MaterialCard]
+Runs = Mapping[tuple[str, str], CardRun]
 
 
 @dataclass(frozen=True, eq=False)
@@ -830,6 +849,23 @@ class ChannelSection(Section):
     def channel(self) -> Channel:
         """Return the channel."""
         return Channel(**self.model_dump())
+
+
+def listed_files(
+    place: Place, folder: Path, said: Mapping[Any, Sequence[str]], at: str
+) -> list[tuple[Path, str, Any]]:
+    """Return each file that a section lists, its key, and the heading that it is listed under.
+    said : names by heading, None for a plain list. at : dotted key of the list below the section.
+    Raises InputError for a name that is listed twice."""
+    found = []
+    for heading, names in said.items():
+        key = at if heading is None else f"{at}.{heading}"
+        for i, name in enumerate(names):
+            if Path(name) in map(Path, names[:i]):
+                problem = f"{name!r} is listed twice; its values would count double"
+                raise place.error(f"{key}[{i}]", problem)
+            found.append((folder / name, f"{key}[{i}]", heading))
+    return found
 
 
 def named_format(place: Place, field: str, content: Content, name: str | None) -> str | None:

@@ -17,13 +17,13 @@ from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
 from .kinds import (
     Array,
-    CardRun,
     FittedTest,
     MakeSolver,
     Masks,
     Predicted,
     PreparedTest,
     Reach,
+    Runs,
     Studied,
     Weighting,
 )
@@ -56,9 +56,8 @@ def compared(
 
 
 def errors_of_cards(
-    runs: Mapping[tuple[str, str], CardRun], errors: Callable[[History], dict[str, Any]],
-    words: Callable[[Any], str],
-) -> tuple[dict[str, Any], list[str], dict[str, History]]:  # fmt: skip
+    runs: Runs, errors: Callable[[History], dict[str, Any]], words: Callable[[Any], str]
+) -> tuple[dict[str, Any], list[str], dict[str, History]]:
     """Return numbers, lines and histories by card, of a test of one part; failures in words."""
     numbers, lines, good = dict[str, Any](), list[str](), dict[str, History]()
     for (name, _), run in runs.items():

@@ -17,7 +17,8 @@ GROUP: Group = "bubblefit.tests"
 #: What a plug-in's kind must have to be one.
 NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", "report")
 
-log = logging.getLogger(__name__)
+#: Logs a line once: kinds are asked for many times.
+warn_once = cache(logging.getLogger(__name__).warning)
 
 
 def kinds() -> Mapping[str, Kind]:
@@ -30,7 +31,7 @@ def kinds() -> Mapping[str, Kind]:
             if plug_in.name not in known:
                 known[plug_in.name] = kind_named(plug_in.name)
         except PlugInFailure as error:
-            _warn(str(error))
+            warn_once("%s", str(error))
     return known
 
 
@@ -70,9 +71,3 @@ def _folders() -> tuple[str, ...]:
     """Return the folders of this package: each holds a `KIND` of that name."""
     here = str(Path(__file__).parent)
     return tuple(module.name for module in iter_modules([here]) if module.ispkg)
-
-
-@cache
-def _warn(text: str) -> None:
-    """Log a line once: kinds are asked for many times."""
-    log.warning("%s", text)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, cast
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison, NoiseIs
@@ -18,7 +18,7 @@ from ...solvers.base import History
 from .. import kinds
 from ..cylinder.test import PART, BentSection, CylinderTest
 from ..cylinder.test import read as read_cylinder
-from ..kinds import Array, Kind, MakeSolver, Masks, Place, Weighting
+from ..kinds import Array, MakeSolver, Masks, Place, Weighting
 from ..measured import MeasuredKind, PreparedWhole
 from ..strips.prepared import LoadObjective
 
@@ -40,7 +40,6 @@ class BendingTest(CylinderTest):
     """A cylinder with measured loads; noise : of one load, N."""
 
     kind: str = "bending"
-    noise: float | None = None
 
     @property
     def points(self) -> tuple[Array, Array]:
@@ -66,8 +65,8 @@ def read(section: BendingSection, place: Place, name: str) -> BendingTest:
     if section.deflection is None and section.deflections is None and ends:
         end, frames = max(ends), section.frames or FRAMES
         cylinder = replace(cylinder, deflections=tuple(np.linspace(0.0, end, frames + 1)[1:]))
-    known = {key: value for key, value in vars(cylinder).items() if key != "kind"}
-    test = BendingTest(**{**known, "weight": section.weight}, noise=section.noise)
+    own = {"kind": "bending", "weight": section.weight, "noise": section.noise}
+    test = BendingTest(**vars(cylinder) | own)
     largest = float(np.abs(test.points[1]).max(initial=0.0))
     if cylinder.measured and not (len(test.points[0]) > 1 and largest > 0):
         end = test.deflections[-1] / place.scales.length
@@ -122,12 +121,12 @@ class PreparedBending(PreparedWhole):
 class Bending(MeasuredKind):
     """An inflated cylinder in bending whose loads are fitted."""
 
-    name: str = "bending"
-    title: str = "an inflated cylinder in bending, with measured loads that a fit matches"
-    section: type[BaseModel] = BendingSection
-    folder_key: str = "measured.folder"
+    name = "bending"
+    title = "an inflated cylinder in bending, with measured loads that a fit matches"
+    section = BendingSection
+    folder_key = "measured.folder"
     prepared = PreparedBending
     read = staticmethod(read)
 
 
-KIND: Kind = Bending()
+KIND = Bending()

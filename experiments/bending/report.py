@@ -4,12 +4,11 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.vega import saved
 from ...solvers.base import History
 from ..cylinder.test import PART
-from ..kinds import CardRun, Findings, FittedTest, Output, Simulation, Weighting
+from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation, Weighting
 from ..measured import compared, errors_of_cards
 from . import BendingObjective, BendingTest, PreparedBending
 
@@ -31,9 +30,8 @@ def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
 
 
 def simulate(
-    test: BendingTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: BendingTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Draw the loads with every card; return the RMS errors."""
     numbers, lines, good = errors_of_cards(
         runs, lambda history: _errors(test, history) if test.measured else {}, _words

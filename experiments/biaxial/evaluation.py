@@ -6,6 +6,7 @@ after the last one, less that of the first row, under the prestress: known at th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import groupby
@@ -19,27 +20,15 @@ from ...files import pandas as pd
 from ...inference.assessment import UNCERTAIN
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
-from ..kinds import UNMATCHED, UNSTABLE, Array
+from ..kinds import UNMATCHED, UNSTABLE
 from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
 from .test import BiaxialTest
 
 #: Of a loading's range: how near both loads must be to those of the first row.
 BACK = 0.01
-
-
-@dataclass(frozen=True, eq=False)
-class KeptStrain:
-    """Residual strains (2,) before the first loading of a phase and after its last.
-    None where the loads are not those of the first row, load (2,) kN/m."""
-
-    file: str
-    ratio: str
-    phase: int
-    cycles: int
-    before: Array | None
-    after: Array | None
-    load: Array
+#: Values along warp and fill that are not known.
+NEITHER = np.full(2, np.nan)
 
 
 #: Constants that differ by more between options (largest over smallest) are worth a word.
@@ -51,16 +40,18 @@ NAMES = {"warp": "E warp", "fill": "E fill", "nu_warp": "nu warp", "nu_fill": "n
 @dataclass(frozen=True, eq=False)
 class BiaxialEvaluation:
     """Elastic constants of one test, by the options chosen and by others that the paths settle.
-    first, last : with the first and the last cycle of each ratio, None where these settle none."""
+    first, last : with the first and the last cycle of each ratio, None where these settle none.
+    kept : residual strains before the first loading of a phase and after its last; NaN where the
+    loads are not those of the first row."""
 
     test: str
-    paths: tuple[BiaxialPath, ...]
+    paths: Sequence[BiaxialPath]
     lines: tuple[LinearPath, ...]
     chosen: Evaluation
     others: tuple[Evaluation, ...]
     first: Evaluation | None
     last: Evaluation | None
-    kept: tuple[KeptStrain, ...]
+    kept: pd.DataFrame
 
     @property
     def notes(self) -> list[Note]:
@@ -92,7 +83,7 @@ class BiaxialEvaluation:
 
 def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluation:
     """Return the constants of a test by some options, beside those of all others."""
-    paths = test.data.paths
+    paths = test.paths
     lines = tuple(line_of(path.ratio, path.load, path.since) for path in paths)
     there = [line.ratio for line in lines]
     missing = [ratio for ratio in options.ratios if ratio not in there]
@@ -101,8 +92,8 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
         raise test.place.error("ratios", problem)
     with test.place.naming(field="data"):
         chosen = designers.evaluate(lines, options)
-    found = []
-    for table, cycles in zip(test.data.tables, test.data.cycles, strict=True):
+    kept = []
+    for table, cycles in zip(test.tables, test.cycles, strict=True):
         away = np.abs(table.load - table.load[0]).max(axis=1)
         least = BACK * float(np.ptp(table.load.max(axis=1)))
         for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
@@ -112,21 +103,24 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
             stop = (later[0] if later else len(table.load) - 1) + 1
             back = last.last + int(np.argmin(away[last.last : stop]))
             before, after = (
-                table.strain[row] - table.strain[0] if away[row] <= least else None
+                PERCENT * (table.strain[row] - table.strain[0]) if away[row] <= least else NEITHER
                 for row in (same[0].first, back)
             )
-            name, load = table.path.name, table.load[0]
-            found.append(KeptStrain(name, last.ratio, last.phase, len(same), before, after, load))
-    others, kept = tuple(designers.evaluate_others(lines, options)), tuple(found)
+            row = {"file": table.path.name, "phase": last.phase, "ratio": last.ratio}
+            strains = _by_yarn(
+                before_percent=before, after_percent=after, load_kN_per_m=table.load[0]
+            )
+            kept.append({**row, "cycles": len(same), **strains})
+    others = tuple(designers.evaluate_others(lines, options))
     ends = _of_cycle(test, 1, options), _of_cycle(test, "last", options)
-    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, kept)
+    table = pd.DataFrame(kept)
+    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, table)
 
 
 def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
     """Return the paths of another cycle of the same ratios, without conditioning."""
-    section, data = test.section, test.data
-    ratios = [path.ratio for path in data.paths]
-    paths = evaluated_paths(data.tables, data.cycles, which, section.conditioning, ratios)
+    section, ratios = test.section, [path.ratio for path in test.paths]
+    paths = evaluated_paths(test.tables, test.cycles, which, section.conditioning, ratios)
     with suppress(InputError):
         if section.range is not None:
             paths = [path.between(*section.range) for path in paths]
@@ -157,12 +151,13 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
         for path, line in zip(found.paths, found.lines, strict=True)
     }
     table = []
-    for k in found.kept:
-        path, line = evaluated.get((k.file, k.phase), (None, None))
-        row: dict[str, object] = {"file": k.file, "ratio": k.ratio, "load_cycles": k.cycles}
+    for k in found.kept.to_dict("records"):
+        path, line = evaluated.get((k["file"], k["phase"]), (None, None))
+        row: dict[str, object] = {"file": k["file"], "ratio": k["ratio"]}
+        row["load_cycles"] = k["cycles"]
         row["cycle_evaluated"] = "" if path is None else str(path.cycle.number)
-        ends = path.load[[0, -1]] if path is not None else np.full((2, 2), np.nan)
-        stiff, nu = np.full(2, np.nan), np.full(2, np.nan)
+        ends = path.load[[0, -1]] if path is not None else (NEITHER, NEITHER)
+        stiff, nu = NEITHER.copy(), NEITHER.copy()
         if line is not None:
             for own, unloaded in enumerate(line.unloaded):
                 if not unloaded and line.strain[own] > 0:
@@ -171,9 +166,9 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
                     nu[own] = -line.strain[own] / line.strain[1 - own]
         table.append(row | _by_yarn(
             from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
-            strain_kept_percent=_percent(k.after),
+            strain_kept_percent=(k["warp_after_percent"], k["fill_after_percent"]),
         ))  # fmt: skip
-    c, count = found.chosen.constants, sum(k.cycles for k in found.kept)
+    c, count = found.chosen.constants, int(found.kept["cycles"].sum())
     row = {"file": "", "ratio": "all", "load_cycles": count, "cycle_evaluated": ""}
     together = _by_yarn(stiffness_kN_per_m=(c.warp, c.fill), poisson=(c.nu_warp, c.nu_fill))
     return pd.DataFrame([*table, row | together])
@@ -186,10 +181,6 @@ def _by_yarn(**pairs: ArrayLike) -> dict[str, float]:
         for name, pair in pairs.items()
         for yarn, value in zip(("warp", "fill"), np.asarray(pair), strict=True)
     }
-
-
-def _percent(strain: Array | None) -> Array:
-    return np.full(2, np.nan) if strain is None else PERCENT * strain
 
 
 #: File of the table after EN 17117-1.
@@ -215,15 +206,8 @@ def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
             rms_about_line_percent=PERCENT * np.asarray(line.residual),
         )
         table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
-    phases = []
-    for k in found.kept:
-        row = {"file": k.file, "phase": k.phase, "ratio": k.ratio, "cycles": k.cycles}
-        before, after = _percent(k.before), _percent(k.after)
-        phases.append(
-            row | _by_yarn(before_percent=before, after_percent=after, load_kN_per_m=k.load)
-        )
     return {"constants": pd.DataFrame(options), STANDARD: standard_table(found),
-            "lines": pd.DataFrame(table), "kept": pd.DataFrame(phases)}  # fmt: skip
+            "lines": pd.DataFrame(table), "kept": found.kept}  # fmt: skip
 
 
 def lines_of(found: BiaxialEvaluation) -> list[str]:
@@ -252,15 +236,13 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
             f"  first cycles: E warp {one.warp:.4g}, E fill {one.fill:.4g} kN/m; last cycles: "
             f"{two.warp:.4g}, {two.fill:.4g} kN/m"
         )
-    last = next((kept for kept in reversed(found.kept) if kept.after is not None), None)
-    if last is not None and last.after is not None:
-        warp, fill = PERCENT * last.after
-        said.append(
-            f"  strain kept after {last.ratio}, the last that comes back to the loads of the "
-            f"beginning ({last.load[0]:.3g} and {last.load[1]:.3g} kN/m): warp {warp:.3g} %, "
-            f"fill {fill:.3g} %"
-        )
-    return said
+    back = found.kept.dropna(subset="warp_after_percent").to_dict("records")
+    return said + [
+        "  strain kept after {ratio}, the last that comes back to the loads of the beginning "
+        "({warp_load_kN_per_m:.3g} and {fill_load_kN_per_m:.3g} kN/m): warp "
+        "{warp_after_percent:.3g} %, fill {fill_after_percent:.3g} %".format(**last)
+        for last in back[-1:]
+    ]
 
 
 def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:

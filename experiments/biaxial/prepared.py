@@ -18,7 +18,7 @@ from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Weighting
 from ..measured import PERCENT, USUAL_NOISE, PreparedParts, StrainObjective
 from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
-from .test import BiaxialData, BiaxialSection, BiaxialTest, TablesSection, reach_of
+from .test import BiaxialSection, BiaxialTest, TablesSection, reach_of
 
 #: Strains at the end of a path: no coated fabric ends below or above.
 LEAST_END, MOST_END = 5e-4, 0.5
@@ -94,18 +94,18 @@ class PreparedBiaxial(PreparedParts):
         return tuple(found)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        used = {id(table): 0 for table in self.test.data.tables}
-        for path in self.test.data.paths:
+        used = {id(table): 0 for table in self.test.tables}
+        for path in self.test.paths:
             used[id(path.table)] += len(path.load)
         files = []
-        for table in self.test.data.tables:
+        for table in self.test.tables:
             rows = used[id(table)]
             dropped = {"not of an evaluated loading": len(table.load) - rows}
             files.append(kinds.DataFile(table.path, table.source, rows, dropped))
         return files
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
-        paths = self.test.data.paths
+        paths = self.test.paths
         found = [doubt for path in paths for doubt in _of_path(path)]
         for path in paths if expected.moduli else ():
             yarn = int(np.argmax(path.load[-1] - path.load[0]))
@@ -159,9 +159,10 @@ def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> Pre
     )
     path = BiaxialPath(table, Cycle(ratio, 1, 1, 1, 0, LOADS - 1), 1, loads, strain)
     section = BiaxialSection(data=TablesSection(files=["computed"]))
-    data, noise = BiaxialData((table,), (), (path,)), _noise(own, planning) / PERCENT
-    name, place = f"biaxial {ratio}", planning.place
-    test = BiaxialTest(name=name, place=place, weight=1.0, data=data, section=section, noise=noise)
+    test = BiaxialTest(
+        name=f"biaxial {ratio}", place=planning.place, weight=1.0, section=section,
+        tables=[table], paths=[path], noise=_noise(own, planning) / PERCENT,
+    )  # fmt: skip
     return PreparedBiaxial(test)
 
 
@@ -169,7 +170,7 @@ def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
     """Return the noise of independent strains, %."""
     if planning.noise is not None:
         return planning.noise
-    known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.data.paths]
+    known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.paths]
     if not known:
         return kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(LOADS - 1)
     return max(one.at(LOADS - 1) for one in known)

@@ -1,13 +1,12 @@
 """Results of biaxial tests as numbers, tables, figures and files."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ...errors import Note, SolverFailure
-from ...materials.card import MaterialCard
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...reports.charts import Charts
@@ -15,7 +14,7 @@ from ...reports.content import Exhibit, Table
 from ...reports.strips import ratio_chart
 from ...reports.vega import saved
 from .. import kinds
-from ..kinds import Array, CardRun, Findings, FittedTest, Output, Simulation
+from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import PERCENT, FittedPart, compared
 from .evaluation import CONVENTION, NAMES, STANDARD, BiaxialEvaluation, in_words, tables_of
 from .prepared import PreparedBiaxial
@@ -54,13 +53,12 @@ def _columns(values: Array, name: str) -> pd.DataFrame:
 
 
 def simulate(
-    test: BiaxialTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: BiaxialTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Write paths.csv and paths.png; `within_range`: only up to the card's valid range."""
     numbers: dict[str, Any] = {name: {"ratios": {}} for name in cards}
     tables, panels, lines = [], [], []
-    for path in test.data.paths:
+    for path in test.paths:
         curves = []
         for name, card in cards.items():
             outcome, ratios = runs[name, path.ratio].outcome, numbers[name]["ratios"]
@@ -117,7 +115,7 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
         f"{prepared.test.name} pulls along the yarns only: it says nothing of G12, which rests on "
         "other tests or stays where its fit began"
     )
-    said = dict.fromkeys(note for table in prepared.test.data.tables for note in table.source.notes)
+    said = dict.fromkeys(note for table in prepared.test.tables for note in table.source.notes)
     notes = Note(kinds.UNMATCHED, words), *(Note(kinds.READING, words) for words in said)
     return Findings({"ratios": numbers}, notes, (summary,), summary, summary)
 
@@ -160,12 +158,12 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
 
 def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     """Draw the paths; return a table of all cycles."""
-    data = prepared.test.data
-    panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.since) for p in data.paths]
+    test = prepared.test
+    panels = [ratio_chart(p.ratio, p.larger, PERCENT * p.since) for p in test.paths]
     charts = Charts("ratios", panels, "")
-    used = {(id(path.table), path.cycle.count) for path in data.paths}
+    used = {(id(path.table), path.cycle.count) for path in test.paths}
     rows: list[list[object]] = []
-    for read, cycles in zip(data.tables, data.cycles, strict=True):
+    for read, cycles in zip(test.tables, test.cycles, strict=True):
         for cycle in cycles:
             kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
             mark = "yes" if (id(read), cycle.count) in used else ""

@@ -1,8 +1,9 @@
 """A biaxial test, as its section describes it, and its models."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from ...materials.card import State
 from ...meshes.strip_models import PatchModel
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Number, Positive, Section
-from ..kinds import Place, Reach, Refined, named_format
+from ..kinds import Place, Reach, Refined, SectionTest, listed_files, named_format
 from .data import (
     BiaxialPath,
     BiaxialTable,
@@ -78,23 +79,17 @@ class BiaxialSection(Section):
     data: TablesSection
 
 
-@dataclass(frozen=True, eq=False)
-class BiaxialData:
-    """Data of a test: files, their cycles, and the path of each ratio."""
-
-    tables: tuple[BiaxialTable, ...]
-    cycles: tuple[tuple[Cycle, ...], ...]
-    paths: tuple[BiaxialPath, ...]
-
-
-def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
-    """Read the data of a section; none where a file is missing and not needed."""
+def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
+    """Read the section of a test, and its files; no data where one is missing and not needed."""
+    noise = None if section.noise is None else 0.01 * section.noise
+    test = BiaxialTest(name=name, place=place, weight=section.weight, section=section, noise=noise)
     data, folder = section.data, place.folder(section.data.folder)
-    columns = {k: v for k, v in data.columns.model_dump().items() if v is not None}
+    columns = data.columns.model_dump(exclude_none=True)
+    said = data.files if isinstance(data.files, dict) else {None: data.files}
     tables, named = [], []
-    for path, field, ratio in _listed(place, data, folder):
+    for path, field, ratio in listed_files(place, folder, said, "data.files"):
         if not place.has(path, field):
-            return BiaxialData((), (), ())
+            return test
         tables.append(
             read_biaxial_table(
                 path, columns=columns, load_unit=data.load_unit, strain_unit=data.strain_unit,
@@ -103,7 +98,7 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
                 format=named_format(place, "data.format", "machine table", data.format),
             )
         )  # fmt: skip
-        named.append(ratio)
+        named.append(ratio and _ratio(place, f"data.files.{ratio}", ratio))
     cycles = [
         find_cycles(table.load, table.ratio if ratio is None else [ratio] * len(table.load))
         for table, ratio in zip(tables, named, strict=True)
@@ -121,19 +116,8 @@ def read_biaxial(place: Place, section: BiaxialSection) -> BiaxialData:
             problem = f"expected [lowest, highest] in kN/m, got [{lowest:g}, {highest:g}]"
             raise place.error("range", problem)
         paths = [path.between(lowest, highest) for path in paths]
-    thinned = tuple(path.thinned(section.points) for path in paths)
-    return BiaxialData(tuple(tables), tuple(tuple(own) for own in cycles), thinned)
-
-
-def _listed(place: Place, data: TablesSection, folder: Path) -> list[tuple[Path, str, str | None]]:
-    """Return each file, its key, and the ratio that it is listed for."""
-    if isinstance(data.files, list):
-        return [(folder / name, f"data.files[{i}]", None) for i, name in enumerate(data.files)]
-    listed: list[tuple[Path, str, str | None]] = []
-    for key, names in data.files.items():
-        ratio = _ratio(place, f"data.files.{key}", key)
-        listed += [(folder / name, f"data.files.{key}[{i}]", ratio) for i, name in enumerate(names)]
-    return listed
+    thinned = [path.thinned(section.points) for path in paths]
+    return replace(test, tables=tables, cycles=cycles, paths=thinned)
 
 
 def _ratio(place: Place, field: str, name: str) -> str:
@@ -146,22 +130,21 @@ LEAST_STRAIN = 1e-4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BiaxialTest:
-    """A cruciform loaded along warp and fill: N/mm, strains as shares; noise of one strain."""
+class BiaxialTest(SectionTest):
+    """A cruciform loaded along warp and fill: N/mm, strains as shares; noise of one strain.
+    tables : the files; cycles : of each; paths : the loading of each ratio that is evaluated."""
 
-    name: str
-    place: Place
-    weight: float
-    data: BiaxialData
     section: BiaxialSection
-    noise: float | None = None
+    tables: Sequence[BiaxialTable] = ()
+    cycles: Sequence[Sequence[Cycle]] = ()
+    paths: Sequence[BiaxialPath] = ()
     kind: str = "biaxial"
     reads_files: bool = True
 
     @property
     def state(self) -> State:
         """Return "conditioned" where a cycle before those that are evaluated was not the first."""
-        later = any(path.cycle.count > 1 for path in self.data.paths)
+        later = any(path.cycle.count > 1 for path in self.paths)
         return "conditioned" if later else "first loading"
 
     @property
@@ -169,25 +152,25 @@ class BiaxialTest:
         """Return rate of strain and hold by the files' times, of the larger load and strain."""
         return pace_of(
             LoadHistory(t.path, t.load.max(axis=1), t.strain.max(axis=1), t.time)
-            for t in self.data.tables
+            for t in self.tables
         )
 
     @property
     def matched(self) -> Mapping[str, BiaxialPath]:
         """Return the paths by ratio."""
-        return {path.ratio: path for path in self.data.paths}
+        return {path.ratio: path for path in self.paths}
 
     @property
     def reach(self) -> Reach:
         """Return the largest strains along warp and fill."""
-        return reach_of(self.data.paths)
+        return reach_of(self.paths)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, PatchModel]:
         """Return a patch for each ratio, driven by the measured loads: nothing to refine."""
-        thick = self.place.fabric.thickness if thickness is None else thickness
-        return {path.ratio: PatchModel(path.load, thick) for path in self.data.paths}
+        thick = self.thick(thickness)
+        return {path.ratio: PatchModel(path.load, thick) for path in self.paths}
 
     def settings(self) -> Mapping[str, object]:
         return {"weight": self.weight, "noise": self.noise}
@@ -200,12 +183,3 @@ def reach_of(paths: Collection[BiaxialPath]) -> Reach:
     ends = np.max([path.strain.max(axis=0) for path in paths], axis=0)
     warp, fill = (float(np.log1p(end)) if end > LEAST_STRAIN else None for end in ends)
     return Reach((warp, fill, None))
-
-
-def read(section: BiaxialSection, place: Place, name: str) -> BiaxialTest:
-    """Read the section of a test, and its files."""
-    noise = None if section.noise is None else 0.01 * section.noise
-    data = read_biaxial(place, section)
-    return BiaxialTest(
-        name=name, place=place, weight=section.weight, data=data, section=section, noise=noise
-    )

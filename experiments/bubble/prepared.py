@@ -28,7 +28,7 @@ from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Precisi
 from . import objective as matching
 from .doubts import View, doubts_of
 from .objective import FieldObjective, FieldTarget, folded, mirrored
-from .point_files import PointFiles, RecordedFrames
+from .point_files import PointFiles
 from .registration import Registration, register_fields
 from .section import Sheet
 from .sheet import (
@@ -80,11 +80,6 @@ class PreparedBubble:
         own = OBJECTIVES[self.test.objective]
         unknown = self.test.sheet.modes or self.test.sheet.slack
         return f"{own}, and what is known of the sheet" if unknown else own
-
-    @property
-    def recorded(self) -> RecordedFrames | None:
-        """Return the frames chosen by pressure; None where the project names all pressures."""
-        return self.test.data.recorded if isinstance(self.test.data, PointFiles) else None
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
@@ -216,9 +211,10 @@ class PreparedBubble:
         return replace(own, model=model, objective=moved, prolong=prolong)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        logs = () if self.recorded is None else self.recorded.logs
-        if isinstance(self.test.data, PointFiles) and self.test.data.options.reference:
-            logs = (*logs, self.test.data.options.reference)
+        data = self.test.data
+        logs = () if data.recorded is None else data.recorded.logs
+        if isinstance(data, PointFiles) and data.options.reference:
+            logs = (*logs, data.options.reference)
         read = [(field.path, field) for field in self.fields if field.path is not None]
         frames = [kinds.DataFile(path, f.source, len(f.points), f.dropped) for path, f in read]
         others = [kinds.DataFile(log, FrameSource("log"), None) for log in logs]
@@ -248,14 +244,14 @@ class PreparedBubble:
         """Return the fields for a look before a fit."""
         test = self.test
         registered, flat = self.registration is not None, not test.sheet.known
-        numbers = () if self.recorded is None else self.recorded.numbers
+        numbers = () if test.data.recorded is None else test.data.recorded.numbers
         thick, fields = test.place.fabric.thickness, self.fields[: test.rising]
         return View(fields, test.outline, thick, registered, flat, numbers)
 
     @property
     def seen(self) -> Sequence[str]:
         """Return what `check` says of several inflations."""
-        found = self.recorded and self.recorded.inflations
+        found = self.test.data.recorded and self.test.data.recorded.inflations
         return (found.line, *found.lines) if found else ()
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:

@@ -3,7 +3,7 @@
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
 fit, `residuals` the table of all matched values, `simulate` the results of forward analyses."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ import pandas as pd
 from ...errors import SolverFailure, percent
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
-from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
@@ -37,7 +36,8 @@ from ...reports.maps import (
 )
 from ...reports.vega import save, saved
 from ...solvers.base import STRAIN_DATA, STRESS_DATA, Array, History
-from ..kinds import CardRun, Findings, FittedTest, Output, Shown, Simulation, by_strain, strains_of
+from .. import kinds
+from ..kinds import Cards, Findings, FittedTest, Output, Runs, Shown, Simulation
 from ..measured import compared
 from . import findings as wording
 from .doubts import View
@@ -108,7 +108,7 @@ def findings(prepared: PreparedBubble, fitted: FittedTest) -> Findings:
         },
     }  # fmt: skip
     lines = [f"mean |dx|+|dy|+|dz|: {mean:.3g} mm"]
-    taken = prepared.recorded
+    taken = prepared.test.data.recorded
     if taken is not None:
         numbers["data"]["pressures"] = wording.recorded_numbers(taken)
         lines += wording.recorded_lines(taken)
@@ -182,7 +182,7 @@ def show(prepared: PreparedBubble, fitted: FittedTest, findings: Findings, out: 
     if prepared.registration is not None:
         figures.append(registration_picture(prepared.fields, prepared.test.outline, out))
         tables.insert(0, registration_table(prepared.registration))
-    taken = prepared.recorded
+    taken = prepared.test.data.recorded
     if taken is not None:
         tables.insert(0, recorded_table(taken))
         figures += [] if taken.clock is None else [clock_picture(taken, taken.clock, out)]
@@ -356,7 +356,8 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     curve = np.array([field.pressure for field in prepared.fields]), np.asarray(all_rises)
     rises = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
     figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
-    if not (found := prepared.recorded and prepared.recorded.inflations):
+    recorded = prepared.test.data.recorded
+    if not (found := recorded and recorded.inflations):
         return Exhibit(facts=facts, figures=figures, tables=tables)
     table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
     file = out.write("inflations.csv", table, "apex of each inflation beside the first")
@@ -539,9 +540,8 @@ def write_series(
 
 
 def simulate(
-    test: BubbleTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: BubbleTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Write displacement.csv, bubble.pvd and profiles.png of every card; return apex heights."""
     numbers: dict[str, dict[str, object]] = {}
     lines: list[str] = []
@@ -556,7 +556,7 @@ def simulate(
         numbers[name] = {
             "pressure_kPa": kilos.tolist(),
             "apex_mm": heights.tolist(),
-            "strain_reached": by_strain(strains_of(history)),
+            "strain_reached": kinds.by_strain(kinds.strains_of(history)),
         }
         out.write(f"displacement{suffix}.csv", displacement_table(model, history))
         write_series(model, history, cards[name].law, out.path(f"bubble{suffix}.pvd"))

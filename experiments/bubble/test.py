@@ -16,7 +16,7 @@ from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.inflations import Which
 from ...solvers.base import History
-from ..kinds import Place, Reach, Refined, Studied, divided
+from ..kinds import Place, Reach, Refined, SectionTest, Studied, divided
 from .point_files import PointFiles, measured_files
 from .registration import clamp_radius
 from .section import (
@@ -49,7 +49,8 @@ def merge_increments(
 
 @dataclass(frozen=True, eq=False)
 class KnownSolution:
-    """Data to be computed by the forward model: beta and increments in MPa, a full disk's quads."""
+    """Data to be computed by the forward model: beta and increments in MPa, a full disk's quads.
+    recorded : there are no frames to choose among."""
 
     beta: NDArray[np.float64]
     form: str
@@ -57,6 +58,7 @@ class KnownSolution:
     increments: tuple[float, ...]
     symmetry: Literal["full", "quarter"]
     solver: str | None = None
+    recorded: ClassVar[None] = None
 
 
 def data_source(
@@ -91,15 +93,12 @@ PART = "bubble"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BubbleTest:
+class BubbleTest(SectionTest):
     """A clamped disk that is inflated. Lengths mm, pressures MPa.
     `pressures` are reported and matched, `increments` are the load steps and contain them. `noise`
     of one displacement. `facet` : by which the camera reads displacements, None for points.
     `registration` : one standard deviation (degrees, mm) of each of its unknowns."""
 
-    name: str
-    place: Place
-    weight: float
     outline: Outline
     elements: int
     symmetry: Symmetry
@@ -113,7 +112,6 @@ class BubbleTest:
     displacement_offset: bool
     pressure_offset: bool
     sheet: Sheet
-    noise: float | None = None
     facet: Facet | None = None
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
     registration: Mapping[str, float] = field(default_factory=dict)
@@ -134,9 +132,7 @@ class BubbleTest:
     @property
     def pace(self) -> Pace:
         """Return rate of strain, that of a spherical cap, and hold by the log and its frames."""
-        recorded = self.data.recorded if isinstance(self.data, PointFiles) else None
-        clock = None if recorded is None else recorded.clock
-        if clock is None:
+        if self.data.recorded is None or (clock := self.data.recorded.clock) is None:
             return Pace()
         known = np.isfinite(clock.pressure + clock.heights)
         strain = 2.0 / 3.0 * (clock.heights[known] / self.outline.radius) ** 2
@@ -155,9 +151,8 @@ class BubbleTest:
         mesh = elliptic_disk_mesh(
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
-        thick = self.place.fabric.thickness if thickness is None else thickness
         steps, unloaded = increments or self.increments, self.rising < len(self.pressures)
-        return BubbleModel(mesh, thick, self.pressures, steps, unloaded=unloaded)
+        return BubbleModel(mesh, self.thick(thickness), self.pressures, steps, unloaded=unloaded)
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0

@@ -15,7 +15,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ...errors import InputError
 from ...inference.comparison import Comparison
@@ -29,12 +29,12 @@ from ...meshes.strip_models import (
     refined_quads,
     straight_strip,
 )
-from ...readers.curves import DIRECTIONS, LengthUnit
+from ...readers.curves import LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
 from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
 from .. import kinds
-from ..kinds import Array, Kind, MakeSolver, Masks, Place, PreparedTest, Reach, Weighting
+from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, SectionTest, Weighting
 from ..measured import MeasuredKind, PreparedParts
 from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
@@ -137,17 +137,13 @@ def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Spe
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CyclesTest:
+class CyclesTest(SectionTest):
     """Specimens by their names; lengths mm, loads N. gauge : of the bias strips."""
 
-    name: str
-    place: Place
-    weight: float
     width: float
     gauge: float
     grip_distance: float
     matched: Mapping[str, Specimen]
-    noise: float | None = None
     kind: str = "cycles"
     reads_files: bool = True
     state: State = "first loading"
@@ -170,9 +166,8 @@ class CyclesTest:
         self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
         """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
-        thick = self.place.fabric.thickness if thickness is None else thickness
         quads = refined_quads("bias", COARSER * (factor if what == "elements" else 1.0))
-        lengths = self.gauge, 2 * self.gauge, thick, self.width
+        lengths = self.gauge, 2 * self.gauge, self.thick(thickness), self.width
         models = {}
         for name, one in self.matched.items():
             if one.direction == "bias":
@@ -201,21 +196,20 @@ def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
     keys = ("load_unit", "length_unit", "strain_unit")
     said = {key: getattr(section, key) for key in keys} | {"length": section.gauge_length}
     specimens: dict[str, Specimen] = {}
-    listed = {d: own for d in DIRECTIONS if (own := getattr(section.files, d))}
+    listed = section.files.model_dump(exclude_none=True)
     if not listed:
         raise place.error("files", "expected files of one direction at least: { warp = [...] }")
-    for direction, names in listed.items():
-        for k, file in enumerate(names):
-            path, key = folder / file, f"files.{direction}[{k}]"
-            if not place.has(path, key):
-                continue
-            columns = section.columns.model_dump(exclude_none=True)
-            history = read_history(path, columns=columns or None, **said)
-            found = evaluate_history(history, section.reference_load)
-            one = specimen_of(direction, found, section.increments)
-            if one.name in specimens:
-                raise place.error(key, f"{file!r} is listed twice; its readings would count double")
-            specimens[one.name] = one
+    columns = section.columns.model_dump(exclude_none=True) or None
+    for path, key, direction in kinds.listed_files(place, folder, listed, "files"):
+        if not place.has(path, key):
+            continue
+        found = evaluate_history(
+            read_history(path, columns=columns, **said), section.reference_load
+        )
+        one = specimen_of(direction, found, section.increments)
+        if one.name in specimens:
+            raise place.error(key, f"two files of one direction are called {found.name!r}")
+        specimens[one.name] = one
     return CyclesTest(
         name=name, place=place, weight=section.weight, width=width, gauge=gauge,
         grip_distance=grips, matched=specimens, noise=section.noise,
@@ -304,10 +298,10 @@ class PreparedCycles(PreparedParts):
 class CyclesKind(MeasuredKind):
     """Strips, straps or cords through loading, unloading and reloading."""
 
-    name: str = "cycles"
-    title: str = "strips through loading, unloading and reloading"
-    section: type[BaseModel] = CyclesSection
-    folder_key: str = "folder"
+    name = "cycles"
+    title = "strips through loading, unloading and reloading"
+    section = CyclesSection
+    folder_key = "folder"
     prepared = PreparedCycles
     read = staticmethod(read)
 
@@ -324,4 +318,4 @@ class CyclesKind(MeasuredKind):
         return super().prepare(test, law, make_solver)
 
 
-KIND: Kind = CyclesKind()
+KIND = CyclesKind()

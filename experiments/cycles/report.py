@@ -9,12 +9,11 @@ import numpy as np
 import pandas as pd
 
 from ...errors import SolverFailure
-from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
-from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import compared
 from . import CyclesTest, PreparedCycles
 
@@ -73,9 +72,8 @@ def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Out
 
 
 def simulate(
-    test: CyclesTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: CyclesTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Draw the loads with every card; return the RMS errors."""
     numbers: dict[str, Any] = {}
     lines: list[str] = []

@@ -1,14 +1,14 @@
 """Results of bent cylinders as facts, figures, tables and files."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from ...errors import marks, percent
-from ...materials.card import BAND, LEVEL, MaterialCard
+from ...materials.card import BAND, LEVEL
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel
 from ...meshes.mesh import Mesh, surface_strain, with_mirror_image
@@ -27,7 +27,7 @@ from ...reports.cylinders import (
 )
 from ...reports.maps import write_vtu
 from ...reports.vega import save
-from ..kinds import Array, CardRun, Output, PredictedRun, Shown, Simulation, record_of
+from ..kinds import Array, Cards, Output, PredictedRun, Runs, Shown, Simulation, record_of
 from .predicted import (
     SECANT,
     BendingRun,
@@ -432,11 +432,7 @@ def _unbroken(row: Sequence[object]) -> list[object]:
 
 
 def simulate(
-    test: CylinderTest,
-    cards: Mapping[str, MaterialCard],
-    runs: Mapping[tuple[str, str], CardRun],
-    out: Output,
-    within_range: bool = False,
+    test: CylinderTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
     """Write load_deflection.csv, figures and beams; return the numbers of every card."""
     predicted = []

@@ -6,7 +6,6 @@ each are refused where the other is asked for.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -49,8 +48,10 @@ from ..kinds import (
     Place,
     Reach,
     Refined,
+    SectionTest,
     divided,
     joined,
+    listed_files,
     named_format,
 )
 
@@ -60,21 +61,18 @@ Lengths = Annotated[list[Length], Field(min_length=1)]
 NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
 
 
-class CollarSection(Section):
-    """The ring that bends the cylinder, or two of them; by its diameter unless given."""
-
-    inner_diameter: Length
-    length: Length
-    fillet: Length | None = None
-    spacing: NotNegative | None = None
-
-
 class SaddleSection(Section):
     """A shell around the cylinder in which it lies, in place of a round support."""
 
     inner_diameter: Length
     length: Length
     fillet: Length | None = None
+
+
+class CollarSection(SaddleSection):
+    """The ring that bends the cylinder, or two of them; by its diameter unless given."""
+
+    spacing: NotNegative | None = None
 
 
 class GasSection(Section):
@@ -198,15 +196,13 @@ GRAVITY = 9.80665
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CylinderTest:
+class CylinderTest(SectionTest):
     """One cylinder at one pressure. Lengths mm, pressure MPa (gauge).
 
     deflections : frames of the bending. reads_files : whether the section lists any. assumed : what
     the section leaves to usual values, in words.
     """
 
-    name: str
-    place: Place
     diameter: float
     pressure: float
     length: float
@@ -226,8 +222,6 @@ class CylinderTest:
     reads_files: bool = False
     assumed: tuple[str, ...] = ()
     kind: str = "cylinder"
-    #: Nothing of it is fitted.
-    weight: float = 1.0
     #: The strains are known only with a card.
     reach = Reach()
 
@@ -243,7 +237,7 @@ class CylinderTest:
         """Return the wall of a beam as a card of constant moduli, of the fabric's thickness."""
         if self.beam is None:
             return None
-        thick = self.place.fabric.thickness
+        thick = self.thick(None)
         axial, hoop, shear, nu = self.beam.section.wall.moduli
         law = HypoelasticLaw.linear(axial / thick, hoop / thick, shear / thick, nu)
         return MaterialCard(law, thick, "its wall")
@@ -252,7 +246,7 @@ class CylinderTest:
         """Return the model with a fabric of this thickness (mm), else of the project's."""
         if self.beam is not None:
             return self.beam
-        thick = self.place.fabric.thickness if thickness is None else thickness
+        thick = self.thick(thickness)
         return inflated_cylinder(
             self.diameter, self.pressure, thick, self.size, self.length, self.seam_width,
             self.supports, self.collar, self.deflections, self.symmetry, self.cap_warp, self.gas,
@@ -417,17 +411,13 @@ def _beam(section: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
 
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
     """Read every repetition in the files of a section; none where it lists none."""
-    names = section.files or []
-    folder = place.folder(section.folder)
+    folder, files = place.folder(section.folder), {None: section.files or []}
     format = named_format(place, "measured.format", "machine table", section.format)
     way, load = section.deflection.channel, section.load.channel
     keys = ("repetition", "preload", "zero", "comment", "decimal")
     said = {key: getattr(section, key) for key in keys}
     curves: list[BendingCurve] = []
-    for k, name in enumerate(names):
-        file, key = folder / name, f"measured.files[{k}]"
-        if Path(name) in map(Path, names[:k]):
-            raise place.error(key, f"{name!r} is listed twice; it would count double")
+    for file, key, _ in listed_files(place, folder, files, "measured.files"):
         if place.has(file, key):
             curves += read_bending_curves(file, deflection=way, load=load, format=format, **said)
     return tuple(curves)

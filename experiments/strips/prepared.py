@@ -21,19 +21,8 @@ from ...inference.noise import alike
 from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
 from ...readers.curves import DIRECTIONS, LoadCurve
 from ...solvers.base import History
-from ..kinds import (
-    Array,
-    Candidate,
-    DataFile,
-    Doubt,
-    Expected,
-    MakeSolver,
-    Masks,
-    Planning,
-    Reach,
-    Weighting,
-    joined,
-)
+from .. import kinds
+from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Reach, Weighting
 from ..measured import PreparedParts
 from .data import Strip, doubts_of_strips
 from .test import StripsTest, reach_of
@@ -259,9 +248,10 @@ class PreparedStrips(PreparedParts):
             model.elongations, elongation, load, scale, weight, *noise, alike, owners
         )
 
-    def data_files(self) -> Sequence[DataFile]:
+    def data_files(self) -> Sequence[kinds.DataFile]:
         test, points = self.test, self.test.match_by == "points"
-        return joined(file for own in test.matched.values() for file in own.data_files(points))
+        every = [file for own in test.matched.values() for file in own.data_files(points)]
+        return kinds.joined(every)
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         test = self.test
@@ -299,7 +289,7 @@ GAUGE, INCREMENTS, USUAL = 20.0, 20, 3
 SCATTER = 0.04
 
 
-def candidates(planning: Planning) -> Sequence[Candidate]:
+def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     """Return each direction by itself, after the project's first strips or usual ones."""
     own = [test for test in planning.present if isinstance(test, PreparedStrips)]
     template = own[0] if own else None
@@ -309,7 +299,7 @@ def candidates(planning: Planning) -> Sequence[Candidate]:
     noise_is = "assumed" if template is None else f"that of {template.test.name}"
     noise_is = noise_is if planning.noise is None else "given"
     return [
-        Candidate(name, partial(_made, name, *pull, template, planning), noise_is, USUAL)
+        kinds.Candidate(name, partial(_made, name, *pull, template, planning), noise_is, USUAL)
         for name, pull in pulls.items()
     ]
 

@@ -1,6 +1,6 @@
 """Results of strip tests as numbers, tables, figures and files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,19 +25,8 @@ from ...reports.strips import (
 )
 from ...reports.vega import save, saved
 from ...solvers.base import History
-from ..kinds import (
-    READING,
-    UNMATCHED,
-    Array,
-    CardRun,
-    Findings,
-    FittedTest,
-    Output,
-    Shown,
-    Simulation,
-    by_strain,
-    strains_of,
-)
+from .. import kinds
+from ..kinds import Array, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import FittedPart, compared
 from .data import Strip, compare_orders, curves_of
 from .prepared import PreparedStrips
@@ -55,9 +44,9 @@ def _warnings(test: StripsTest, strips: Sequence[FittedPart]) -> Iterator[Note]:
     for direction, modulus in PINS.items():
         if direction not in directions:
             words = f"no {direction} strip of {test.name} is matched: {modulus} rests on the other "
-            yield Note(UNMATCHED, words + "directions")
+            yield Note(kinds.UNMATCHED, words + "directions")
     for words in dict.fromkeys(n for s in strips for curve in s.data.curves for n in curve.notes):
-        yield Note(READING, words)
+        yield Note(kinds.READING, words)
     words = "points beyond the final length (or before zero) were left out"
     for s in strips:
         if test.match_by == "points" and s.data.beyond:
@@ -156,9 +145,8 @@ MATCHED = {"polynomial": "load polynomials", "points": "measured points"}
 
 
 def simulate(
-    test: StripsTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: StripsTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Write loads.csv, loads.png and the deformed bias strips, also of failed analyses.
     within_range : show each curve only to where the card's valid range ends."""
     numbers: dict[str, Any] = {}
@@ -188,7 +176,7 @@ def simulate(
             end, shown = float(load[-1]), float(u[n - 1]) if n else 0.0
             directions[direction] = {
                 "rms_N": error, "end_load_N": end, "shown_to_mm": shown,
-                "strain_reached": by_strain(strains_of(history)),
+                "strain_reached": kinds.by_strain(kinds.strains_of(history)),
             }  # fmt: skip
             words = (
                 f"{end:.4g} N at the end" if error is None else f"{error:.4g} N to {shown:.3g} mm"
@@ -274,7 +262,7 @@ def show(prepared: PreparedStrips, fitted: FittedTest, found: Findings, out: Out
         }  # fmt: skip
         parts.append(pd.DataFrame(columns))
     charts = fitted_loads(prepared, fitted)
-    figures: list[Shown] = []
+    figures: list[kinds.Shown] = []
     files = [
         out.write("loads.csv", pd.concat(parts), "load curves of the best fit", None),
         saved(out, "loads.png", charts, "picture of the load curves"),

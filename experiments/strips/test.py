@@ -36,7 +36,7 @@ from ...readers.curves import (
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
 from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
-from ..kinds import Place, Reach, Refined, named_format, state_said
+from ..kinds import Place, Reach, Refined, SectionTest, listed_files, named_format, state_said
 from .data import Strip
 
 Mask = NDArray[np.bool_]
@@ -126,14 +126,11 @@ class StripsSection(Section):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StripsTest:
+class StripsTest(SectionTest):
     """Cut strips pulled along warp, fill and across the yarns. Lengths mm, loads N, degrees.
     strips, weights : by direction. noise : N of one load. specimens : of each direction; None where
     unknown. rate : mm a minute between the grips. conditioning : in words."""
 
-    name: str
-    place: Place
-    weight: float
     width: float
     grip_distance: float
     bias_angle: float
@@ -142,7 +139,6 @@ class StripsTest:
     match_by: Match
     weights: Mapping[str, float]
     objective: Unit
-    noise: float | None = None
     specimens: int | None = None
     rate: float | None = None
     conditioning: str | None = None
@@ -179,11 +175,10 @@ class StripsTest:
     ) -> Mapping[str, UniaxialModel]:
         """Return the models by direction; edges of quads, or increments, divided by a factor."""
         quads, steps = (factor, 1.0) if what == "elements" else (1.0, factor)
-        thick = self.place.fabric.thickness if thickness is None else thickness
         increments = max(1, round(self.increments * steps))
         models = {}
         for d, s in self.strips.items():
-            lengths = s.gauge_length, s.final_length, thick, self.width
+            lengths = s.gauge_length, s.final_length, self.thick(thickness), self.width
             if d == "bias":
                 across = refined_quads("bias", quads)
                 grips = self.grip_distance, self.bias_angle
@@ -250,26 +245,18 @@ def reach_of(test: StripsTest, masks: Mapping[str, Mask | None] | None = None) -
 ListedFile = tuple[Path, str, str | None]
 
 
-def listed_files(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
+def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile]:
     """Return the files of [strips.data], there or not, in the order of the section."""
     if data.polynomials is not None:
         return [(folder / data.polynomials, "data.polynomials", None)]
-    said: dict[str | None, Any] = {None: data.files}
-    if not isinstance(data.files, list):
-        said = {d: getattr(data.files, d) or [] for d in DIRECTIONS}
-    listed: list[ListedFile] = []
-    for direction, given in said.items():
-        key = "data.files" if direction is None else f"data.files.{direction}"
-        names = [file for name in given for file in _matches(folder, name)]
-        for i, name in enumerate(names):
-            if Path(name) in map(Path, names[:i]):
-                problem = f"{name!r} is listed twice; its points would count double"
-                raise place.error(f"{key}[{i}]", problem)
-            listed.append((folder / name, f"{key}[{i}]", direction))
-    if not listed:
+    given: Any = {None: data.files}
+    if isinstance(data.files, FilesSection):
+        given = data.files.model_dump(exclude_none=True)
+    said = {d: [f for name in own for f in _matches(folder, name)] for d, own in given.items()}
+    if not said:
         problem = "expected files of one direction at least: { warp = [...], fill = [...] }"
         raise place.error("data.files", problem)
-    return listed
+    return listed_files(place, folder, said, "data.files")
 
 
 def _matches(folder: Path, name: str) -> list[str]:
@@ -328,7 +315,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
         raise place.error("data", "expected exactly one of 'polynomials' and 'files'")
     folder = place.folder(data.folder)
     tables = {d: getattr(section, d) for d in DIRECTIONS if getattr(section, d) is not None}
-    listed = listed_files(place, data, folder)
+    listed = files_of(place, data, folder)
     for path, field, _ in listed:
         if is_file(path):
             continue

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ...errors import InputError
 from ...files import pandas as pd
@@ -23,7 +23,7 @@ from ...readers.frames import FrameSource
 from ...readers.sections import Length, Name, Positive, Section
 from ...solvers.base import History
 from .. import kinds
-from ..kinds import Array, Kind, MakeSolver, Masks, Place, Planning, Reach, Weighting
+from ..kinds import Array, MakeSolver, Masks, Place, Planning, Reach, SectionTest, Weighting
 from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, PreparedWhole, StrainObjective
 
 #: Columns of a file: loads, in MPa, N and N mm per unit; strains, of which one is enough.
@@ -47,19 +47,15 @@ class TubeSection(Section):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TubeTest:
+class TubeTest(SectionTest):
     """Loads (n, 3) as of `TubeModel`, and strains (n, 3) along, around, radius times twist.
 
     Strains from any zero; NaN in columns that are not measured.
     """
 
-    name: str
-    place: Place
-    weight: float
     radius: float
     loads: Array
     strain: Array
-    noise: float | None = None
     path: Path | None = None
     kind: str = "tube"
     reads_files: bool = True
@@ -75,8 +71,7 @@ class TubeTest:
         self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, TubeModel]:
         """Return the one model: nothing to refine."""
-        thick = self.place.fabric.thickness if thickness is None else thickness
-        return {PART: TubeModel(self.loads, self.radius, thick)}
+        return {PART: TubeModel(self.loads, self.radius, self.thick(thickness))}
 
     def settings(self) -> Mapping[str, object]:
         return {"weight": self.weight, "noise": self.noise, "radius": self.radius}
@@ -209,13 +204,13 @@ def _integral(law: HypoelasticLaw, name: str, end: ArrayLike) -> float:
 class Tube(MeasuredKind):
     """An inflated tube in tension and torsion."""
 
-    name: str = "tube"
-    title: str = "an inflated tube in tension and torsion"
-    section: type[BaseModel] = TubeSection
-    folder_key: str = "folder"
+    name = "tube"
+    title = "an inflated tube in tension and torsion"
+    section = TubeSection
+    folder_key = "folder"
     prepared = PreparedTube
     read = staticmethod(read)
     candidates = staticmethod(candidates)
 
 
-KIND: Kind = Tube()
+KIND = Tube()

@@ -5,12 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from ...materials.card import MaterialCard
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
-from ..kinds import CardRun, Findings, FittedTest, Output, Simulation
+from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import compared, errors_of_cards
 from . import PART, PERCENT, PreparedTube, TubeObjective, TubeTest
 
@@ -48,9 +47,8 @@ def show(prepared: PreparedTube, fitted: FittedTest, found: Findings, out: Outpu
 
 
 def simulate(
-    test: TubeTest, cards: Mapping[str, MaterialCard], runs: Mapping[tuple[str, str], CardRun],
-    out: Output, within_range: bool = False,
-) -> Simulation:  # fmt: skip
+    test: TubeTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
+) -> Simulation:
     """Draw the strains with every card; return the RMS errors."""
     numbers, lines, good = errors_of_cards(
         runs, lambda history: {"rms_percent": _errors(test, history)},

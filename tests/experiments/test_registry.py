@@ -77,7 +77,7 @@ def test_a_plug_ins_kind_is_one_of_them(packages):
 )
 def test_a_broken_kind_is_one_line_and_breaks_no_other(packages, caplog, name, text, words):
     install(packages, name, text, group="bubblefit.tests")
-    registry._warn.cache_clear()
+    registry.warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, logger="bubblefit"):
         assert name not in kinds() and "bubble" in kinds()
     line = f"the plug-in {name!r} of acme-things 2.5 {words}"

@@ -424,7 +424,7 @@ def test_biaxial_and_cylinder_from_arrays(tmp_path):
     by_ratio = {r: rows.drop(columns="ratio").to_numpy() for r, rows in table.groupby("ratio")}
     for given in (table, by_ratio):
         project = project_of(bf.Biaxial(given, **keys), form="linear")
-        for mine, theirs in zip(project.tests["biaxial"].data.paths, own.data.paths, strict=True):
+        for mine, theirs in zip(project.tests["biaxial"].paths, own.paths, strict=True):
             assert mine.ratio == theirs.ratio
             np.testing.assert_allclose(mine.load, theirs.load, rtol=1e-14)
             np.testing.assert_allclose(mine.strain, theirs.strain, rtol=1e-14)

@@ -143,18 +143,18 @@ def test_the_section_chooses_ratios_loads_cycle_and_how_many_points(tmp_path):
 
     lines = 'ratios = ["1:2", "2/1"]\nrange = [5, 20]\ncycle = 2\npoints = 8\nname = "cross"'
     test = read(lines, '["test.csv"]')
-    assert [p.ratio for p in test.data.paths] == ["2:1", "1:2"] and test.name == "cross"
-    for path in test.data.paths:
+    assert [p.ratio for p in test.paths] == ["2:1", "1:2"] and test.name == "cross"
+    for path in test.paths:
         assert path.cycle.number == 2 and len(path.load) == 8
         assert 5 <= path.load.max(axis=1).min() < 6 and 19 < path.load.max() <= 20
-    ends = np.max([path.strain.max(axis=0) for path in test.data.paths], axis=0)
+    ends = np.max([path.strain.max(axis=0) for path in test.paths], axis=0)
     assert test.reach.strain == (*np.log1p(ends), None) and 0.01 < ends[0] < 0.03
     # Files may be listed by ratio.
     for ratio in ("1:1", "2:1"):
         rows = [row[1:] for row in rows_of(BENT, [ratio])]
         write_rows(tmp_path / f"{ratio[0]}.csv", rows, HEAD.removeprefix("ratio,"))
     test = read("", '{ "1:1" = ["1.csv"], "2/1" = ["2.csv"] }')
-    assert [p.ratio for p in test.data.paths] == ["1:1", "2:1"]
+    assert [p.ratio for p in test.paths] == ["1:1", "2:1"]
     for lines, file, words in (
         ("range = [20, 5]", '["test.csv"]', ["project.toml", "biaxial[0].range", "[20, 5]"]),
         ('ratios = ["1:1", "2-1"]', '["test.csv"]', ["biaxial[0].ratios[1]", "'2-1'"]),
@@ -227,7 +227,7 @@ def test_each_ratio_is_offered_up_to_the_strains_that_the_law_is_known_for(tmp_p
     ]
     assert {c.noise_is for c in offered} == {"that of biaxial"}
     for candidate in offered:
-        (path,) = candidate.make().test.data.paths
+        (path,) = candidate.make().test.paths
         share = np.log1p(path.strain[-1]) / [0.03, 0.04]
         assert share.max() == pytest.approx(1.0, rel=1e-6) and len(path.load) == 20
         wanted = biaxial_response(TRUE, path.load, THICKNESS).elongation
