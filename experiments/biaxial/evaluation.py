@@ -113,8 +113,8 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
             kept.append({**row, "cycles": len(same), **strains})
     others = tuple(designers.evaluate_others(lines, options))
     ends = _of_cycle(test, 1, options), _of_cycle(test, "last", options)
-    table = pd.DataFrame(kept)
-    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, table)
+    strain = pd.DataFrame(kept)
+    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, strain)
 
 
 def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
@@ -240,7 +240,7 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
     return said + [
         "  strain kept after {ratio}, the last that comes back to the loads of the beginning "
         "({warp_load_kN_per_m:.3g} and {fill_load_kN_per_m:.3g} kN/m): warp "
-        "{warp_after_percent:.3g} %, fill {fill_after_percent:.3g} %".format(**last)
+        "{warp_after_percent:.3g} %, fill {fill_after_percent:.3g} %".format_map(last)
         for last in back[-1:]
     ]
 
