@@ -34,6 +34,7 @@ from .best import BestFit, best_fit, ranking, with_certainty
 from .estimate import Estimate, estimate_of, with_start
 from .executor import Task, executor_of
 from .folder import (
+    DIGITS,
     NAMES,
     Record,
     Reported,
@@ -528,16 +529,17 @@ def check(
 def facts_of(setup: FitSetup, solver: Solver, data: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return all that a fit's starts depend on, as `folder.Facts`; data : of `data_rows`."""
     project, names = setup.project, [test.test.name for test in setup.tests]
-    files = {name: [{k: row[k] for k in ("name", "sha256")} for row in data if row["test"] == name]
-             for name in names}  # fmt: skip
     whole = {} if project.written is None else settings_of(project, names)
     said = {} if project.written is None else project.written.whole
     others = {"fabric": NAMES, "units": (), "law": (), "fit": UNCOUNTED}
     return {
-        "version": __version__, "solver": solver_facts(project.fit.solver, solver.identity),
-        "settings": {f"{part}.{key}": value for part, left_out in others.items()
-                     for key, value in whole.get(part, {}).items() if key not in left_out},
-        "tests": {name: _without(said.get(name, {})) for name in names}, "files": files,
+        "version of bubblefit": __version__,
+        "solver": solver_facts(project.fit.solver, solver.identity),
+        **{part: {key: value for key, value in whole.get(part, {}).items() if key not in left_out}
+           for part, left_out in others.items()},
+        "tests": {name: _without(said.get(name, {})) for name in names},
+        "data files": {name: [f"{row['name']}, sha256 {row['sha256'][:DIGITS]}" for row in data
+                              if row["test"] == name] for name in names},
     }  # fmt: skip
 
 

@@ -49,44 +49,21 @@ FEW, LONG = 3, 60
 CHECKSUM = re.compile("[0-9a-f]{64}")
 log = logging.getLogger(__name__)
 
-#: All that results depend on, in plain values: `version` of bubblefit; `solver`, name and
-#: identity; `settings` of the project file; `tests`, settings by name; `files`, name and sha256 of
-#: the data files of each test.
+#: All that results depend on, in plain values, as they are named where they differ.
 Facts = Mapping[str, Any]
 
 
-def differences(before: Facts, now: Facts) -> list[str]:
-    """Return the differences of two runs, one each: key, old value, new value."""
-    words = _values("version of bubblefit", before.get("version"), now.get("version"))
-    one, other = before.get("solver", {}), now.get("solver", {})
-    name = other.get("name")
-    if one.get("name") != name:  # what one says of itself, the other cannot
-        words += _values("the solver", one.get("name"), name)
-    else:
-        both = ({f"the solver {name}: {k}": v for k, v in own.items()} for own in (one, other))
-        words += _values("", *both)
-    words += _values("", before.get("settings", {}), now.get("settings", {}))
-    tests, others = before.get("tests", {}), now.get("tests", {})
-    if list(tests) != list(others):
-        words.append(f"the tests: {', '.join(tests)}, now {', '.join(others)}")
-    for name in tests:
-        if name in others:
-            words += _values(name, tests[name], others[name])
-            files = before.get("files", {}).get(name, []), now.get("files", {}).get(name, [])
-            words += _files(name, *files)
-    return words
-
-
-def _values(key: str, before: Any, now: Any) -> list[str]:
+def differences(before: Any, now: Any, key: str = "") -> list[str]:
+    """Return the differences of the facts of two runs, one each: key, old value, new value."""
     if before == now:
         return []
     if isinstance(before, Mapping) and isinstance(now, Mapping):
-        keys = [(own, before.get(own), now.get(own)) for own in {**before, **now}]
-        return [w for own, *two in keys for w in _values(f"{key}.{own}".lstrip("."), *two)]
+        keys = [(before.get(own), now.get(own), own) for own in {**before, **now}]
+        return [w for *two, own in keys for w in differences(*two, f"{key}.{own}".lstrip("."))]
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        pairs = [(i, a, b) for i, (a, b) in enumerate(zip(before, now, strict=True)) if a != b]
-        if len(pairs) <= FEW:
-            return [words for i, a, b in pairs for words in _values(f"{key}[{i}]", a, b)]
+        pairs = [(a, b, f"{key}[{i}]") for i, (a, b) in enumerate(zip(before, now, strict=True))]
+        if sum(a != b for a, b, _ in pairs) <= FEW:
+            return [words for pair in pairs for words in differences(*pair)]
     return [f"{key} = {_said(before)}, now {_said(now)}"]
 
 
@@ -97,23 +74,6 @@ def _said(value: Any) -> str:
         return f"sha256 {value[:DIGITS]}"
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= LONG else f"{text[:LONG]}..."
-
-
-def _files(
-    test: str, before: Sequence[Mapping[str, str]], now: Sequence[Mapping[str, str]]
-) -> Iterator[str]:
-    if len(before) != len(now):
-        yield f"{len(before)} data files of {test!r}, now {len(now)}"
-        return
-    for old, new in zip(before, now, strict=True):
-        if old["sha256"] == new["sha256"]:
-            continue
-        marks = old["sha256"][:DIGITS], new["sha256"][:DIGITS]
-        if old["name"] == new["name"]:
-            yield f"data file {old['name']} of {test!r} (sha256 {marks[0]}, now {marks[1]})"
-        else:
-            files = f"{old['name']} ({marks[0]}), now {new['name']} ({marks[1]})"
-            yield f"data file of {test!r}, by sha256: {files}"
 
 
 RUN, RESULT = "run.json", "result.json"
@@ -426,20 +386,6 @@ class Record:
             return cls(Path(project["file"]), project["text"], None, data, content["solver"], runs)
         return None
 
-    def to_json(self) -> dict[str, Any]:
-        text = self.text
-        return {
-            "project": {
-                "file": os.path.abspath(self.project),
-                "sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
-                "text": text,
-                "as_run": None if self.settings is None else project_text(self.settings),
-            },
-            "data": [dict(row) for row in self.data],
-            "solver": dict(self.solver),
-            "runs": [dict(run) for run in self.runs],
-        }
-
     def after(self, folder: Path) -> Record:
         """Return the record after the runs of the folder's own, unless that is damaged."""
         before = Record.read(folder)
@@ -447,9 +393,17 @@ class Record:
 
     def write(self, folder: Path) -> None:
         """Write provenance.json, and the project as run; raises OutputError."""
-        names = ("text", "settings", "data")
-        kept = with_kept_arrays({name: getattr(self, name) for name in names}, folder)
-        content = replace(self, **kept).to_json()
+        text = self.text
+        content = {
+            "project": {
+                "file": os.path.abspath(self.project),
+                "sha256": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
+                "text": text,
+                "as_run": None if self.settings is None else project_text(self.settings),
+            },
+            **{name: getattr(self, name) for name in ("data", "solver", "runs")},
+        }
+        content = with_kept_arrays(content, folder)
         if self.settings is not None:
             write_text(folder / AS_RUN, content["project"]["as_run"])
         write_text(folder / PROVENANCE, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
