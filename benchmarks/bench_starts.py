@@ -13,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.runs import fit as stages
 from bubblefit.runs.executor import Executor
 from bubblefit.runs.fit import SAME_MODULI, distinct, moduli_apart
-from bubblefit.runs.setup import CoarseToFine, coarse_problem
+from bubblefit.runs.setup import coarse_problem, coarse_to_fine
 from bubblefit.runs.starts import StartRecord, run_start
 from common import known_project, known_setup, start_on
 
@@ -142,8 +142,7 @@ def coarse(starts=50, *project):
         print(f"{name:16s} best e {min(e):.6g}, worst {max(e):.6g}, {analyses} analyses, "
               f"{found[-1][1]:.1f} s of the processor")  # fmt: skip
     (full, long), (both, short) = found
-    meshes = CoarseToFine.of(fine, both)
-    print("" if meshes is None else meshes.words)
+    print(coarse_to_fine(fine, both) or "")
     print(f"processor time: {short / long:.2f} of that of the full mesh")
     ends = [r for r in both if r.objective is not None and r.same_as is None]
     for group in distinct(problem, full, tolerance):

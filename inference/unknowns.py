@@ -36,10 +36,6 @@ class LawBounds:
     @classmethod
     def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
         """Return bounds (least, largest) of every modulus, MPa; starts draw modulus values."""
-        for name, (low, high) in ranges.items():
-            if not 0 < low < high:
-                problem = f"expected 0 < least < largest, got [{low:g}, {high:g}]"
-                raise InputError(None, f"bounds.{name}", problem)
         return cls({name: float(low) for name, (low, _) in ranges.items()},
                    {name: float(high) for name, (_, high) in ranges.items()})  # fmt: skip
 
@@ -48,11 +44,7 @@ class LawBounds:
         cls, lower: ArrayLike, upper: ArrayLike, margins: Mapping[str, float]
     ) -> LawBounds:
         """Return bounds (free,) MPa of coefficients, and the least of each modulus (`margins`)."""
-        low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
-        if low.shape != high.shape or not (low <= high).all():
-            problem = f"expected lower <= upper, got {low.tolist()} and {high.tolist()}"
-            raise InputError(None, "bounds", problem)
-        return cls(dict(margins), None, low, high)
+        return cls(dict(margins), None, np.array(lower, dtype=float), np.array(upper, dtype=float))
 
     def beside(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
         """Return the bounds with those of a form's own constants."""
@@ -89,15 +81,11 @@ class Unknowns:
         comparisons: Iterable[Comparison] = (),
     ) -> Unknowns:  # fmt: skip
         """Return the unknowns of a law and its comparisons.
-        Raises InputError for a modulus without bounds, or a wrong number of bounds."""
+        Raises InputError for a modulus without bounds."""
         bounds = bounds.beside(own_bounds(form))
         missing = [name for name in dict.fromkeys(form.modulus_of) if name not in bounds.least]
         if missing:
             raise InputError(None, f"bounds.{missing[0]}", "this key is missing; add it")
-        count = len(form.free)
-        if bounds.lower is not None and bounds.lower.shape != (count,):
-            problem = f"expected {count} of a {form.name} law, got {len(bounds.lower)}"
-            raise InputError(None, "bounds.lower", problem)
         several = tuple(comparisons)
         nuisance = NuisanceOf({c.name: c.nuisance for c in several})
         # Where it is unknown, whatever it may be: the largest is the strictest.

@@ -238,8 +238,7 @@ def bootstrap(
     project = project.with_fit(seed=seed)
     found = find_optimum(project, card, tests)
     groups = groups_of(found, over)
-    folder = None if out is None else Path(out)
-    begin_study(folder, {"over": over}, resume, overwrite, records=(SAMPLES,))
+    folder = begin_study(out, {"over": over}, resume, overwrite, records=(SAMPLES,))
     at = [f"{value:.6g}" for value in found.point.unknowns]
     depends = {**fingerprints(found.setup, found.problem), "over": over, "at": at}
     record = StudyRecord(folder, SAMPLES, "samples", Sample, "number", depends, resume)

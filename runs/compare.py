@@ -16,6 +16,7 @@ from ..errors import lines as note_lines
 from ..experiments.kinds import Masks
 from ..files import known
 from ..files import pandas as pd
+from ..inference.noise import misfits
 from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
@@ -140,11 +141,7 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
 
 def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
     """Return the root mean square by comparison, in its unit."""
-    misfit = residual * problem.scale
-    return {
-        c.name: float(np.sqrt(np.mean(misfit[problem.rows(k)] ** 2)))
-        for k, c in enumerate(problem.comparisons)
-    }
+    return {name: misfit.rms for name, misfit in misfits(problem, residual).items()}
 
 
 def errors_of_folds(
@@ -293,18 +290,12 @@ class LawComparison(Presented):
                 f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
             )
         lines.append(f"the data's own noise: {result['noise']:.4g}")
-        return [*lines, *self.conclusion, *note_lines(self.notes)]
-
-    @property
-    def conclusion(self) -> list[str]:
-        """The best form, and the simplest that is as good; empty where every form lost a fold."""
-        result = self.result
-        if result["simplest_as_good"] is None:
-            return []
-        return [
-            f"least at specimens left out: {result['least_cross_validated']}; simplest within "
-            f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
-        ]
+        if result["simplest_as_good"] is not None:
+            lines.append(
+                f"least at specimens left out: {result['least_cross_validated']}; simplest within "
+                f"{100 * AS_GOOD:.0f} % of it: {result['simplest_as_good']}"
+            )
+        return [*lines, *note_lines(self.notes)]
 
 
 @checked
@@ -339,9 +330,8 @@ def compare(
             'match = "points"'
         )
         raise InputError(project.path, "", problem)
-    folder = None if out is None else Path(out)
     of = {"folds": str(folds), "fold starts": str(fold_starts)}
-    begin_study(folder, of, resume, overwrite, map(plain, projects))
+    folder = begin_study(out, of, resume, overwrite, map(plain, projects))
     names, done = [test.name for test in chosen], []
     for name, own in projects.items():
         found = stored_fit(

@@ -39,7 +39,7 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
-from .setup import CoarseToFine, FitSetup
+from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
 
 #: Kinds of notes that are made here.
@@ -192,17 +192,22 @@ class Fit(Reported):
         return {**alone, TOGETHER: dict(sure.sigma)}
 
     @cached_property
-    def coarse_to_fine(self) -> CoarseToFine | None:
+    def coarse_to_fine(self) -> dict[str, Any] | None:
         """Return what ran on which mesh; None if all starts ran on the full one."""
-        return CoarseToFine.of(self.setup, self.best.records)
+        return coarse_to_fine(self.setup, self.best.records)
 
     @property
     def stages(self) -> str:
         """Return `coarse_to_fine` as a line; empty unless asked for."""
-        if self.coarse_to_fine is not None:
-            return self.coarse_to_fine.words
-        asked = self.project.fit.coarse_to_fine
-        return "no test has a coarser mesh: every start ran on the full one" if asked else ""
+        if (ran := self.coarse_to_fine) is None:
+            asked = self.project.fit.coarse_to_fine
+            return "no test has a coarser mesh: every start ran on the full one" if asked else ""
+        meshes = [f"{n} {own['coarse']} of {own['full']} quads" for n, own in ran["quads"].items()]
+        return (
+            f"{ran['starts']} starts on the coarse mesh ({', '.join(meshes)}; "
+            f"{ran['coarse_analyses']} analyses), {ran['distinct']} distinct of their optima on "
+            f"the full one ({ran['full_analyses']})"
+        )
 
     def moduli(self) -> pd.DataFrame:
         """Return E1, E2 and G12 along their strains with band and standard deviation.
@@ -483,7 +488,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
         "nu12": law.nu12, "strain_reached": by_strain(best.reached),
         "valid_strain": by_strain(best.valid), "seed": project.fit.seed,
         "starts": start_rows(fit),
-        "coarse_to_fine": None if fit.coarse_to_fine is None else asdict(fit.coarse_to_fine),
+        "coarse_to_fine": fit.coarse_to_fine,
         **{name: sum(getattr(r, name) for r in records) for name in COUNTED},
         "optima": fit.agreement, "warnings": [], "notes": [], "wall_s": fit.wall_s,
         "versions": versions(),

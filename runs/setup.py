@@ -500,42 +500,23 @@ def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Compar
         return ()  # the mesh is as coarse as it can be
 
 
-@dataclass(frozen=True)
-class CoarseToFine:
-    """The starts and analyses on each mesh.
+def coarse_to_fine(setup: FitSetup, records: Sequence[StartRecord]) -> dict[str, Any] | None:
+    """Return the starts and analyses on each mesh; None if all starts ran on the full one.
     quads : of the coarse and the full mesh by comparison, if meshed. starts : on the coarse mesh.
     distinct : optima fitted on the full mesh."""
-
-    quads: dict[str, dict[str, int]]
-    starts: int
-    distinct: int
-    coarse_analyses: int
-    full_analyses: int
-
-    @classmethod
-    def of(cls, setup: FitSetup, records: Sequence[StartRecord]) -> CoarseToFine | None:
-        """Return that of a fit with these records; None if all starts ran on the full mesh."""
-        coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
-        if coarse is None:
-            return None
-        pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
-        quads = {
-            own.name: {name: len(one.model.mesh.quads) for name, one in both.items()}
+    coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
+    if coarse is None:
+        return None
+    pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)
+    before = sum(record.coarse_analyses for record in records)
+    return {
+        "quads": {
+            own.name: {"coarse": len(other.model.mesh.quads), "full": len(own.model.mesh.quads)}
             for other, own in pairs
             if hasattr(own.model, "mesh")
-            for both in [{"coarse": other, "full": own}]
-        }
-        before = sum(record.coarse_analyses for record in records)
-        after = sum(record.analyses for record in records) - before
-        distinct = sum(record.same_as is None for record in records)
-        return cls(quads, len(records), distinct, before, after)
-
-    @property
-    def words(self) -> str:
-        meshes = ", ".join(
-            f"{name} {own['coarse']} of {own['full']} quads" for name, own in self.quads.items()
-        )
-        return (
-            f"{self.starts} starts on the coarse mesh ({meshes}; {self.coarse_analyses} analyses), "
-            f"{self.distinct} distinct of their optima on the full one ({self.full_analyses})"
-        )
+        },
+        "starts": len(records),
+        "distinct": sum(record.same_as is None for record in records),
+        "coarse_analyses": before,
+        "full_analyses": sum(record.analyses for record in records) - before,
+    }

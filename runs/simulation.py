@@ -248,16 +248,18 @@ def card_words(card: GivenCard | None) -> str:
 
 
 def begin_study(
-    folder: Path | None, of: Mapping[str, str], resume: bool, overwrite: bool,
+    out: Path | str | None, of: Mapping[str, str], resume: bool, overwrite: bool,
     fits: Iterable[str] = (), records: Sequence[str] = (),
-) -> None:  # fmt: skip
-    """Prepare the folder of a study, if any, with a folder for each fit; raises as `Store.begin`.
+) -> Path | None:  # fmt: skip
+    """Return the folder of a study, if any, prepared with a folder for each fit; as `Store.begin`.
     `overwrite` removes the records of earlier fits, from which an interrupted study would resume.
     """
-    if folder is not None:
-        for name in fits if overwrite else ():
-            Store(folder / name).forget()
-        Store(folder).begin({"version": __version__, **of}, resume, overwrite, records)
+    if out is None:
+        return None
+    for name in fits if overwrite else ():
+        Store(Path(out) / name).forget()
+    Store(Path(out)).begin({"version": __version__, **of}, resume, overwrite, records)
+    return Path(out)
 
 
 class StudyRecord(Generic[R]):

@@ -334,10 +334,9 @@ def validate(
     if leave != TESTS:  # a mistake shows before the first fit
         setups = {form: prepare_fit(own, chosen) for form, own in projects.items()}
         parts = {form: parts_of(setup, leave) for form, setup in setups.items()}
-    folder = None if out is None else Path(out)
     places = ["all", *(f"without-{k + 1}" for k in range(len(chosen)))]
-    begin_study(
-        folder, {"forms": ", ".join(projects), "left out": leave}, resume, overwrite,
+    folder = begin_study(
+        out, {"forms": ", ".join(projects), "left out": leave}, resume, overwrite,
         [f"{plain(form)}-{place}" for form in projects for place in places],
         [f"{plain(form)}-without-{leave}.json" for form in projects],
     )  # fmt: skip

@@ -173,8 +173,8 @@ def weights(
             f"got {counted!r}"
         )
         raise InputError(project.path, "--weights", problem)
-    folder = None if out is None else Path(out)
-    begin_study(folder, {"counted": ", ".join(names)}, resume, overwrite, [FITTED], [RUNS])
+    of = {"counted": ", ".join(names)}
+    folder = begin_study(out, of, resume, overwrite, [FITTED], [RUNS])
     found = stored_fit(
         project, [test.name for test in chosen], "the fit at the project's weights", FITTED,
         folder=folder, resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
