@@ -26,7 +26,6 @@ from .noise import Discrepancy, Noise, differences_of_all, discrepancies, notes_
 from .posterior import Posterior, bands_of
 from .problem import Evaluation, FitProblem
 
-#: Kinds of notes that are made here.
 UNCERTAIN = NoteKind("uncertain", weight=6)
 MARGIN = NoteKind("on its margin", weight=3)
 BOUND = NoteKind("on a bound", weight=7)
@@ -61,21 +60,21 @@ class Certainty:
     strain: dict[str, Array]
     sigma: dict[str, Array]
     undetermined: tuple[Note, ...]
-    mesh: dict[str, Array] | None = None
-    alike: dict[str, float] = field(default_factory=dict)
-    posterior: Posterior | None = None
-    fine: Posterior | None = None
-    rows: Array | None = None
-    band: dict[str, Array] = field(default_factory=dict)
+    mesh: dict[str, Array] | None
+    alike: dict[str, float]
+    posterior: Posterior
+    fine: Posterior | None
+    rows: Array
+    band: dict[str, Array]
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
     second: Second | None = None
     order: Order | None = None
 
     @property
-    def reported(self) -> Posterior | None:
+    def reported(self) -> Posterior:
         """Return the posterior of the reported law: `fine` where the mesh error is taken out."""
-        return self.fine if self.taken_out else self.posterior
+        return (self.fine if self.taken_out else None) or self.posterior
 
     @property
     def total(self) -> dict[str, Array]:
@@ -93,21 +92,15 @@ class Certainty:
             return {name: np.abs(off) for name, off in self.mesh.items()}
         return {name: LEFT * np.abs(off) / (1.0 + off) for name, off in self.mesh.items()}
 
-    def ends(self, name: str, strain: Array | float, modulus: Array) -> tuple[Array, Array] | None:
-        """Return the ends of the band at strains (n,), with the modulus (n,) inside; None if
-        unknown."""
-        if name not in self.band:
-            return None
+    def ends(self, name: str, strain: Array | float, modulus: Array) -> tuple[Array, Array]:
+        """Return the ends of the band at strains (n,), with the modulus (n,) inside."""
         return band_at(self.strain[name], list(self.band[name]), strain, modulus)
 
     def laws(
         self, law: HypoelasticLaw, count: int, random: np.random.Generator
     ) -> list[HypoelasticLaw]:
-        """Return `count` random laws that data and mesh allow; ValueError without a posterior."""
-        known = self.fine or self.posterior
-        if known is None:
-            raise ValueError("this certainty has no posterior to draw laws from")
-        return known.laws(law, count, random)
+        """Return `count` random laws that data and mesh allow."""
+        return (self.fine or self.posterior).laws(law, count, random)
 
 
 def certainty(

@@ -111,8 +111,6 @@ class NuisanceOf:
 
 
 NEAR = 0.02  # largest predicted change of displacement, relative, for a warm start
-
-
 #: Where the noise of an objective's data is from: the project says it, it is the scatter of the
 #: specimens, or what such an instrument is good for.
 NoiseIs = Literal["given", "specimens' scatter", "assumed"]

@@ -28,12 +28,9 @@ from ..materials.law import ThicknessChange
 from .comparison import NoiseIs, Objective
 from .problem import Evaluation, FitProblem
 
-#: Kinds of notes that are made here.
 ABOVE_NOISE = NoteKind("above the noise", weight=13)
 BELOW_NOISE = NoteKind("below the noise")
 DISCREPANCY = NoteKind("wrong form", weight=15)
-
-
 RINGS = 60  # rings around a point that others are compared with, unless given
 #: Distances looked at in a block, and blocks looked at, evenly spread.
 DISTANCES, BLOCKS = 500_000, 60
@@ -158,8 +155,6 @@ LEAST_VALUES, FEW = 2, 3
 #: over a Gaussian has exp(2.6 to 3.5 sqrt(A / n)) times their power in the smooth ones (computed on
 #: a square, n / A from 40 to 400; white noise has as much).
 STEEPER = 3.5
-
-
 #: Of what was measured (RMS): a discrepancy of displacements, or of loads, that does not matter
 #: unless its cause moves a modulus by more than `MOVES`.
 OF_SHEET, OF_LOAD, MOVES = 0.002, 0.01, 0.02

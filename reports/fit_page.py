@@ -231,7 +231,7 @@ def answer_tables(fit: Fit) -> list[Part]:
     band = f"In brackets the {percent(LEVEL)} band, noise and mesh together. "
     note = (
         "Tangent moduli at logarithmic strains along their own direction (shear: γ12). "
-        f"{band if sure is not None and sure.band else ''}kN/m: MPa times the thickness of "
+        f"{'' if sure is None else band}kN/m: MPa times the thickness of "
         f"{fit.thickness:.4g} mm. Beyond the last strain of a table no test reached: the card "
         "keeps the modulus that it has there."
     )
@@ -428,9 +428,9 @@ def moduli(fit: Fit) -> Charts:
     known = next((t.known for t in fit.setup.tests if t.known is not None), None)
     curves = np.array([modulus_curves(law, strains) for law in fit.laws])
     band, sure = None, fit.best.certainty
-    if sure is not None and sure.band:
+    if sure is not None:
         along = zip(COMPONENTS, strains, strict=True)
-        ends = [sure.ends(name, x, fit.law.modulus(name, x)) or () for name, x in along]
+        ends = [sure.ends(name, x, fit.law.modulus(name, x)) for name, x in along]
         band = np.array(ends).transpose(1, 0, 2)
     truth = None if known is None else modulus_curves(known, strains)
     words = ", where a dot ends them" if known is None and band is not None else ""
@@ -520,7 +520,7 @@ COEFFICIENTS_TITLE = "How sure the coefficients are, and how they hang together"
 
 def coefficients_table(fit: Fit) -> list[Table]:
     """Return the unknowns with their correlations; nothing where these are not known."""
-    if fit.best.certainty is None or fit.best.certainty.posterior is None:
+    if fit.best.certainty is None:
         return []
     note = (
         "One standard deviation by noise, bounds left aside; then the correlations. Coefficients "

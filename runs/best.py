@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SOLVER, InputError, Note, NoteKind, SolverFailure
 from ..experiments.kinds import Refinable, strains_of
@@ -34,7 +33,7 @@ from ..inference.posterior import Posterior
 from ..inference.problem import Evaluation, FitProblem
 from ..inference.search import evaluate_law
 from ..materials.card import CardCertainty, certainty_of, words_of
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
 from ..project.project import Project
@@ -42,15 +41,10 @@ from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .simulation import GivenCard, card_of, card_words
 from .starts import StartRecord
 
-#: Kinds of notes that are made here.
 MESH = NoteKind("mesh error", weight=16)
 UNKNOWN = NoteKind("mesh error not known", weight=5)
 TAKEN_OUT = NoteKind("mesh error taken out")
 NOT_THE_CARD = NoteKind("not where the card is")
-
-
-Array = NDArray[np.float64]
-
 #: Rounding of an objective run again, relative to itself and to the share of the data's noise.
 ROUNDING, UNTOLD = 1e-5, 1e-6
 #: Least reached strain.
@@ -264,15 +258,13 @@ def card_certainty(
 ) -> CardCertainty | None:
     """Return the certainty of the card's law, from draws within the bounds of the fit, if known.
     With an error of the mesh not taken out, draws lie about the law of ever finer meshes."""
-    sure = best.certainty
-    known = None if sure is None else sure.fine or sure.posterior
-    if sure is None or known is None:
+    if (sure := best.certainty) is None:
         return None
-    unknowns = known.unknowns
+    known = sure.fine or sure.posterior
     values = sum(sum(c.objective.sizes) for c in problem.comparisons)
     words = words_of(tests, values, sure.fine is not None)
     bands = {name: np.array([sure.strain[name], *ends]) for name, ends in sure.band.items()}
-    return certainty_of(law, known.drawn @ unknowns.to_coefficients.T, words, bands)
+    return certainty_of(law, known.drawn @ known.unknowns.to_coefficients.T, words, bands)
 
 
 #: A card, its file or its name; None for that of the project's fit.
@@ -285,15 +277,13 @@ MOVED = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """A fit's optimum, found again from its card, with derivatives and certainty.
-    moved : largest relative change of each modulus from the card."""
+    """A fit's optimum, found again from its card, with derivatives and certainty."""
 
     setup: FitSetup
     problem: FitProblem
     best: BestFit
     card: str
     analyses: int
-    moved: dict[str, float]
     notes: tuple[Note, ...] = ()
 
     @property
@@ -304,7 +294,6 @@ class Optimum:
     @property
     def posterior(self) -> Posterior:
         """Return the posterior of the unknowns, from the noise alone."""
-        assert self.sure.posterior is not None
         return self.sure.posterior
 
     @property
@@ -314,7 +303,6 @@ class Optimum:
     @property
     def linear(self) -> Linear:
         """Return the linear fit there, with the noise of the certainty."""
-        assert self.sure.rows is not None
         noise = replace(Noise.of(self.problem, self.point.residual), rows=self.sure.rows)
         return Linear.of(self.problem, self.point, noise, self.sure.second)
 
@@ -356,15 +344,15 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         0, (project.fit.seed, 0), found.value, status, analyses, y, coefficients, 0.0
     )
     best = with_certainty(setup, problem, best_fit(problem, [record], tolerance))
-    moved = {}
+    far = []
     for name, component in COMPONENTS.items():
         end = min(float(best.valid[component]), float(material.law.strain_range[component]))
         strain = np.linspace(0.0, end, 21)
         change = best.law.modulus(name, strain) / material.law.modulus(name, strain) - 1.0
-        moved[name] = float(change[np.abs(change).argmax()])
-    far = [f"{name} by {100 * by:+.2g} %" for name, by in moved.items() if abs(by) > MOVED]
+        by = float(change[np.abs(change).argmax()])
+        far += [f"{name} by {100 * by:+.2g} %"] if abs(by) > MOVED else []
     if far:
         words = f"the optimum of these tests is not where the card is; moved {', '.join(far)}"
         notes.append(Note(NOT_THE_CARD, words))
     words = card_words(card)
-    return Optimum(setup, problem, best, words, analyses + 1, moved, tuple(notes))
+    return Optimum(setup, problem, best, words, analyses + 1, tuple(notes))

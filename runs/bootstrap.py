@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, checked, percent, rows
 from ..errors import lines as note_lines
@@ -28,7 +27,7 @@ from ..inference.problem import (
     factors_of,
     rows_of,
 )
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, Array
 from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores
@@ -38,12 +37,7 @@ from .setup import fingerprints
 from .simulation import StudyRecord, begin_study
 from .validation import TESTS, name_of, parts_of
 
-#: Kinds of notes that are made here.
 FEW_UNITS = NoteKind("few to draw from")
-
-
-Array = NDArray[np.float64]
-
 #: Units of a group, and samples, below which percentiles are noted as unreliable.
 FEW, FEW_SAMPLES = 5, 40
 #: Relative difference below which numbers are equal.
@@ -223,15 +217,11 @@ def bootstrap(
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Listener = None,
 ) -> Bootstrap:  # fmt: skip
-    """Draw parts of the data with replacement and fit every draw.
-    Every refit begins at the optimum of the fit that wrote the card and takes a few analyses. What
-    is drawn twice counts twice. over : "tests" (among those of their kind), or a sort of parts of
-    the tests: "frames", "specimens", "directions", "ratios". samples : number of draws. card : the
-    one that the project's fit left in its usual folder unless given. tests : as for `fit`. seed :
-    of the draws, the project's unless given. out : folder of the study, in which every sample is
-    kept as it ends; resume : read what it holds. Raises InputError: in the project or its data;
-    fewer than two units; OutputError: the folder is used or cannot be written; SolverFailure: the
-    tests cannot be run with the card."""
+    """Draw parts of the data with replacement and fit every draw, from the optimum of the fit.
+    over : "tests" (among those of their kind), or a sort of parts of the tests: "frames",
+    "specimens", "directions", "ratios"; what is drawn twice counts twice. samples : number of
+    draws, each kept in `out` as it ends. seed : of the draws, the project's unless given. The other
+    arguments and the errors are those of `profile`. InputError also : fewer than two units."""
     check_asked(out, resume, overwrite)
     if samples < 2:
         raise InputError(None, "--samples", f"expected two or more, got {samples}")

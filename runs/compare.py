@@ -31,10 +31,7 @@ from .result import Fit
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
 from .simulation import StudyRecord, begin_study
 
-#: Kinds of notes that are made here.
 FOLD = NoteKind("fold without an error")
-
-
 #: Knots of a spline where neither the project nor the caller gives a number.
 KNOTS = 6
 VALIDATION = "validation.json"
@@ -309,13 +306,10 @@ def compare(
     command_line: Sequence[str] | None = None,
 ) -> LawComparison:  # fmt: skip
     """Fit every form to the tests, then without some specimens, and judge it at those.
-    Tests without known specimens stay whole in every fold. tests : by name or kind; every test that
-    can be fitted unless given. forms : as for `candidates`. folds : at most; fold_starts : random
-    starts of the fit of each. starts : random starts of the fit of each form. out : folder of the
-    study, with a folder for each form, written as the fits end. trust, progress, command_line : as
-    for `fit`. Raises InputError:
-    in the project or its data, no test with specimens, nothing to resume; OutputError,
-    NoFeasibleStart, SolverFailure: as `fit`."""
+    Tests without known specimens stay whole in every fold. forms : as for `candidates`. folds : at
+    most; fold_starts : random starts of the fit of each. starts : of the fit of each form. out :
+    folder of the study, with a folder for each form, written as the fits end. The other arguments
+    and the errors are those of `fit`. InputError also : no test with specimens."""
     check_asked(out, resume, overwrite)
     tell = listener(progress)
     project = project.with_fit(trust=[*project.fit.trust, *trust])

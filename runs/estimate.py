@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
 from ..experiments.kinds import Weighting
@@ -20,6 +19,7 @@ from ..inference.descent import bounded_step, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
 from ..inference.unknowns import EstimatedStarts
+from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from ..meshes.bubble_model import MeasuredShape
 from ..project.project import Project
@@ -29,9 +29,7 @@ from .setup import FitSetup, prepare_fit
 
 log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 METHOD = "virtual work"
-#: Kinds of notes that are made here.
 NOT_ESTIMATED = NoteKind("not estimated")
 GAP = NoteKind("not in equilibrium", weight=11)
 

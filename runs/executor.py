@@ -61,6 +61,12 @@ _prepared: OrderedDict[str, bytes] = OrderedDict()
 _ready = threading.local()
 
 
+class WorkersLost(BubblefitError):
+    """Processes, workers or a scheduler that ended before their tasks."""
+
+    exit_code = 4
+
+
 @functools.cache
 def cores() -> int:
     """Return the number of cores this process may use."""
@@ -221,7 +227,7 @@ def _again(worker: _Worker, what: str, waiting: deque[int], died: Counter[int]) 
         announce(f"{words}; what it did is done again")
         waiting.appendleft(number)
         return
-    raise _error(
+    raise WorkersLost(
         f"{words}, as did the one before it at the same task; finished {what} are kept: go on with "
         "--resume, perhaps with fewer --jobs"
     )
@@ -415,13 +421,13 @@ class ClusterTasks:
             why = f"{DEATHS} workers died of it, the last was {worker}"
             announce(f"{task} is given up: {why}")
             if self.lost is None:
-                raise _error(f"{task}: {why}; the others are kept: go on with --resume")
+                raise WorkersLost(f"{task}: {why}; the others are kept: go on with --resume")
             yield self.lost(number, why)
 
     def _gone(self, error: BaseException) -> BubblefitError:
         log.info("%r", error)
         kept = f"finished {self.what} are kept: go on with --resume"
-        return _error(f"the Dask scheduler does not answer any more; {kept}")
+        return WorkersLost(f"the Dask scheduler does not answer any more; {kept}")
 
 
 def _other(said: Any, wanted: tuple[str, str, str]) -> str:
@@ -434,13 +440,6 @@ def _other(said: Any, wanted: tuple[str, str, str]) -> str:
         for name, own, ours in zip(names, said, wanted, strict=True)
         if own != ours
     )
-
-
-def _error(words: str) -> BubblefitError:
-    """Return an error of exit code 4."""
-    error = BubblefitError(words)
-    error.exit_code = 4
-    return error
 
 
 @functools.cache

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, NoFeasibleStart, Note, SolverFailure, checked
 from ..experiments.kinds import (
@@ -59,8 +58,6 @@ from .starts import (
     run_start,
     timed,
 )
-
-Array = NDArray[np.float64]
 
 #: Optima are one where no modulus differs by more over the strains reached, relative: starts that
 #: end in one and the same optimum of a real test differ by up to 0.7 % ...

@@ -239,15 +239,12 @@ def plan(
     """Rank the tests that could be made next by the uncertainty of the moduli with each.
     The information of the present tests (misfit or noise, whichever is larger; neighbours that err
     as one counted as one) and that of the candidate, from the derivatives at a law, are added.
-    Nothing is fitted but offsets and the sheet's surface. card : the present optimum, as itself,
-    its file or its name; the one that the project's fit left in its usual folder unless given.
-    tests : the present ones, by name or kind; every test that can be fitted unless given. strain :
-    largest (warp, fill, shear) of the moduli; the card's valid range unless given. rank : "worst"
-    for the least certain modulus, or "E1", "E2", "G12". specimens : of every candidate; the usual
-    number of its kind unless given. noise : of measured values of a kind (mm, N), instead of that
-    of the project's own tests. out : folder of the study. progress : as for `fit`. Raises
-    InputError: in the project or its data, no card, no candidates; OutputError: the folder is used;
-    SolverFailure: the present tests cannot be run with the card."""
+    Nothing is fitted but offsets and the sheet's surface. card : the present optimum. tests : the
+    present ones. strain : largest (warp, fill, shear) of the moduli; the card's valid range unless
+    given. rank : "worst" for the least certain modulus, or "E1", "E2", "G12". specimens : of every
+    candidate; the usual number of its kind unless given. noise : of measured values of a kind (mm,
+    N), instead of that of the project's own tests. The other arguments and the errors are those of
+    `profile`. InputError also : no candidates."""
     check_unused(out, False, overwrite)
     tell = listener(progress)
     check_one_of(rank, (WORST, *COMPONENTS), "--rank")

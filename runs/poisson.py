@@ -40,7 +40,7 @@ class Ratios:
     """A response at several nu12, (n,) each: itself, over that at the base nu12, over the mean."""
 
     nu12: Array
-    values: Array
+    value: Array
     to_base: Array
     to_mean: Array
 
@@ -93,10 +93,7 @@ class Nu12Study(Presented):
             "models": {
                 name: {
                     "responses": {
-                        response: {
-                            "nu12": r.nu12.tolist(), "value": r.values.tolist(),
-                            "to_base": r.to_base.tolist(), "to_mean": r.to_mean.tolist(),
-                        }
+                        response: {key: own.tolist() for key, own in vars(r).items()}
                         for response, r in part.responses.items()
                     },
                     "failed": dict(part.failed),
@@ -109,11 +106,10 @@ class Nu12Study(Presented):
     def table(self) -> pd.DataFrame:
         """Return columns model, response, nu12, value, to_base, to_mean."""
         frames = [
-            pd.DataFrame({"model": name, "response": response, "nu12": r.nu12, "value": r.values,
-                          "to_base": r.to_base, "to_mean": r.to_mean})
+            pd.DataFrame({"model": name, "response": response, **vars(r)})
             for name, part in self.parts.items()
             for response, r in part.responses.items()
-        ]  # fmt: skip
+        ]
         return pd.concat(frames, ignore_index=True)
 
     def lines(self) -> list[str]:

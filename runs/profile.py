@@ -32,10 +32,7 @@ from .folder import Presented, check_unused, finished
 from .progress import Listener, listener
 from .setup import FitSetup
 
-#: Kinds of notes that are made here.
 NOT_CLOSED = NoteKind("profile not closed")
-
-
 #: Ratio of the distances of the ends from the best beyond which an interval is asymmetric.
 ASYMMETRIC = 1.3
 #: -2 log L below the best from which another optimum is better.
@@ -205,10 +202,11 @@ def profile(
     """Hold moduli away from their best and refit everything else, until the data contradict.
     Begins at the optimum of the fit that wrote the card; every refit begins at its neighbour.
     moduli : strains of each modulus, by name; half of what is reached of all three unless given, or
-    where a modulus has no strains. card : the one that the project's fit left in its usual folder
-    unless given. tests, progress : as for `fit`. out : folder of the study. Raises InputError: in
-    the project or its data; no such modulus, or a strain beyond the law's; OutputError: the folder
-    is used; SolverFailure: the tests cannot be run with the card."""
+    where a modulus has no strains. card : itself, its file or its name in the project; the one that
+    the project's fit left in its usual folder unless given. tests, progress : as of `fit`. out :
+    folder of the study. InputError : in the project or its data; no such modulus, or a strain
+    beyond the law's. OutputError : the folder is used. SolverFailure : the tests cannot be run with
+    the card."""
     check_unused(out, False, overwrite)
     asked = {name: list(strains) for name, strains in (moduli or {}).items()}
     for name, strains in asked.items():

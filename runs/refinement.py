@@ -318,15 +318,12 @@ def refine(
     progress: Listener = None,
 ) -> Refinement:  # fmt: skip
     """Run tests with a card on finer and finer meshes, or with more and more increments.
-    card : itself, its file, or its name in the project; the one that the project's fit left in its
-    usual folder unless given. tests : names or kinds, all unless given.
-    levels : number of refinements of `what`. factor : edges, or increments, are divided by it from
-    one level to the next. coarser : levels coarser than the project's own; 1 of elements and 0 of
-    increments unless given. progress : called with every `Step`, as for `fit`. out : folder of the
-    study, which keeps the analyses that ended, from which an interrupted study resumes. Raises
-    InputError: a level that cannot be meshed, or equals another; OutputError: the folder is used;
-    SolverFailure: nothing can be compared, because fewer than two levels
-    ended well anywhere."""
+    card : as of `profile`. tests : names or kinds, all unless given. levels : number of refinements
+    of `what`. factor : edges, or increments, are divided by it from one level to the next. coarser
+    : levels coarser than the project's own; 1 of elements and 0 of increments unless given.
+    progress : receives every `Step`, as of `fit`. out : folder of the study, which keeps analyses
+    that ended, to resume. InputError : a level that cannot be meshed, or equals another.
+    OutputError. SolverFailure : fewer than two levels ended well anywhere."""
     check_unused(out, resume, overwrite)
     below = (1 if what == "elements" else 0) if coarser is None else coarser
     if below >= levels:

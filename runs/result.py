@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, Note, NoteKind, as_note, check_one_of, rows
 from ..experiments.kinds import (
@@ -34,7 +33,7 @@ from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tes
 from ..inference.posterior import LEVEL, Posterior
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..materials.card import MaterialCard
-from ..materials.forms.base import COMPONENTS
+from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
@@ -42,14 +41,9 @@ from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
 
-#: Kinds of notes that are made here.
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
 NOT_CONVERGED = NoteKind("not converged", weight=9)
-
-
-Array = NDArray[np.float64]
-
 #: Number of best starts of which the laws are drawn together.
 BEST = 5
 #: Tables of `Fit.write_table`.
@@ -180,7 +174,7 @@ class Fit(Reported):
         """Return 1 sigma (n,) of each modulus along its strains, by test and from all.
         Empty if not known, or of one test."""
         point, sure = self.best.differentiated, self.best.certainty
-        if point is None or sure is None or sure.rows is None or len(self.setup.tests) < 2:
+        if point is None or sure is None or len(self.setup.tests) < 2:
             return {}
         leading = self.problem.surrogate or self.problem
         names = [c.name for c in self.problem.comparisons]
@@ -222,8 +216,7 @@ class Fit(Reported):
             if sure is not None:
                 at = sure.strain[name]
                 sigma, noise = (np.interp(strain, at, s[name]) for s in (sure.total, sure.sigma))
-                if (ends := sure.ends(name, strain, self.law.modulus(name, strain))) is not None:
-                    lower, upper = ends
+                lower, upper = sure.ends(name, strain, self.law.modulus(name, strain))
                 if sure.mesh is not None:
                     mesh = np.interp(strain, at, sure.mesh[name])
             columns = {
@@ -243,10 +236,10 @@ class Fit(Reported):
 
         The same seed draws the same laws. InputError : the fit has no uncertainty to draw from.
         """
-        if self._known is None or self.best.certainty is None:
+        if (sure := self.best.certainty) is None:
             problem = "the solver gives no derivatives, so that nothing is known to draw from"
             raise InputError(self.project.path, "draw_laws", problem)
-        return self.best.certainty.laws(self.law, count, np.random.default_rng(seed))
+        return sure.laws(self.law, count, np.random.default_rng(seed))
 
     def history(self) -> Histories:
         """Return the analyses of the best fit by name of the comparison, on the mesh of the fit."""
@@ -385,7 +378,7 @@ def answers(best: BestFit, thickness: float) -> list[Answer]:
             if sure is not None:
                 sigma = float(np.interp(strain, sure.strain[name], sure.total[name]))
                 ends = sure.ends(name, strain, np.array(value))
-                band = None if ends is None else (float(ends[0]), float(ends[1]))
+                band = float(ends[0]), float(ends[1])
             one = Answer(name, strain, value, value * thickness, sigma, band, strain == end)
             found.append(one)
     return found
@@ -415,7 +408,7 @@ def reaches(fit: Fit) -> dict[str, Reach]:
     found, sure = {}, fit.best.certainty
     for name, component in COMPONENTS.items():
         end = float(fit.best.valid[component])
-        if sure is None or name not in sure.band:
+        if sure is None:
             found[name] = Reach(None, (0.0, end), end)
             continue
         strain, (lower, upper) = sure.strain[name], sure.band[name]
@@ -451,8 +444,6 @@ def next_step(fit: Fit) -> str:
 
 #: Columns before the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
-
-
 #: Relative 1 sigma beyond which a test says nothing about a modulus.
 NOTHING = 1.0
 #: Name of all tests together among the tests.

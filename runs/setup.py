@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import functools
+import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,6 +24,7 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kind_named
 from ..files import one_blas_thread
+from ..files import pandas as pd
 from ..inference.comparison import Comparison, Nuisance, OwnObjective
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
@@ -47,7 +48,7 @@ from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
 from .folder import PARTS, RUN
-from .starts import HEADER, HISTORY, StartRecord, timed
+from .starts import HISTORY, StartRecord, timed
 
 #: Smallest modulus allowed anywhere on the strain range (MPa), unless the file says otherwise.
 MARGIN_E, MARGIN_G = 5.0, 0.5
@@ -282,6 +283,8 @@ def proposals(
     try:
         before = dict(json.loads((folder / RUN).read_text(encoding="utf-8"))[PARTS])
         text = (folder / HISTORY).read_text(encoding="utf-8", errors="replace")
+        whole = io.StringIO(text[: text.rfind("\n") + 1])  # a line without its end was cut off
+        table = pd.read_csv(whole, dtype=str, on_bad_lines="skip")
     except (OSError, ValueError, KeyError, TypeError):
         problem = f"expected the folder of a fit, with {RUN} and {HISTORY}"
         raise InputError(folder, KEY, problem) from None
@@ -289,21 +292,16 @@ def proposals(
     if other:
         problem = f"is a fit of another model: its {' and '.join(other)} differ from this fit's"
         raise InputError(folder, KEY, f"{problem}; name a fit of this model, or start elsewhere")
-    head, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())
-    if any(column not in head for column in columns):
+    if any(column not in table for column in columns):
         raise InputError(folder / HISTORY, KEY, f"has not the columns {', '.join(columns)}")
-    places, value = [head.index(column) for column in columns], HEADER.index("objective")
-    whole = [row for row in rows if len(row) == len(head) and row[value]]
     try:
-        coefficients = np.array([[float(row[k]) for k in places] for row in whole]) * scale
-        objectives = np.array([float(row[value]) for row in whole])
+        known = table.dropna(subset="objective")[["objective", *columns]].to_numpy(float)
     except ValueError as error:
         raise InputError(folder / HISTORY, KEY, f"is damaged: {error}") from None
-    good = np.isfinite(objectives)
-    if not good.any():
+    if not np.isfinite(known[:, 0]).any():
         raise InputError(folder / HISTORY, KEY, "holds no evaluation that ended well")
-    good &= np.isfinite(coefficients).all(axis=1)
-    return ProposedStarts(coefficients[good], objectives[good])
+    known = known[np.isfinite(known).all(axis=1)]
+    return ProposedStarts(known[:, 1:] * scale, known[:, 0])
 
 
 #: Solver that leads the fit if the project's gives no derivatives.

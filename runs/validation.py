@@ -311,14 +311,12 @@ def validate(
 ) -> Validation:  # fmt: skip
     """Fit all tests, then all but each in turn, and judge the fits at the test left out.
     Offsets and the sheet's surface of a test left out are fitted to it, with the law as it is. For
-    a part of a test (a frame) they are those of the fit to the rest of the test. tests : by name or
-    kind; every test that can be fitted unless given. forms : of the moduli, as for `compare`;
-    the project's own unless given. leave : "tests", or a sort of parts that the tests have:
-    "frames" of a bubble, "specimens" or "directions" of strips. cards : judged at every test
-    instead, without a fit: by name, or names and files as for the command. out : folder of the
-    study, with a folder for each fit, written as the fits end. trust, progress, command_line : as
-    for `fit`. Raises InputError: in the project or its data, fewer than two tests or parts, nothing
-    to resume; OutputError, NoFeasibleStart, SolverFailure: as `bubblefit.fit`."""
+    a part of a test (a frame) they are those of the fit to the rest of the test. forms : of the
+    moduli, as for `compare`; the project's own unless given. leave : "tests", or a sort of parts
+    that the tests have: "frames" of a bubble, "specimens" or "directions" of strips. cards : judged
+    at every test instead, without a fit: by name, or names and files as for the command. out :
+    folder of the study, with a folder for each fit. The other arguments and the errors are those of
+    `fit`. InputError also : fewer than two tests or parts."""
     if cards:
         check_unused(out, False, overwrite)
         given = cards if isinstance(cards, Mapping) else chosen_cards(project, cards)

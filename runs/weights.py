@@ -155,12 +155,10 @@ def weights(
     progress: Listener = None, command_line: Sequence[str] | None = None,
 ) -> WeightStudy:  # fmt: skip
     """Fit the tests together, then with other weights of one kind, each from its neighbour.
-    counted : kind of test whose weight is changed, or the name of a test. tests : as for `fit`.
-    starts : of the fit at the project's weights; the others begin at the optimum beside them.
-    counts : factors of the weight in the project. out : folder of the study, in which every fit is
-    written as it ends. trust, progress, command_line : as for `fit`. Raises InputError: in the
-    project or its data; no test of that kind or name, or no other one; OutputError,
-    NoFeasibleStart, SolverFailure: as `bubblefit.fit`."""
+    counted : kind of test whose weight is changed, or the name of a test. starts : of the fit at
+    the project's weights; the others begin at the optimum beside them. counts : factors of the
+    weight in the project. The other arguments and the errors are those of `fit`. InputError also :
+    no test of that kind or name, or no other one."""
     check_asked(out, resume, overwrite)
     tell = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])

@@ -321,7 +321,7 @@ def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
     sigma = {"E1": [0.02, 0.03, 0.03], "E2": [0.001] * 3, "G12": [0.5] * 3}
     mesh = {"E1": [0.01, -0.044, 0.031], "E2": [0.009] * 3, "G12": [-0.4] * 3}
     sigma, mesh = ({n: np.array(v) for n, v in of.items()} for of in (sigma, mesh))
-    told = Certainty({}, strain, sigma, (), mesh)
+    told = Certainty({}, strain, sigma, (), mesh, {}, None, None, None, {})
     (note,) = notes_of_mesh(told)
     assert note.kind is MESH
     assert "E1" in note and "-4.4 %" in note and "5 % of" in note and "(3 %)" in note
