@@ -58,8 +58,8 @@ def differences(before: Any, now: Any, key: str = "") -> list[str]:
     if before == now:
         return []
     if isinstance(before, Mapping) and isinstance(now, Mapping):
-        keys = [(before.get(own), now.get(own), own) for own in {**before, **now}]
-        return [w for *two, own in keys for w in differences(*two, f"{key}.{own}".lstrip("."))]
+        pairs = [(before.get(own), now.get(own), f"{key}.{own}") for own in {**before, **now}]
+        return [w for a, b, own in pairs for w in differences(a, b, own.lstrip("."))]
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         pairs = [(a, b, f"{key}[{i}]") for i, (a, b) in enumerate(zip(before, now, strict=True))]
         if sum(a != b for a, b, _ in pairs) <= FEW:
