@@ -6,6 +6,7 @@ of a `NoteKind` of the module that makes it: `lines` on the terminal, `rows` in 
 
 from __future__ import annotations
 
+import difflib
 import functools
 import inspect
 import re
@@ -113,6 +114,12 @@ def check_one_of(
     if value is not None and value not in (names := list(known)):
         problem = f"expected one of {', '.join(map(str, names))}, got {value!r}"
         raise InputError(path, field, problem)
+
+
+def did_you_mean(typed: object, known: Iterable[str]) -> str:
+    """Return a question with the nearest known name; "" where none is near."""
+    near = difflib.get_close_matches(str(typed), list(known), n=1, cutoff=0.5)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 class OutputError(BubblefitError):

@@ -116,7 +116,7 @@ def elements(sizes="25,12", *cases):
     for case in cases or ("150/140",):
         name = "{} mm, {} kPa".format(*case.split("/"))
         for card in ("uniaxial", "bubble 1"):
-            found, own = [], project.cards[card]
+            found, own = [], project.cards[card].card
             for size in sizes.split(","):
                 model = replace(project.tests[name], size=float(size)).model(own.thickness)
                 load = MembraneSolver().run(model, own.law).load

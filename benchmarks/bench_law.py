@@ -160,7 +160,7 @@ def constants(lowest=0.0, highest=5.0):
     print(f"{lowest:g} to {highest:g} kN/m, G to a shear strain of 0.05; E and G in kN/m")
     for name, one in bf.read_project(BENDING, need_data=False).cards.items():
         try:
-            found = constants_of_law(one.law, one.thickness, lowest, highest, 0.05)
+            found = constants_of_law(one.card.law, one.card.thickness, lowest, highest, 0.05)
         except InputError as error:
             print(f"{name:10s}{error.problem}")
             continue

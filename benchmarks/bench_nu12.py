@@ -118,7 +118,7 @@ def fitted(setups, known, nu12, moduli):
 
 def biaxial(sets=10):
     """Fit SETS of the computed biaxial example with other noise, first reading and strain kept."""
-    known = bf.read_project(BENDING, need_data=False).cards["uniaxial"].law
+    known = bf.read_project(BENDING, need_data=False).cards["uniaxial"].card.law
     setup = free(bf.read_project(EXAMPLES / "biaxial-computed" / "project.toml"))
     (prepared,) = setup.tests
     test, thickness = prepared.test, setup.project.fabric.thickness

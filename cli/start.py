@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from io import StringIO
@@ -13,12 +14,15 @@ import click
 from rich.console import Console
 from rich.markdown import Markdown
 
-from ..errors import InputError, OutputError
-from ..files import ROOT, write_text
-from ..project.new_project import writable_kinds, write_project
+from ..errors import InputError, OutputError, check_one_of, did_you_mean
+from ..experiments.registry import kind_named
+from ..files import ROOT, __version__, render, write_text
+from ..inference.methods import method_names
+from ..materials.forms.base import form_names
+from ..project.project import read_project
 from ..project.schema import SHIPPED, schema_text
 from .options import numbers
-from .terminal import FILE, command, did_you_mean, wrapped
+from .terminal import FILE, command, wrapped
 
 DOCS = ROOT / "docs"
 #: Folders of pages; of two pages with one name the first is meant.
@@ -37,6 +41,13 @@ PROJECT = "project.toml"
 #: First line of an example, where it lies and where it is copied to: editors find the schema by it.
 FAR, NEAR = b"#:schema ../../templates/project/", b"#:schema "
 COUNT = click.IntRange(0, 99)
+#: Kinds of test that a project of one's own is written for.
+WRITABLE = ("bubble", "strips", "biaxial", "cylinder")
+#: What a project of one's own is like unless something else is said; mm and kPa.
+USUAL: Mapping[str, Any] = {
+    "name": "My fabric", "thickness": 0.8, "form": "cubic", "radius": 100.0,
+    "pressures": (20, 60, 100, 150, 200, 250, 300), "diameter": 150.0, "pressure": 100.0,
+}  # fmt: skip
 
 
 @command(
@@ -76,20 +87,17 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
     else:
         name, advice, project = KINDS[example or "known"]
         files = sorted(f for f in (EXAMPLES / name).iterdir() if f.is_file())
-        for file in (*files, SHIPPED):
-            _free(folder / file.name)
-        written = []
+        content = {f.name: f.read_bytes().replace(FAR, NEAR, 1) for f in (*files, SHIPPED)}
+        for file in content:
+            _free(folder / file)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            for file in files:
-                written.append(folder / file.name)
-                written[-1].write_bytes(file.read_bytes().replace(FAR, NEAR, 1))
-            written.append(folder / SHIPPED.name)
-            written[-1].write_bytes(SHIPPED.read_bytes())
+            for file, text in content.items():
+                (folder / file).write_bytes(text)
         except OSError as error:
-            for path in written:  # half an example would be in the way of the next attempt
+            for file in content:  # half an example would be in the way of the next attempt
                 with suppress(OSError):
-                    path.unlink(missing_ok=True)
+                    (folder / file).unlink(missing_ok=True)
             raise OutputError(
                 f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
             ) from None
@@ -100,7 +108,6 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
 def _write_own(folder: Path, said: dict[str, Any]) -> None:
     path = folder / PROJECT
     _free(path)
-    kinds = writable_kinds()
     if not said and on_a_terminal():
         said = {
             "name": click.prompt("Name of the fabric", default="My fabric"),
@@ -120,10 +127,18 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
             said["pressure"] = click.prompt("Pressure in them, kPa", type=float)
         if said["bubble"] or said["strips"] or said["biaxial"]:
             said["form"] = click.prompt("Form of the moduli", default="cubic")
-    tests = {kind: said.pop(kind, 0) for kind in kinds}
+    tests = {kind: said.pop(kind, 0) for kind in WRITABLE}
     if "pressures" in said:
         said["pressures"] = numbers(said["pressures"], "--pressures")
-    write_project(path, tests, **said)
+    text = _project_text(tests, {**USUAL, **said})
+    with tempfile.TemporaryDirectory() as place:  # so that a wrong one leaves no folder
+        tried = Path(place) / PROJECT
+        tried.write_text(text, encoding="utf-8")
+        try:
+            read_project(tried, need_data=False)
+        except InputError as error:
+            raise InputError(None, error.field, error.problem) from None
+    write_text(path, text)
     write_text(folder / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
     click.echo(f"wrote {path}: read it, put the measured files where it says, then")
     if tests["bubble"]:
@@ -133,6 +148,36 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
     fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
     then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
     click.echo(f"next: bubblefit {then}")
+
+
+def _project_text(tests: Mapping[str, int], said: Mapping[str, Any]) -> str:
+    """Return a commented project file; tests : how many of each kind. said : as `USUAL`."""
+    asked = [kind for kind, count in tests.items() if count]
+    if not asked:
+        raise InputError(None, "--own", f"name at least one test: --{', --'.join(tests)}")
+    check_one_of(said["form"], form_names(), "--form")
+    fitted = [kind for kind in asked if kind_named(kind).fitted]
+    values = {**said, "deflection": 1.6 * said["diameter"]}
+    parts = [
+        render(f"project/{kind}.toml.j2", **{**values, "name": f"{kind}{n}"}, number=n,
+               count=tests[kind])
+        for kind in asked
+        for n in range(1, tests[kind] + 1)
+    ]  # fmt: skip
+    words = {key: _quoted(said[key]) for key in ("name", "form")}
+    return render(
+        "project/project.toml.j2", **{**values, **words}, version=__version__, tests=parts,
+        fitted=bool(fitted), predicted=len(fitted) < len(asked),
+        methods=", ".join(f'"{name}"' for name in method_names()),
+        # The gauges of strips tell how far a fabric is strained; nothing else does beforehand.
+        strain_range="strips" not in asked,
+    )  # fmt: skip
+
+
+def _quoted(text: str) -> str:
+    """Return text as it may stand between TOML's quotation marks."""
+    plain = "".join(c for c in text if c.isprintable())
+    return plain.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def on_a_terminal() -> bool:

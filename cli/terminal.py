@@ -5,7 +5,6 @@ with `show`. `--events` and `--verbose` belong to every command and are added by
 
 from __future__ import annotations
 
-import difflib
 import functools
 import json
 import logging
@@ -21,7 +20,7 @@ from typing import IO, Any
 
 import click
 
-from ..errors import BubblefitError, OutputError
+from ..errors import BubblefitError, OutputError, did_you_mean
 from ..files import __version__, json_text, one_blas_thread, output_errors
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -204,12 +203,6 @@ def _name(param: click.Parameter | None) -> str:
     if isinstance(param, click.Option):
         return max((*param.opts, *param.secondary_opts), key=len)
     return "" if param is None else (param.metavar or param.name or "").upper()
-
-
-def did_you_mean(typed: str, known: Sequence[str]) -> str:
-    """Return a question with the nearest known name; "" where none is near."""
-    near = difflib.get_close_matches(typed, known, n=1, cutoff=0.5)
-    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 class Suggesting(click.Group):

@@ -22,7 +22,7 @@ FIRST, LATER, NOISE = np.array([0.20, 0.30]), np.array([0.02, 0.03]), 0.01
 
 def main() -> None:
     cards = bf.read_project(EXAMPLES / "bend-valmex7318" / "project.toml", need_data=False).cards
-    card = cards["uniaxial"]
+    card = cards["uniaxial"].card
     random = np.random.default_rng(7318)
     share = np.concatenate([np.linspace(0, 1, UP), np.linspace(1, 0, DOWN + 1)[1:]])
     kept, lines = np.zeros(2), ['ratio,"n_w, kN/m","n_f, kN/m","eps_w, %","eps_f, %"']

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import atexit
 import csv
-import difflib
 import hashlib
 import io
 import json
@@ -29,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..experiments.bubble.section import RegistrationSection, SheetSection
 from ..experiments.kinds import Output
 from ..experiments.registry import kind_named
@@ -560,9 +559,7 @@ def _with(table: Mapping[str, Any], dotted: str, value: Any) -> dict[str, Any]:
 def _check_names(said: Iterable[str], known: Sequence[str], at: str = "") -> None:
     for key in said:
         if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.5)
-            meant = f"did you mean {near[0]!r}? " if near else ""
-            problem = f"unknown; {meant}known here: {', '.join(known)}"
+            problem = f"unknown{did_you_mean(key, known) or ';'} known here: {', '.join(known)}"
             raise InputError(None, f"{at}{key}", problem)
 
 

@@ -47,6 +47,7 @@ from .schema import (
     CardSection,
     FitSection,
     LawSection,
+    NamedCard,
     ProjectFile,
     read_cards,
     read_content,
@@ -192,7 +193,7 @@ class Project:
     tests: Mapping[str, Test]
     law: LawSection
     fit: FitSection
-    cards: Mapping[str, MaterialCard]
+    cards: Mapping[str, NamedCard]
     solver_options: Mapping[str, Mapping[str, Any]]
     written: Written | None = None
     scheduler: str | None = None
@@ -571,7 +572,7 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
             problem = f"there is no card (and no file) {str(path)!r}; the project has: "
             problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "
             raise InputError(project.path, "--card", problem + "card's file, or add [[card]]")
-    own = {name: card for name, card in project.cards.items() if name in sources}
+    own = {name: named.card for name, named in project.cards.items() if name in sources}
     return named_cards(files, own)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -336,9 +336,17 @@ def usual_folder(project: Path) -> Path:
     return Path("out") / (name if project.stem == "project" else f"{name}-{project.stem}")
 
 
-def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, MaterialCard]:
+@dataclass(frozen=True, eq=False)
+class NamedCard:
+    """A material card and, where it is known, the sort of test that it was fitted to."""
+
+    card: MaterialCard
+    test: str | None = None
+
+
+def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, NamedCard]:
     """Return the cards by name, in the order of the file; InputError."""
-    cards: dict[str, MaterialCard] = {}
+    cards: dict[str, NamedCard] = {}
     for i, section in enumerate(sections):
         at = f"card[{i}]"
         if (section.file is None) == (section.beta is None):
@@ -347,7 +355,7 @@ def read_cards(place: Place, sections: Sequence[CardSection]) -> dict[str, Mater
         if card.name in cards:
             problem = f"{card.name!r} is there twice; name one of them"
             raise InputError(place.path, f"{at}.name", problem)
-        cards[card.name] = card
+        cards[card.name] = NamedCard(card, section.test)
     return cards
 
 

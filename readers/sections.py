@@ -1,6 +1,5 @@
 """The base of all sections of a project file, its numbers and units, and errors in one line."""
 
-import difflib
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 ModulusUnit = Literal["GPa", "MPa", "Pa"]
 PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
@@ -94,10 +93,8 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         for part in location[:-1]:
             if isinstance(part, str):  # a number counts the tables of a list
                 holder = next(_sections(holder.model_fields[part].annotation))
-        known = list(holder.model_fields)
-        near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
-        meant = f"did you mean {near[0]!r}? " if near else ""
-        return f"unknown key; {meant}allowed here: {', '.join(known)}"
+        meant = did_you_mean(location[-1], holder.model_fields) or ";"
+        return f"unknown key{meant} allowed here: {', '.join(holder.model_fields)}"
     if kind == "finite_number":
         return f"expected a finite number, got {given!r}"
     if kind in ("too_short", "too_long"):

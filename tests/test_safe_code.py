@@ -231,7 +231,7 @@ def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
 
 def test_a_cards_text_is_no_line_of_an_export(tmp_path):
     project = read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
-    plain = next(iter(project.cards.values()))
+    plain = next(iter(project.cards.values())).card
     card = MaterialCard(plain.law, plain.thickness, HOSTILE, HOSTILE)
     write_card(card, tmp_path / "card.toml")
     for name, kind in FORMATS.items():

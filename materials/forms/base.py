@@ -10,7 +10,6 @@ on its size). A piece holds for strains up to its upper end, which belongs to it
 range, and below zero strain, a modulus is held.
 """
 
-import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ...files import Group, PlugIn, names_with, plug_in_named
 
 Array = NDArray[np.float64]
@@ -241,10 +240,9 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
     settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
     offer, plug_in = _offer(name)
     if offer is None:
-        near = difflib.get_close_matches(name, form_names(), n=1, cutoff=0.5)
-        meant = f"did you mean {near[0]!r}? " if near else ""
-        problem = f"no form is called {name!r}; {meant}known: {', '.join(form_names())}"
-        raise InputError(None, "form", problem)
+        known = form_names()
+        words = f"no form is called {name!r}{did_you_mean(name, known) or ';'} known: "
+        raise InputError(None, "form", words + ", ".join(known))
     for key in settings:
         if key not in offer.settings:
             raise InputError(None, key, f"a {name} law has no {key}")

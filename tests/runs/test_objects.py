@@ -215,9 +215,9 @@ def test_examples_are_the_same_through_objects_and_toml(example, tmp_path, reque
         for name, test in project.tests.items():
             assert other.tests[name].settings() == test.settings()
         for name, card in project.cards.items():
-            same = other.cards[name]
-            np.testing.assert_array_equal(same.law.beta, card.law.beta)
-            assert same.thickness == card.thickness
+            same = other.cards[name].card
+            np.testing.assert_array_equal(same.law.beta, card.card.law.beta)
+            assert same.thickness == card.card.thickness
 
 
 SCHEMA = project_schema(with_plug_ins=False)
@@ -383,7 +383,7 @@ VALUES = {
 def test_every_other_key_is_the_same_through_objects_and_toml(tmp_path):
     count = 0
     bend = bf.read_project(EXAMPLES / "bend-valmex7318" / "project.toml")
-    bend.cards["bubble 1"].write(tmp_path / "a.toml")
+    bend.cards["bubble 1"].card.write(tmp_path / "a.toml")
     for table in ("fabric", "law", "fit", "card", "solver"):
         for path, own in keys(SCHEMA["properties"][table], (table,)):
             said = {"fabric": {"thickness": 8e-4}, "units": UNITS, "cylinder": [LEAST["cylinder"]]}

@@ -12,7 +12,7 @@ from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.forms.base import form_names
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import card_sources, chosen_cards, read_project
-from bubblefit.project.schema import SHIPPED, CardSection, read_cards, schema_text
+from bubblefit.project.schema import SHIPPED, CardSection, NamedCard, read_cards, schema_text
 from bubblefit.runs.setup import bounds_of, law_of
 
 from ..complaints import complaint, complaint_with
@@ -283,9 +283,10 @@ def test_a_card_of_a_file_keeps_what_the_file_says(tmp_path):
             {"file": "bare.toml", "test": "bubble"})  # fmt: skip
     found = read_cards(place(tmp_path), [CardSection(**one) for one in said])
     assert list(found) == ["soft", "another", "bare"]
-    for name, card in found.items():
-        assert (card.name, card.thickness, card.source) == (name, 0.7, "a fit")
-        np.testing.assert_allclose(card.law.beta, LAW.beta)
+    assert [named.test for named in found.values()] == [None, None, "bubble"]
+    for name, named in found.items():
+        assert (named.card.name, named.card.thickness, named.card.source) == (name, 0.7, "a fit")
+        np.testing.assert_allclose(named.card.law.beta, LAW.beta)
 
 
 @pytest.mark.parametrize(
@@ -308,7 +309,7 @@ def test_cards_that_cannot_be(tmp_path, said, words):
 
 
 def with_cards(folder, *names):
-    cards = {name: MaterialCard(LAW, 0.8, name) for name in names}
+    cards = {name: NamedCard(MaterialCard(LAW, 0.8, name)) for name in names}
     return SimpleNamespace(cards=cards, path=folder / "fabric" / "project.toml")
 
 

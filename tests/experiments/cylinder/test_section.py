@@ -56,8 +56,9 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
     assert list(project.cards) == list(TABLES)
     for name, beta in TABLES.items():
         card = project.cards[name]
-        np.testing.assert_allclose(card.law.beta, 1e3 * np.array(beta), rtol=1e-12)
-        assert card.thickness == 0.81 and card.law.nu12 == 0.24
+        np.testing.assert_allclose(card.card.law.beta, 1e3 * np.array(beta), rtol=1e-12)
+        assert card.card.thickness == 0.81 and card.card.law.nu12 == 0.24
+        assert card.test == name.split()[0]
     for test in tests:
         collar = (295.0, 147.0) if test.diameter == 250 else (240.0, 145.0)
         assert (test.collar.inner_diameter, test.collar.length) == collar
@@ -69,7 +70,7 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
     assert tests[2].name == "150 mm, 140 kPa"
     # Moduli stay above zero as far as each card says that it is valid.
     for card in project.cards.values():
-        law = card.law
+        law = card.card.law
         for modulus, column in (("E1", 0), ("E2", 1), ("G12", 2)):
             assert law.modulus(modulus, np.linspace(0, law.strain_range[column], 500)).min() > 0
 
@@ -102,7 +103,7 @@ def test_metres_and_bars_are_the_same_cylinder(tmp_path):
             assert getattr(other, key) == pytest.approx(getattr(one, key)), key
         assert other.reading.places == pytest.approx(one.reading.places)
         assert other.reading.slope_over == pytest.approx(one.reading.slope_over)
-    assert read_project(path).cards["soft"].thickness == pytest.approx(0.81)
+    assert read_project(path).cards["soft"].card.thickness == pytest.approx(0.81)
 
 
 D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'
