@@ -22,7 +22,7 @@ from .linear import (
     posteriors_of,
     sizes_of,
 )
-from .noise import Discrepancy, Noise, differences_of_all, discrepancies, notes_of_discrepancies
+from .noise import Discrepancy, Noise, discrepancies, notes_of_discrepancies
 from .posterior import Posterior, bands_of
 from .problem import Evaluation, FitProblem
 
@@ -49,22 +49,18 @@ def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> 
 @dataclass(frozen=True, eq=False)
 class Certainty:
     """The uncertainty of each modulus up to the strains reached, and notes on it.
-    By comparison: `noise`, in the unit of its data (mm, N), and `alike`, neighbouring values that
-    err as one. By modulus: `strain`; `sigma`, relative, by noise; `mesh`, relative change on ever
-    finer meshes, None where unknown; `band` (2, n) MPa, 95 %, noise and mesh together. posterior :
-    from the noise alone. fine : of ever finer meshes, with the error that may be left. rows : (m,)
-    noise of each residual if as many independent ones were measured. taken_out : the reported law
-    is that of ever finer meshes. second, order : None where the certainty is of first order."""
+    By modulus: `strain`; `sigma`, relative, by noise; `mesh`, relative change on ever finer meshes,
+    None where unknown; `band` (2, n) MPa, 95 %, noise and mesh together. posterior : from the noise
+    alone. fine : of ever finer meshes, with the error that may be left. taken_out : the reported
+    law is that of ever finer meshes. second, order : None where the certainty is of first order."""
 
-    noise: dict[str, float]
+    noise: Noise
     strain: dict[str, Array]
     sigma: dict[str, Array]
     undetermined: tuple[Note, ...]
     mesh: dict[str, Array] | None
-    alike: dict[str, float]
     posterior: Posterior
     fine: Posterior | None
-    rows: Array
     band: dict[str, Array]
     taken_out: bool = False
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
@@ -132,7 +128,6 @@ def certainty(
         return max(float(np.abs(after[name] / before[name] - 1.0).max()) for name in some)
 
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual), best, effect)
-    wrong |= differences_of_all(problem, left, best, effect)
     mesh = None
     if limit is not None:
         moduli = moduli_of(problem.unknowns, best.unknowns, strains)
@@ -140,7 +135,7 @@ def certainty(
         mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
     bands = bands_of(fine or posterior, law, strains)
     sure = Certainty(
-        noise.level, strains, sigmas, (), mesh, noise.alike, posterior, fine, noise.rows, bands,
+        noise, strains, sigmas, (), mesh, posterior, fine, bands,
         taken_out and limit is not None, discrepancy=wrong, second=second,
     )  # fmt: skip
     words = [

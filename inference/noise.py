@@ -238,38 +238,39 @@ class Discrepancy:
 
 
 def discrepancies(
-    problem: FitProblem, residual: Array, doubt: Array | None = None,
-    best: Evaluation | None = None, effect: Effect | None = None,
-) -> dict[str, Discrepancy]:  # fmt: skip
-    """Return the discrepancy of every comparison with places on a sheet, from the residual (m,).
-    doubt : (m,) part of the residual that the mesh may cause. best : where causes are looked for.
-    """
+    problem: FitProblem, residual: Array, doubt: Array | None, best: Evaluation, effect: Effect
+) -> dict[str, Discrepancy]:
+    """Return the discrepancy of every comparison on a sheet, or of several specimens, by name.
+    residual : (m,). doubt : (m,) part of it that the mesh may cause. best : where causes are looked
+    for."""
     found = {}
     doubt = np.zeros_like(residual) if doubt is None else doubt
     for k, comparison in enumerate(problem.comparisons):
-        objective = comparison.objective
-        places = getattr(objective, "places", ())
-        if not places or places[0].shape[1] != 2:
-            continue
-        rows = problem.rows(k)
-        ends = np.cumsum(objective.sizes)[:-1]
-        blocks, of_mesh = (
-            np.split(whole[rows] * problem.scale[rows], ends) for whole in (residual, doubt)
-        )
-        one = discrepancy(blocks, of_mesh, places, problem.unknowns.count, objective.unit)
-        if one is not None:
-            least = objective.least_noise / float(np.sqrt(len(residual[rows])))
-            one = replace(one, least=least, share=_share(one, objective))
-            if one.systematic and best is not None:
+        objective, rows = comparison.objective, problem.rows(k)
+        if getattr(objective, "specimens", None) is not None:
+            one = _of_specimens(problem, residual, best, k, effect)
+        else:
+            one = _of_sheet(problem, (residual[rows], doubt[rows]), k)
+            if one is not None and one.systematic:
                 one = replace(one, causes=_causes_on_sheet(problem, residual, best, k, effect))
+        if one is not None:
+            measured = np.asarray(getattr(objective, "measured", ()))
+            if measured.any():
+                one = replace(one, share=one.rms / float(np.sqrt(np.mean(measured**2))))
             found[comparison.name] = one
     return found
 
 
-def _share(one: Discrepancy, objective: Objective) -> float:
-    """Return its size beside what was measured."""
-    measured = np.asarray(getattr(objective, "measured", ()))
-    return one.rms / float(np.sqrt(np.mean(measured**2))) if measured.any() else 1.0
+def _of_sheet(problem: FitProblem, parts: Sequence[Array], k: int) -> Discrepancy | None:
+    objective = problem.comparisons[k].objective
+    places = getattr(objective, "places", ())
+    if not places or places[0].shape[1] != 2:
+        return None
+    scale, ends = problem.scale[problem.rows(k)], np.cumsum(objective.sizes)[:-1]
+    blocks, of_mesh = (np.split(part * scale, ends) for part in parts)
+    one = discrepancy(blocks, of_mesh, places, problem.unknowns.count, objective.unit)
+    least = objective.least_noise / float(np.sqrt(len(scale)))
+    return None if one is None else replace(one, least=least)
 
 
 def _causes_on_sheet(
@@ -406,31 +407,21 @@ COVERED = 0.8  # of the whole curve, that a specimen must cover to count
 NOTHING, LEFT = 1e-6, 1e-3
 
 
-def differences_of_all(
-    problem: FitProblem, residual: Array, best: Evaluation, effect: Effect | None = None
-) -> dict[str, Discrepancy]:
-    """Return discrepancies of the comparisons with values of several specimens along a curve."""
-    found: dict[str, Discrepancy] = {}
-    jacobian = best.jacobian
-    if jacobian is None:
-        return found
-    for k, comparison in enumerate(problem.comparisons):
-        objective = comparison.objective
-        whose = getattr(objective, "specimens", None)
-        if whose is None:
-            continue
-        rows, (at,) = problem.rows(k), objective.places  # type: ignore[attr-defined]
-        scale = problem.scale[rows]
-        off, slopes = residual[rows] * scale, jacobian[rows] * scale[:, None]
-        some = [np.flatnonzero(whose == number) for number in np.unique(whose)]
-        left, places, steep = ([v[own] for own in some] for v in (off, at[:, 0], slopes))
-        known = objective.causes(best.histories[k]) if hasattr(objective, "causes") else {}
-        order = np.concatenate(some)
-        causes = {words: (own * scale[:, None])[order] for words, own in known.items()}
-        one = alike_in_all(left, places, steep, objective.unit, causes, effect)
-        if one is not None:
-            found[comparison.name] = replace(one, share=_share(one, objective))
-    return found
+def _of_specimens(
+    problem: FitProblem, residual: Array, best: Evaluation, k: int, effect: Effect
+) -> Discrepancy | None:
+    if best.jacobian is None:
+        return None
+    objective: Any = problem.comparisons[k].objective
+    rows, (at,), whose = problem.rows(k), objective.places, objective.specimens
+    scale = problem.scale[rows]
+    off, slopes = residual[rows] * scale, best.jacobian[rows] * scale[:, None]
+    some = [np.flatnonzero(whose == number) for number in np.unique(whose)]
+    left, places, steep = ([v[own] for own in some] for v in (off, at[:, 0], slopes))
+    known = objective.causes(best.histories[k]) if hasattr(objective, "causes") else {}
+    order = np.concatenate(some)
+    causes = {words: (own * scale[:, None])[order] for words, own in known.items()}
+    return alike_in_all(left, places, steep, objective.unit, causes, effect)
 
 
 def alike_in_all(

@@ -76,10 +76,11 @@ def _determined(fit: Fit) -> Sequence[Table]:
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
     together = {
         name: f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
-        for name, alike in sure.alike.items()
+        for name, alike in sure.noise.alike.items()
     }
     noise = ", ".join(
-        f"{value:.2g} {units[name]} ({name}{together[name]})" for name, value in sure.noise.items()
+        f"{value:.2g} {units[name]} ({name}{together[name]})"
+        for name, value in sure.noise.level.items()
     )
     note = (
         f"noise of {noise} on everything matched; a law or a model of the wrong form is not in it; "

@@ -303,8 +303,7 @@ class Optimum:
     @property
     def linear(self) -> Linear:
         """Return the linear fit there, with the noise of the certainty."""
-        noise = replace(Noise.of(self.problem, self.point.residual), rows=self.sure.rows)
-        return Linear.of(self.problem, self.point, noise, self.sure.second)
+        return Linear.of(self.problem, self.point, self.sure.noise, self.sure.second)
 
 
 def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None) -> Optimum:

@@ -197,13 +197,9 @@ class RunRecords:
     def begin(self, resume: bool, overwrite: bool) -> bool:
         """Make the folder ready, without `resume` empty of runs; as `Store.begin`."""
         folder = self.store.path / RUNS
-        # A name with a dot before it is a file whose writing was cut off.
-        cut = list(folder.glob(".*.npz"))
-        held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz") if path not in cut]
-        resume = self.store.begin({}, resume, overwrite, held)
-        for path in cut:
-            path.unlink(missing_ok=True)
-        return resume
+        remove_unfinished(folder)
+        held = [f"{RUNS}/{path.name}" for path in folder.glob("*.npz")]
+        return self.store.begin({}, resume, overwrite, held)
 
     def write(self, mark: str, record: RunRecord) -> None:
         """Write a run unless it failed: that is tried again next time; raises OutputError."""

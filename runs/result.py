@@ -181,7 +181,7 @@ class Fit(Reported):
         numbers = {name: [names.index(c.name) for c in fitted.comparisons]
                    for name, fitted in self.tests.items()}  # fmt: skip
         given = leading, point, self.law, self.best.valid
-        sigma = partial(uncertainty_from, *given, noise=sure.rows)
+        sigma = partial(uncertainty_from, *given, noise=sure.noise.rows)
         alone = {name: sigma(numbers=own) for name, own in numbers.items()}
         return {**alone, TOGETHER: dict(sure.sigma)}
 
@@ -489,7 +489,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
-            "noise": sure.noise, "values_that_err_as_one": sure.alike,
+            "noise": sure.noise.level, "values_that_err_as_one": sure.noise.alike,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),

@@ -73,7 +73,7 @@ def test_certainty_predicts_the_scatter_of_noisy_fits():
     point = fit.evaluate(truth, True)
     scatter = scatter_of(fit, point, {"bubble": noise})
     predicted = certainty(fit, point, FLAT_LAW, clean.strain_max)
-    assert predicted.noise["bubble"] == pytest.approx(noise, rel=0.03)  # of 1281 values: 2 %
+    assert predicted.noise.level["bubble"] == pytest.approx(noise, rel=0.03)  # of 1281 values: 2 %
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANT.to_coefficients @ scatter / moduli, rel=0.03)
     assert not predicted.undetermined
@@ -237,15 +237,15 @@ def test_a_fit_is_as_much_less_sure():
         point = fit.evaluate(fit.unknowns.at(LAW.beta), True)
         found[name] = certainty(fit, point, LAW, np.full(3, 0.08))
         if name == "shared":
-            assert alike_in(objective, point.residual) == found[name].alike["bubble"]
+            assert alike_in(objective, point.residual) == found[name].noise.alike["bubble"]
     # A smooth misfit of 0.03 mm, below 0.05 mm to reckon with, does not tell.
-    assert found["smooth"].alike == {"bubble": 1.0}
-    assert found["white"].alike["bubble"] == pytest.approx(1.0, abs=0.15)
-    assert 3.0 < found["shared"].alike["bubble"] < 12.0
+    assert found["smooth"].noise.alike == {"bubble": 1.0}
+    assert found["white"].noise.alike["bubble"] == pytest.approx(1.0, abs=0.15)
+    assert 3.0 < found["shared"].noise.alike["bubble"] < 12.0
     for name in ("E1", "E2", "G12"):
         ratio = found["shared"].sigma[name] / found["white"].sigma[name]
-        noise_ratio = found["shared"].noise["bubble"] / found["white"].noise["bubble"]
-        many = found["shared"].alike["bubble"] / found["white"].alike["bubble"]
+        noise_ratio = found["shared"].noise.level["bubble"] / found["white"].noise.level["bubble"]
+        many = found["shared"].noise.alike["bubble"] / found["white"].noise.alike["bubble"]
         # Noise that is shared leaves blocks of other norms, and so of other weights.
         assert ratio == pytest.approx(noise_ratio * np.sqrt(many), rel=0.15)
 

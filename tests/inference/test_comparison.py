@@ -15,7 +15,7 @@ from bubblefit.inference.noise import (
     DISCREPANCY,
     Noise,
     alike_in_all,
-    differences_of_all,
+    discrepancies,
     notes_of_discrepancies,
 )
 from bubblefit.inference.problem import FitProblem, folds_of
@@ -323,7 +323,7 @@ def differences(knots, places, measured, count, slopes, model):
         rows=lambda _: slice(None), scale=objective.scale,
     )  # fmt: skip
     best = SimpleNamespace(jacobian=slopes / objective.scale[:, None], histories=[model])
-    return differences_of_all(problem, objective.residual(model), best, lambda step: 0.0)["warp"]
+    return discrepancies(problem, objective.residual(model), None, best, lambda _: 0.0)["warp"]
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def test_a_run_is_stored_exactly(folder, tmp_path):
 @pytest.mark.parametrize("resume", [True, False])
 def test_a_file_whose_writing_was_cut_off_goes(folder, tmp_path, resume):
     folder.write("a" * 64, ran(model(), card()))
-    (tmp_path / "runs" / ".aaaa.123.npz").write_bytes(b"half")
+    (tmp_path / "runs" / ".aaaa.999999999.npz").write_bytes(b"half")
     folder.begin(resume, not resume)
     assert len(list((tmp_path / "runs").iterdir())) == resume
     assert (folder.read("a" * 64) is not None) == resume

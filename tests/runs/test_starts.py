@@ -321,7 +321,7 @@ def test_a_mesh_that_moves_a_modulus_more_than_the_noise_is_told():
     sigma = {"E1": [0.02, 0.03, 0.03], "E2": [0.001] * 3, "G12": [0.5] * 3}
     mesh = {"E1": [0.01, -0.044, 0.031], "E2": [0.009] * 3, "G12": [-0.4] * 3}
     sigma, mesh = ({n: np.array(v) for n, v in of.items()} for of in (sigma, mesh))
-    told = Certainty({}, strain, sigma, (), mesh, {}, None, None, None, {})
+    told = Certainty(None, strain, sigma, (), mesh, None, None, {})
     (note,) = notes_of_mesh(told)
     assert note.kind is MESH
     assert "E1" in note and "-4.4 %" in note and "5 % of" in note and "(3 %)" in note
@@ -362,7 +362,7 @@ def test_where_it_cannot_be_known(off, monkeypatch):
 def test_what_the_mesh_leaves_is_no_noise(off):
     before = off.misfits["bubble"].rms
     assert before > 0.02
-    assert off.best.certainty.noise["bubble"] == 0.05  # the least, whatever is left
+    assert off.best.certainty.noise.level["bubble"] == 0.05  # the least, whatever is left
     problem, best = off.problem, off.best.differentiated
     (test,) = off.setup.tests
     finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
