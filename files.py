@@ -20,12 +20,12 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, cached_property, lru_cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from .errors import NOTES, BubblefitError, InputError, Note, OutputError, PlugInFailure, rows
 
@@ -238,16 +238,19 @@ def html_table(caption: str, header: Sequence[object], rows: Iterable[Sequence[o
     return f"<table>{said}<thead>{head}</thead><tbody>{''.join(lines)}</tbody></table>"
 
 
-def known(value: V) -> V:
-    """Return plain values with None for every number that is not finite."""
-    plain: Any = value
+def known(value: Any) -> Any:
+    """Return plain values of dataclasses and arrays, None for a number that is not finite."""
+    if is_dataclass(value):
+        return {f.name: known(getattr(value, f.name)) for f in fields(value)}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     if isinstance(value, Mapping):
-        plain = {key: known(own) for key, own in value.items()}
-    elif isinstance(value, (list, tuple)):
-        plain = [known(own) for own in value]
-    elif isinstance(value, float) and not math.isfinite(value):
-        plain = None
-    return cast(V, plain)
+        return {key: known(own) for key, own in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [known(own) for own in value]
+    return value if isinstance(value, int | float | None) else str(value)
 
 
 def remove_unfinished(folder: Path | str) -> None:

@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..files import ends
 from . import tables
 from .frames import Array, Frame, heading_of
-from .inflations import Which, branches_of
+from .histories import Which, branches_of
 from .machine_tables import AS_FOUND, Channel, TableOptions, in_unit, read_machine_table
 from .text_frames import SEPARATORS, TOP, Lines, cells_of
 

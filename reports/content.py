@@ -7,18 +7,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import zip_longest
-from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import InputError
-from ..files import write_text
+from ..files import known, write_text
 from .charts import Chart, Charts, Series
 from .maps import Maps, Solid
 
@@ -161,7 +159,7 @@ def _adapter() -> TypeAdapter[Report]:
 
 def write_page_data(folder: Path, report: Report) -> Path:
     """Write page.json. Raises OutputError: it cannot be written."""
-    content = {"layout": LAYOUT, **plain(report)}
+    content = {"layout": LAYOUT, **known(report)}
     path = folder / PAGE_DATA
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return path
@@ -189,24 +187,7 @@ def read_page_data(folder: Path) -> Report:
 
 def round_trip(report: Report) -> Report:
     """Return the report as read back from page.json, so that pages made later are the same."""
-    return _adapter().validate_python(plain(report))
-
-
-def plain(value: object) -> Any:
-    """Return plain values of dataclasses, arrays and numbers; None for NaN and infinity."""
-    if is_dataclass(value):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, bool | int | None):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): plain(own) for key, own in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [plain(own) for own in value]
-    return str(value)
+    return _adapter().validate_python(known(report))
 
 
 Named = tuple[str, Report]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..readers.bending import BendingCurve, BendingScatter
 from .charts import Array, Chart, Charts, Series, band, dots, faces, line, shades_of
 
 Point = tuple[float, float]
@@ -44,23 +45,14 @@ class BendLine:
 
 
 @dataclass(frozen=True, eq=False)
-class BendReadings:
-    """Measured loads: every repetition's readings, their mean and scatter on one grid (k,)."""
-
-    readings: Sequence[tuple[ArrayLike, ArrayLike]]
-    deflection: Array
-    mean: Array
-    deviation: Array
-
-
-@dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: a curve a card, readings, and the name of what curves may be off by.
+    """One case: a curve a card, repetitions with their scatter, what curves may be off by.
     along : the name of the deflection."""
 
     title: str
     lines: Sequence[BendLine] = ()
-    measured: BendReadings | None = None
+    readings: Sequence[BendingCurve] = ()
+    measured: BendingScatter | None = None
     spread: str = ""
     along: str = ALONG
 
@@ -113,8 +105,7 @@ def _loads(panel: BendPanel) -> Chart:
         ends = seen.mean - seen.deviation, seen.mean + seen.deviation
         series.append(band("scatter of repetitions (±)", seen.deflection, *ends, colour=7))
         series.append(line("mean", seen.deflection, seen.mean, colour=7, wide=True))
-        for elongation, load in seen.readings:
-            series.append(dots("measured", elongation, load, colour=7))
+        series += [dots("measured", c.deflection, c.load, colour=7) for c in panel.readings]
     known = [(own.name, own.rms) for own in panel.lines if own.rms is not None]
     for own in panel.lines:
         look = 1 + own.rank % 6

@@ -25,10 +25,9 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
 from ..runs.result import USABLE, Fit, answers, next_step, reaches
-from .charts import Chart, Charts, dots, line
+from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
-from .moduli import moduli_charts, pinned_charts
 from .studies import optima_chart
 from .vega import save
 

@@ -17,8 +17,7 @@ from ..runs.profile import Profile
 from ..runs.refinement import Level, Refinement, ended, largest_load, rms_changes
 from ..runs.validation import Validation
 from ..runs.weights import PLACES, WeightStudy
-from .charts import TITLES, Chart, Charts, Series, dots, line, spans_a_decade
-from .moduli import MODULUS, PANELS, PERCENT, axis_top
+from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 
 #: What a perfect fit (zero) is drawn as on a logarithmic axis.
 PERFECT = 1e-16
@@ -172,7 +171,7 @@ def bootstrap_charts(study: Bootstrap, caption: str) -> Charts:
     """Return moduli (MPa) with the ends of samples and of the fit's band."""
     charts = []
     for (title, label), (name, strain) in zip(PANELS, study.strains.items(), strict=True):
-        x, (low, high), fit = PERCENT * strain, study.bands[name], study.of_fit[name]
+        x, (low, high), fit = 100 * strain, study.bands[name], study.of_fit[name]
         best = study.found.best.law.modulus(name, strain)
         series = [
             line("fit, with its band by the noise", x, best, (fit[0], fit[1])),
@@ -181,7 +180,8 @@ def bootstrap_charts(study: Bootstrap, caption: str) -> Charts:
         ]
         top, cut = axis_top(1.08 * max(float(best.max()), float(high.max())), fit[1])
         alt = f"{title}: at rest {best[0]:.4g} MPa, samples {low[0]:.4g} to {high[0]:.4g} MPa"
-        charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
+        up, title = "tangent modulus, MPa", f"{title}{cut}"
+        charts.append(Chart(title, label, up, series, alt, from_zero=True, top=top))
     return Charts("bootstrap", charts, caption)
 
 

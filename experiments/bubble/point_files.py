@@ -13,7 +13,7 @@ from ...files import is_file
 from ...readers import pressure_log
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
-from ...readers.inflations import Inflations, Which, has_several
+from ...readers.histories import Inflations, Which, has_several
 from ...readers.machine_tables import Channel, read_times
 from ...readers.pressure_log import check_pattern, number_in_name, values_in_file
 from ...readers.sections import LENGTH_UNITS

@@ -13,8 +13,7 @@ from ...meshes.bubble_model import BubbleModel, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
-from ...readers.histories import LoadHistory, Pace, pace_of
-from ...readers.inflations import Which
+from ...readers.histories import LoadHistory, Pace, Which, pace_of
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, SectionTest, Studied, divided
 from .point_files import PointFiles, measured_files

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,6 @@ from ...reports.cylinders import (
     BeamBodies,
     BendLine,
     BendPanel,
-    BendReadings,
     beam_charts,
     bending_charts,
     gas_charts,
@@ -229,12 +229,12 @@ def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
         s = scatter(test.measured)
         # Where a repetition has ended the mean of the others jumps.
         whole = s.count == len(test.measured)
-        readings = [(c.deflection, c.load) for c in test.measured]
-        shown = (np.where(whole, values, np.nan) for values in (s.mean, s.deviation))
-        measured = BendReadings(readings, s.deflection, *shown)
+        mean, deviation = (np.where(whole, own, np.nan) for own in (s.mean, s.deviation))
+        measured = replace(s, mean=mean, deviation=deviation)
     beam = any(isinstance(run.model, BeamModel) for run in outcome.runs if run.test is test)
     along = "deflection of mid-span, mm" if beam else ALONG
-    return BendPanel(test.name, lines, measured, f"{100 * LEVEL:g} % by the card", along)
+    spread = f"{100 * LEVEL:g} % by the card"
+    return BendPanel(test.name, lines, test.measured, measured, spread, along)
 
 
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:

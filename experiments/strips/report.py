@@ -12,10 +12,9 @@ from ...materials.card import MaterialCard
 from ...materials.forms.base import COMPONENTS
 from ...meshes.mesh import surface_strain
 from ...meshes.strip_models import UniaxialModel
-from ...reports.charts import Charts
+from ...reports.charts import Charts, moduli_together
 from ...reports.content import Exhibit, Table
 from ...reports.maps import write_vtu
-from ...reports.moduli import moduli_together
 from ...reports.strips import (
     StripCurves,
     load_charts,

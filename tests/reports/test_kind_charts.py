@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bubblefit.meshes.strip_models import strip_mesh
+from bubblefit.readers.bending import BendingCurve, BendingScatter
 from bubblefit.reports import bubbles, cylinders, strips
 from bubblefit.reports.bubbles import cut_charts, height_charts, node_cut
 from bubblefit.reports.charts import Charts, axis_ends, scale_ends
@@ -112,8 +113,9 @@ SOFT = BendLine(
 )
 STIFF = BendLine("stiff", 1, WAY, 5 * WAY, 0.14 + 2e-5 * WAY, 5e7 - 2e4 * WAY, limit=(40.0, 200.0))
 READINGS = [(WAY[:5], 3.9 * WAY[:5]), (WAY[:6], 4.1 * WAY[:6])]
-MEASURED = cylinders.BendReadings(READINGS, GRID, 4 * GRID, 0.1 * GRID)
-CASE = BendPanel("one", [SOFT, STIFF], MEASURED)
+CURVES = [BendingCurve("a", *pair) for pair in READINGS]
+MEASURED = BendingScatter(GRID, 4 * GRID, 0.1 * GRID, np.full(7, 2))
+CASE = BendPanel("one", [SOFT, STIFF], CURVES, MEASURED)
 
 
 def test_loads_and_what_the_cards_miss():
@@ -150,8 +152,7 @@ def test_bands_of_the_solver_and_of_the_card():
     assert named(chart)["soft, other end"].colour == first.colour
     assert "95 % by the card" in named(chart) and axis_ends(chart)[1][1] > 270.0
     short = BendLine("short", 0, WAY[:3], WAY[:3])
-    long = replace(MEASURED, readings=[(WAY[:7], 4.1 * WAY[:7])])
-    charts = bending_charts([BendPanel("one", [short], long)], misses=True)
+    charts = bending_charts([BendPanel("one", [short], CURVES[1:], MEASURED)], misses=True)
     check_charts(charts)
     off = lines(charts.charts[1], "short")[0][1]
     assert off == pytest.approx(np.where(GRID <= 10.0, -3 * GRID, np.nan), nan_ok=True)

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from bubblefit.reports import studies
-from bubblefit.reports.charts import axis_ends
-from bubblefit.reports.moduli import moduli_charts, pinned_charts
+from bubblefit.reports.charts import axis_ends, moduli_charts, pinned_charts
 from bubblefit.runs.poisson import ratios
 
 from ..drawings import check_charts, data, legend, lines, named
