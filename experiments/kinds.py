@@ -721,12 +721,11 @@ class Judgement:
     @property
     def notes(self) -> tuple[Note, ...]:
         """Return notes on all other doubts, with their name where they are trusted."""
-        texts = (
-            d.text + f" (trusted: {d.name})" * (d.name in self.trusted)
+        return tuple(
+            Note(DOUBTFUL, d.text + f" (trusted: {d.name})" * (d.name in self.trusted), self.test)
             for d in self.doubts
             if d not in self.errors
         )
-        return tuple(Note(DOUBTFUL, text, self.test) for text in texts)
 
     def demand(self, project: Path) -> None:
         """Raise an InputError with all sure doubts in one line, each with its name."""
@@ -822,19 +821,14 @@ def laws_around(
     if samples is not None:
         laws = sure.laws(card.law, samples, np.random.default_rng(SEED))
         return Around("samples", [1.0] * samples), laws
-    steps, laws = [], []
-    for k in range(min(DIRECTIONS, len(sure.directions))):
-        along = np.zeros(len(sure.directions))
-        for step in STEPS:
-            along[k] = step
-            law = sure.shifted(card.law, along)
-            if positive(law):
-                break
-        else:
-            raise ValueError("a modulus is not positive next to the card's own law")
-        steps.append(step)
-        laws.append(law)
-    return Around("directions", steps), laws
+    found = []
+    for along in np.eye(len(sure.directions))[:DIRECTIONS]:
+        tried = ((step, sure.shifted(card.law, step * along)) for step in STEPS)
+        found.append(next((pair for pair in tried if positive(pair[1])), None))
+    known = [pair for pair in found if pair is not None]
+    if len(known) < len(found):
+        raise ValueError("a modulus is not positive next to the card's own law")
+    return Around("directions", [step for step, _ in known]), [law for _, law in known]
 
 
 class ChannelSection(Section):

@@ -15,18 +15,8 @@ from ..files import pandas as pd
 from ..inference.comparison import Comparison, NoiseIs
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
-from .kinds import (
-    Array,
-    FittedTest,
-    MakeSolver,
-    Masks,
-    Predicted,
-    PreparedTest,
-    Reach,
-    Runs,
-    Studied,
-    Weighting,
-)
+from . import kinds
+from .kinds import Array, FittedTest, MakeSolver, Masks, PreparedTest, Reach, Runs, Weighting
 
 PERCENT = 100.0
 #: Of one measured strain: what an extensometer, a camera or an encoder is good for.
@@ -37,8 +27,8 @@ class MeasuredKind:
     """A kind of test that is fitted, and read with its data. prepared : makes one of a test."""
 
     fitted: bool = True
-    predicted: Predicted | None = None
-    studied: Studied | None = None
+    predicted: kinds.Predicted | None = None
+    studied: kinds.Studied | None = None
     prepared: type[Any]
 
     def prepare(self, test: Any, law: HypoelasticLaw, make_solver: MakeSolver) -> PreparedTest:

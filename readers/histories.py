@@ -126,10 +126,10 @@ def find_cycles(load: Array) -> list[Cycle]:
     return [c if c.end - c.peak >= 5 else replace(c, unloaded=False) for c in cycles]
 
 
-def turns(load: Array, back: float = BACK, again: float = AGAIN) -> list[int]:
+def turns(load: Array, back: float = BACK, again: float = AGAIN, floor: float = FLOOR) -> list[int]:
     """Return rows of a valley, the peak after it, the next valley and so on."""
-    floor = FLOOR * float(np.ptp(load)) if len(load) else 0.0
-    if not floor > 0:
+    least = floor * float(np.ptp(load)) if len(load) else 0.0
+    if not least > 0:
         return []
     found: list[int] = []
     far, sign = 0, -1.0  # the first turn is a valley
@@ -138,7 +138,7 @@ def turns(load: Array, back: float = BACK, again: float = AGAIN) -> list[int]:
             far = i
             continue
         before = abs(load[far] - load[found[-1]]) if found else 0.0
-        if sign * (load[far] - value) > max(floor, (back if sign > 0 else again) * before):
+        if sign * (load[far] - value) > max(least, (back if sign > 0 else again) * before):
             found.append(far)
             far, sign = i, -sign
     return [*found, far]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, check_one_of
 from ...materials.designers import RATIOS, shares
 from ...readers.frames import FrameSource
+from ...readers.histories import turns
 from ...readers.machine_tables import Channel, TableOptions, read_machine_table
 from ...readers.tables import LOAD_UNITS, PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 
@@ -170,23 +171,8 @@ def find_cycles(load: Array, labels: Sequence[str] | None = None) -> list[Cycle]
 
 def _loadings(s: Array) -> list[tuple[int, int]]:
     """Return first and last row of every loading in loads (n,)."""
-    least = TURN * float(np.ptp(s)) if len(s) else 0.0
-    if not least > 0:
-        return []
-    found = []
-    rises, valley, peak, rising = [], 0, 0, False
-    for i in range(len(s)):
-        if rising:
-            if s[i] > s[peak]:
-                peak = i
-            elif s[i] < s[peak] - least:
-                rises.append((valley, peak))
-                rising, valley = False, i
-        elif s[i] < s[valley]:
-            valley = i
-        elif s[i] > s[valley] + least:
-            rising, peak = True, i
-    for low, high in [*rises, (valley, peak)] if rising else rises:
+    rows, found = turns(s, 0.0, 0.0, TURN), []
+    for low, high in zip(rows[::2], rows[1::2], strict=False):
         hold = HOLD * (s[high] - s[low])
         first = low + int(np.flatnonzero(s[low : high + 1] <= s[low] + hold)[-1])
         last = first + int(np.flatnonzero(s[first : high + 1] >= s[high] - hold)[0])

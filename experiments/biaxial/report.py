@@ -48,8 +48,8 @@ def misfit_table(paths: Sequence[FittedPart]) -> Table:
     return Table("Misfit by ratio", header, rows, note, text=(0, 3))
 
 
-def _columns(values: Array, name: str) -> pd.DataFrame:
-    return pd.DataFrame(values, columns=[f"{yarn}_{name}" for yarn in YARNS])
+def _columns(values: Array, name: str) -> dict[str, Array]:
+    return {f"{yarn}_{name}": values[:, k] for k, yarn in enumerate(YARNS)}
 
 
 def simulate(
@@ -70,11 +70,9 @@ def simulate(
             beyond = (np.log1p(own) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
             shown = int(np.argmax(beyond)) if within_range and beyond.any() else len(own)
             larger, strain = path.larger[:shown], PERCENT * (own - own[0])[:shown]
-            table = _columns(path.load[:shown], "load_kN_per_m")
-            table[[f"{yarn}_strain_percent" for yarn in YARNS]] = strain
-            table.insert(0, "card", name)
-            table.insert(1, "ratio", path.ratio)
-            tables.append(table)
+            columns = _columns(path.load[:shown], "load_kN_per_m")
+            columns |= _columns(strain, "strain_percent")
+            tables.append(pd.DataFrame({"card": name, "ratio": path.ratio, **columns}))
             warp, fill, end = None, None, 0.0
             if shown:
                 curves.append((name, larger, strain))
@@ -140,11 +138,10 @@ def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Ou
     paths = prepared.fitted_parts(fitted)
     parts = []
     for p in paths:
-        own = p.objective.strain, p.objective.modelled(p.history)
-        columns = zip(("strain_percent", "model_percent"), own, strict=True)
-        strains = [_columns(PERCENT * values, name) for name, values in columns]
-        parts.append(pd.concat([_columns(p.data.load, "load_kN_per_m"), *strains], axis=1))
-        parts[-1].insert(0, "ratio", p.data.ratio)
+        columns = _columns(p.data.load, "load_kN_per_m")
+        columns |= _columns(PERCENT * p.objective.strain, "strain_percent")
+        columns |= _columns(PERCENT * p.objective.modelled(p.history), "model_percent")
+        parts.append(pd.DataFrame({"ratio": p.data.ratio, **columns}))
     charts = fitted_paths(prepared, fitted)
     facts = [("ratios matched", ", ".join(p.data.ratio for p in paths))]
     files = [

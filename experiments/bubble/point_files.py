@@ -31,10 +31,7 @@ def pressures_by_log(
     place: Place, folder: Path,
 ) -> tuple[pressure_log.ClockOffset, list[str], list[str]]:  # fmt: skip
     """Return the pressures of all frames by a log, their names, and doubts about their numbers.
-
-    Raises InputError.
-
-    folder : of the data, where the log may be too."""
+    folder : of the data, where the log may be too. Raises InputError."""
     at = f"{AT}.log"
     file = _beside(section.file, place, folder, f"{at}.file")
     kind = named_format(place, f"{at}.format", "machine table", section.format)
@@ -48,8 +45,7 @@ def pressures_by_log(
         risen = [pressure_log.apex_height(frame) for frame in frames]
         own += [frame.number for frame in frames]
         heights += risen
-        several = [f"{one.name}, frame {i + 1}" for i in range(len(risen))]
-        names += several if len(risen) > 1 else [one.name] * len(risen)
+        names += _frame_names(one, len(risen))
     height = np.array(heights)
     with place.naming(at):
         times, said = _frame_times(section, files, own, place, folder)
@@ -57,6 +53,12 @@ def pressures_by_log(
         if section.offset is None:
             return pressure_log.find_offset(*seen), names, said
         return pressure_log.given_offset(section.offset, *seen), names, said
+
+
+def _frame_names(file: Path, count: int) -> list[str]:
+    """Return the names of the frames of a file."""
+    several = [f"{file.name}, frame {i + 1}" for i in range(count)]
+    return several if count > 1 else [file.name] * count
 
 
 def _frame_times(
@@ -148,11 +150,8 @@ def recorded_frames(
     elif section.column is not None:
         channel = Channel(section.column, section.unit, section.scale, section.offset)
         each = [values_in_file(file, channel, PRESSURE_UNITS) for file in files]
-        names = [
-            f"{file.name}, frame {i + 1}" if len(one) > 1 else file.name
-            for file, one in zip(files, each, strict=True)
-            for i in range(len(one))
-        ]
+        counted = zip(files, map(len, each), strict=True)
+        names = [name for file, count in counted for name in _frame_names(file, count)]
         pressures = np.concatenate(each)
         source = f"{section.column!r} in each file"
     else:

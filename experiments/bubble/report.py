@@ -356,16 +356,15 @@ def examine(prepared: PreparedBubble, out: Output) -> Exhibit:
     curve = np.array([field.pressure for field in prepared.fields]), np.asarray(all_rises)
     rises = bubbles.rise_charts("rises", "rise about the centre, mm", [curve])
     figures = [maps, saved(out, "rises.png", rises, "rise about the centre against pressure")]
-    recorded = prepared.test.data.recorded
-    if not (found := recorded and recorded.inflations):
-        return Exhibit(facts=facts, figures=figures, tables=tables)
-    table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
-    file = out.write("inflations.csv", table, "apex of each inflation beside the first")
-    tables.append(Table("Inflations", list(INFLATIONS.values()), table.to_numpy().tolist(),
-                        found.line))  # fmt: skip
-    apexes = bubbles.rise_charts("inflations", "height of the apex, mm", found.curves)
-    figures.append(saved(out, "inflations.png", apexes, "apex in each inflation and release"))
-    return Exhibit(facts=facts, figures=figures, tables=tables, files=[file])
+    recorded, files = prepared.test.data.recorded, []
+    if found := recorded and recorded.inflations:
+        table = pd.DataFrame(found.rows, columns=list(INFLATIONS))
+        files.append(out.write("inflations.csv", table, "apex of each inflation beside the first"))
+        cells = table.to_numpy().tolist()
+        tables.append(Table("Inflations", list(INFLATIONS.values()), cells, found.line))
+        apexes = bubbles.rise_charts("inflations", "height of the apex, mm", found.curves)
+        figures.append(saved(out, "inflations.png", apexes, "apex in each inflation and release"))
+    return Exhibit(facts=facts, figures=figures, tables=tables, files=files)
 
 
 def _equilibrium(view: View) -> Table:

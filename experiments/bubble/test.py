@@ -225,17 +225,16 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
             clamp, _ = clamp_radius(fields, measured.registration)
     outline = outline_of(section, place, clamp)
     source = data_source(section, place, pressures, increments, measured)
+    same = ("weight", "elements", "symmetry", "generator", "objective", "inflation")
     return BubbleTest(
-        name=name, place=place, weight=section.weight, outline=outline, elements=section.elements,
-        symmetry=section.symmetry, generator=section.generator, pressures=pressures,
-        increments=increments, data=source, match_by=section.match.by,
-        match_degree=section.match.degree, objective=section.objective,
+        name=name, place=place, outline=outline, pressures=pressures, increments=increments,
+        data=source, match_by=section.match.by, match_degree=section.match.degree,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         noise=None if section.noise is None else section.noise * length,
         facet=facet_of(section, place), sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
-        inflation=section.inflation,
+        **{key: getattr(section, key) for key in same},
     )  # fmt: skip
 
 

@@ -103,11 +103,6 @@ class Against:
     reference: float
     pairs: Mapping[str, tuple[float, float] | None]
 
-    @property
-    def ratios(self) -> Mapping[str, float | None]:
-        """Return predicted over measured by quantity."""
-        return {name: pair and pair[0] / pair[1] for name, pair in self.pairs.items()}
-
 
 def against_measured(
     reading: CurveReading, d: Array, load: Array, measured: Sequence[BendingCurve]
@@ -441,8 +436,8 @@ class CylinderOutcome:
             "reached_mm": m and m.reached,
         }
         if m is not None and m.against is not None:
-            ratios = m.against.ratios.items()
-            row |= {f"{n.replace(' ', '_')}_over_measured": ratio for n, ratio in ratios}
+            for name, pair in m.against.pairs.items():
+                row[f"{name.replace(' ', '_')}_over_measured"] = pair and pair[0] / pair[1]
         if number in self.spreads:
             sigma = zip(places, self.sigma(number).values(), strict=True)
             row |= {f"load_at_{p}_sigma_N": value for p, value in sigma}

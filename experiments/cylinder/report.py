@@ -386,8 +386,6 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
             " ±: one standard deviation of the load by what the card leaves open of its law "
             f"({'; '.join(how)} around it), which is no part of the band of the walls."
         )
-    note += "".join(f" {words.capitalize()}." for words in outcome.unsure)
-    note += "".join(f" {end.name.capitalize()}: {end.meaning}." for end in outcome.band)
     named = range(1, header.index("stiffness, N/mm"))
     text = (*named, header.index("ended"), header.index("marked"))
     return Table("Runs", header, [_unbroken(row) for row in rows], note, text=text)

@@ -42,18 +42,8 @@ from ...readers.sections import (
     Unit,
     whole_in_base_units,
 )
-from ..kinds import (
-    ChannelSection,
-    DataFile,
-    Place,
-    Reach,
-    Refined,
-    SectionTest,
-    divided,
-    joined,
-    listed_files,
-    named_format,
-)
+from .. import kinds
+from ..kinds import ChannelSection, DataFile, Place, Reach, Refined, SectionTest, divided
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -226,7 +216,7 @@ class CylinderTest(SectionTest):
     reach = Reach()
 
     def data_files(self) -> Sequence[DataFile]:
-        return joined(
+        return kinds.joined(
             DataFile(c.path, c.source or FrameSource(), len(c.load), c.dropped)
             for c in self.measured
             if c.path is not None
@@ -298,12 +288,9 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
         return _beam(section, shared)
     usual = RigidSupports()
     with place.naming(keys=KEYS):
-        collar = usual_collar(own.diameter)
-        if own.collar is not None:
-            collar = Collar(**own.collar.model_dump(exclude_none=True))
-        saddle = None
-        if own.saddle is not None:
-            saddle = Collar(**own.saddle.model_dump(exclude_none=True))
+        collar, saddle = (
+            one and Collar(**one.model_dump(exclude_none=True)) for one in (own.collar, own.saddle)
+        )
         test = CylinderTest(
             **shared,
             pressure=own.pressure,
@@ -318,7 +305,7 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
                 saddle,
             ),
             mass_per_area=own.mass_per_area or 0.0,
-            collar=collar,
+            collar=collar or usual_collar(own.diameter),
             gas=Gas(**own.gas.model_dump(exclude_none=True)),
             reading=curve_reading(own.diameter, own.places, own.slope_over),
         )
@@ -339,14 +326,7 @@ def _cord(section: CordSection, place: Place, at: str) -> Cord:
         table = axial_table(section.stiffness or 1.0)
         if section.strain and section.force:
             table = ForceTable(np.array(section.strain), np.array(section.force))
-        return Cord(
-            section.angle,
-            table,
-            section.initial_force,
-            section.prestrain,
-            section.tension_only,
-            section.bonded,
-        )
+        return Cord(table=table, **section.model_dump(exclude={"stiffness", "strain", "force"}))
 
 
 def _wall(section: WallSection, at: float, place: Place) -> PlainWall | BraidedWall:
@@ -412,12 +392,12 @@ def _beam(section: CylinderSection, shared: dict[str, Any]) -> CylinderTest:
 def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
     """Read every repetition in the files of a section; none where it lists none."""
     folder, files = place.folder(section.folder), {None: section.files or []}
-    format = named_format(place, "measured.format", "machine table", section.format)
+    format = kinds.named_format(place, "measured.format", "machine table", section.format)
     way, load = section.deflection.channel, section.load.channel
     keys = ("repetition", "preload", "zero", "comment", "decimal")
     said = {key: getattr(section, key) for key in keys}
     curves: list[BendingCurve] = []
-    for file, key, _ in listed_files(place, folder, files, "measured.files"):
+    for file, key, _ in kinds.listed_files(place, folder, files, "measured.files"):
         if place.has(file, key):
             curves += read_bending_curves(file, deflection=way, load=load, format=format, **said)
     return tuple(curves)
