@@ -53,8 +53,13 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         rms = np.sqrt(np.mean(constant_field(fitted)[1] ** 2, axis=0))
         taken = {DIRECTIONS[k]: float(rms[k]) for k in sheet.constant}
     since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
+    on = {
+        "measured surface": sheet.measured, "modes": sheet.modes, "slack": sheet.slack,
+        "measured rim": sheet.moving_rim, "constant field": sheet.constant,
+        "loaded reference frame": sheet.since is not None,
+    }  # fmt: skip
     return {
-        "used": used_of(prepared),
+        "used": [words for words, used in on.items() if used],
         "surface_mm": {"least": float(heights.min()), "largest": float(heights.max())},
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
@@ -101,17 +106,6 @@ def warnings_of(prepared: PreparedBubble) -> list[Note]:
         )
         notes.append(Note(SURFACES, words))
     return notes
-
-
-def used_of(prepared: PreparedBubble) -> list[str]:
-    """Return in words what the fit used of the sheet."""
-    sheet = prepared.test.sheet
-    on = {
-        "measured surface": sheet.measured, "modes": sheet.modes, "slack": sheet.slack,
-        "measured rim": sheet.moving_rim, "constant field": sheet.constant,
-        "loaded reference frame": sheet.since is not None,
-    }  # fmt: skip
-    return [words for words, used in on.items() if used]
 
 
 def constant_field(fitted: FittedTest) -> tuple[Array, Array]:

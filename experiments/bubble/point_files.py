@@ -259,9 +259,14 @@ def measured_files(
     measured = PointFiles(files, options, kind, registration, correlation=correlation)
     listed = list(pressures or ()) if points.pressure is None else []
     several = bool(listed) and (section.inflation != 1 or listed != sorted(listed))
-    if several and len(files) != len(listed) and (files or place.need_data):
-        problem = f"in order of time expected one for each of the {len(files)} files"
-        raise place.error("pressures", f"{problem}, got {len(listed)}")
+    fits = {len(listed)} if several else {len(listed), 1}
+    # Where no data are needed, the files may not be there to be counted.
+    if listed and len(files) not in fits and (files or place.need_data):
+        problem = f"expected one file for each of the {len(listed)} pressures, got {len(files)}"
+        key = "indices" if points.files is None else "files"
+        if points.files is not None:
+            problem += "; [bubble.data.points.pressure] says at which pressures they were recorded"
+        raise place.error("pressures" if several else f"data.points.{key}", problem)
     forward = pressures is not None and not place.need_data
     if not several and (points.pressure is None or forward):
         return measured

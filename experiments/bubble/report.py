@@ -394,8 +394,8 @@ def sheet_exhibit(
     sheet, edge = prepared.test.sheet, prepared.test.outline.edge()
     if sheet.measured or sheet.modes:
         points = fitted_model(fitted).mesh.points
-        shapes = ("measured surface", "modes")
-        how = " and ".join(used for used in wording.used_of(prepared) if used in shapes)
+        used = ["measured surface"] * sheet.measured + ["modes"] * (sheet.modes > 0)
+        how = " and ".join(used)
         words = "surface of the sheet in the reference picture"
         caption = f"{prepared.test.name}: {words} ({how})"
         values = {"z0": points[:, 2]}

@@ -60,32 +60,20 @@ class KnownSolution:
     recorded: ClassVar[None] = None
 
 
-def data_source(
-    section: BubbleSection, place: Place, pressures: Sequence[float], increments: Sequence[float],
-    measured: PointFiles | None,
-) -> KnownSolution | PointFiles:  # fmt: skip
-    """Return the measured files, as many as pressures (MPa), or the known solution."""
-    known, points = section.data.known_solution, section.data.points
-    if known is not None:
-        field = "data.known_solution"
-        if known.increments is not None:
-            increments = merge_increments(place, f"{field}.increments", known.increments, pressures)
-        return KnownSolution(
-            beta=np.array(known.beta) * place.scales.modulus, form=known.form,
-            elements=known.elements or section.elements, increments=tuple(increments),
-            symmetry=known.symmetry or section.symmetry, solver=known.solver,
-        )  # fmt: skip
-    assert points is not None and measured is not None
-    found, count = len(measured.files), len(pressures)
-    # Where no data are needed, the files may not be there to be counted.
-    counted = measured.recorded is None and points.pressure is None
-    if counted and (place.need_data or found) and found not in (count, 1):
-        field = "data.points.files" if points.files is not None else "data.points.indices"
-        problem = f"expected one file for each of the {count} pressures, got {found}"
-        if points.files is not None:
-            problem += "; [bubble.data.points.pressure] says at which pressures they were recorded"
-        raise place.error(field, problem)
-    return measured
+def known_solution(
+    section: BubbleSection, place: Place, pressures: Sequence[float], steps: tuple[float, ...]
+) -> KnownSolution:
+    """Return the known solution of a section; steps : increments (MPa) unless it names its own."""
+    known = section.data.known_solution
+    assert known is not None
+    if known.increments is not None:
+        at = "data.known_solution.increments"
+        steps = merge_increments(place, at, known.increments, pressures)
+    return KnownSolution(
+        beta=np.array(known.beta) * place.scales.modulus, form=known.form,
+        elements=known.elements or section.elements, increments=steps,
+        symmetry=known.symmetry or section.symmetry, solver=known.solver,
+    )  # fmt: skip
 
 
 PART = "bubble"
@@ -224,7 +212,7 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
             fields = measured_fields(place, measured, pressures)
             clamp, _ = clamp_radius(fields, measured.registration)
     outline = outline_of(section, place, clamp)
-    source = data_source(section, place, pressures, increments, measured)
+    source = measured or known_solution(section, place, pressures, increments)
     same = ("weight", "elements", "symmetry", "generator", "objective", "inflation")
     return BubbleTest(
         name=name, place=place, outline=outline, pressures=pressures, increments=increments,

@@ -180,7 +180,6 @@ class CyclesTest(SectionTest):
         return models
 
     def settings(self) -> Mapping[str, object]:
-        """Return the settings that a result depends on; data count by themselves."""
         names = ("weight", "width", "gauge", "grip_distance", "noise")
         return {name: getattr(self, name) for name in names}
 
@@ -287,7 +286,6 @@ class PreparedCycles(PreparedParts):
         )  # fmt: skip
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        """Return the files."""
         every = [one.evaluated.history for one in self.test.matched.values()]
         return [
             kinds.DataFile(h.path, FrameSource("machine table", notes=h.notes), len(h.load))

@@ -20,10 +20,6 @@ from . import CyclesTest, PreparedCycles
 FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled", "cycles.csv"
 
 
-def _by_specimen(prepared: PreparedCycles, fitted: FittedTest) -> dict[str, History]:
-    return dict(zip(prepared.test.matched, fitted.histories, strict=True))
-
-
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N from the reference load on."""
     return pd.concat([
@@ -51,7 +47,8 @@ def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     """Return the RMS errors of the best fit, and the doubts about the histories."""
-    numbers = _numbers(prepared.test, _by_specimen(prepared, fitted))
+    of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
+    numbers = _numbers(prepared.test, of_fit)
     notes = [n for one in prepared.test.matched.values() for n in one.evaluated.notes]
     share = max(100 * p.rms / p.data.load.max() for p in prepared.fitted_parts(fitted))
     words = f"RMS error of load {share:.2g} % of the largest"
@@ -60,7 +57,8 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write cycles.csv and the figure."""
-    charts = _drawn(prepared.test, {"model": _by_specimen(prepared, fitted)})
+    of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
+    charts = _drawn(prepared.test, {"model": of_fit})
     rows: list[list[object]] = [
         [name, cycle, error] for name, own in found.numbers["rms_N"].items()
         for cycle, error in own.items()
