@@ -289,7 +289,8 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
     usual = RigidSupports()
     with place.naming(keys=KEYS):
         collar, saddle = (
-            one and Collar(**one.model_dump(exclude_none=True)) for one in (own.collar, own.saddle)
+            None if one is None else Collar(**one.model_dump(exclude_none=True))
+            for one in (own.collar, own.saddle)
         )
         test = CylinderTest(
             **shared,
