@@ -92,12 +92,6 @@ class Certainty:
         """Return the ends of the band at strains (n,), with the modulus (n,) inside."""
         return band_at(self.strain[name], list(self.band[name]), strain, modulus)
 
-    def laws(
-        self, law: HypoelasticLaw, count: int, random: np.random.Generator
-    ) -> list[HypoelasticLaw]:
-        """Return `count` random laws that data and mesh allow."""
-        return (self.fine or self.posterior).laws(law, count, random)
-
 
 def certainty(
     problem: FitProblem, best: Evaluation, law: HypoelasticLaw, reached: Array,

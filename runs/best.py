@@ -172,21 +172,15 @@ def notes_of_mesh(sure: Certainty) -> list[Note]:
     return notes
 
 
-def note_of_limit(mesh: dict[str, Array]) -> Note:
-    """Return the note that the card is not that of the mesh of the fit."""
-    by = ", ".join(f"{name} {_signed(off[np.abs(off).argmax()])}" for name, off in mesh.items())
-    words = (
-        f"the error of the mesh is taken out of the moduli ({by} at most): the card is the law of "
-        "ever finer meshes, to first order; objective, residuals and what is drawn of the tests "
-        "are those of the mesh of the fit"
-    )
-    return Note(TAKEN_OUT, words)
-
-
 def _signed(share: float) -> str:
     return f"{100 * share:+.{0 if abs(share) >= 0.1 else 2}{'f' if abs(share) >= 0.1 else 'g'}} %"
 
 
+TAKEN_OUT_IS = (
+    "the error of the mesh is taken out of the moduli ({} at most): the card is the law of ever finer "
+    "meshes, to first order; objective, residuals and what is drawn of the tests are those of the "
+    "mesh of the fit"
+)
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
 
@@ -216,7 +210,10 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     if sure.mesh is not None:
         notes += notes_of_mesh(sure)
         if out and max(np.abs(off).max() for off in sure.mesh.values()) > LEAST:
-            notes.append(note_of_limit(sure.mesh))
+            by = ", ".join(
+                f"{n} {_signed(off[np.abs(off).argmax()])}" for n, off in sure.mesh.items()
+            )
+            notes.append(Note(TAKEN_OUT, TAKEN_OUT_IS.format(by)))
     if sure.order is not None:
         notes += sure.order.notes
     told = (*sure.undetermined, *notes)

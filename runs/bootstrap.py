@@ -35,7 +35,7 @@ from .folder import Presented, check_asked, finished
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study
-from .validation import TESTS, name_of, parts_of
+from .validation import TESTS, parts_of
 
 FEW_UNITS = NoteKind("few to draw from")
 #: Units of a group, and samples, below which percentiles are noted as unreliable.
@@ -261,7 +261,7 @@ def groups_of(found: Optimum, over: str) -> list[Group]:
             alone = {name: mask for name, mask in part.alone.items() if mask.any()}
             shared = [name for name, mask in alone.items() if not mask.all()]
             own = shared[0] if shared else setup.tests[part.test].test.name
-            unit = Unit(name_of(setup, part), rows_of(problem, alone))
+            unit = Unit(part.name, rows_of(problem, alone))
             grouped.setdefault(own, []).append(unit)
     several = [Group(name, units) for name, units in grouped.items() if len(units) > 1]
     if not several:

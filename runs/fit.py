@@ -6,6 +6,7 @@ import functools
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -315,10 +316,17 @@ def fit(
         scale = [scales.modulus] * unknowns.size + [1.0] * len(unknowns.nuisance.names)
         files = RunningFiles(store, [*columns, *unknowns.nuisance.names], scale)
         done = files.begin(resume)
+
+    def ran(record: Event | None) -> None:
+        if record is not None and files is not None:
+            files.add(record)
+        log_record(record)
+        tell(record)
+
     setup.law.increment(*np.zeros((3, 3)))  # processes that are forked find the kernels loaded
     with failure_page(None if out is None else Path(out), project.title):
-        with timed("all starts"):
-            records = _records(setup, files, done, tell)
+        with timed("all starts"), files or nullcontext():
+            records = every_start(setup, done, ran, tell)
         with one_blas_thread(), timed("the best fit once more, and how sure it is"):
             best = with_certainty(setup, problem, _best(problem, records, project))
     seconds, agreed = time.perf_counter() - begun, agreement(problem, best.records, project)
@@ -334,30 +342,6 @@ def _best(problem: FitProblem, records: Sequence[StartRecord], project: Project)
         raise NoFeasibleStart(f"{project.path}: no feasible start: {records[0].status}")
     problem_said = f"no start ended with a fit: {failed.failure}"
     raise SolverFailure(f"{problem_said}; --resume tries again", problem.solver.name)
-
-
-def _records(
-    setup: FitSetup,
-    files: RunningFiles | None,
-    done: Sequence[StartRecord],
-    progress: Callable[..., None],
-) -> list[StartRecord]:
-    """Return finished starts and run the others side by side."""
-
-    def ran(record: EvaluationRecord | StartRecord | None) -> None:
-        if record is not None and files is not None:
-            files.add(record)
-        log_record(record)
-        progress(record)
-
-    try:
-        records = every_start(setup, done, ran, progress)
-    finally:
-        if files is not None:
-            files.close()
-    if files is not None:
-        files.finish()
-    return records
 
 
 def stored_fit(

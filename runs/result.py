@@ -239,7 +239,8 @@ class Fit(Reported):
         if (sure := self.best.certainty) is None:
             problem = "the solver gives no derivatives, so that nothing is known to draw from"
             raise InputError(self.project.path, "draw_laws", problem)
-        return sure.laws(self.law, count, np.random.default_rng(seed))
+        known = sure.fine or sure.posterior
+        return known.laws(self.law, count, np.random.default_rng(seed))
 
     def history(self) -> Histories:
         """Return the analyses of the best fit by name of the comparison, on the mesh of the fit."""

@@ -186,6 +186,12 @@ class RunningFiles:
             said = record.start, record.analysis, record.solver, record.mesh, value, record.status
             _append(self._rows, _table([[*said, *numbers]]))
 
+    def __enter__(self) -> RunningFiles:
+        return self
+
+    def __exit__(self, failed: type[BaseException] | None, *_: object) -> None:
+        self.close() if failed else self.finish()
+
     def finish(self) -> None:
         """Close the files and sort history.csv; of a start that began again the last rows count."""
         self.close()

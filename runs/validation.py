@@ -205,7 +205,7 @@ def _relative(one: HeldOut | None) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of a test, by its number in a setup; masks : the points kept without the part."""
+    """A part of a test, by its number in a setup, named with it; masks : the points kept without."""
 
     test: int
     name: str
@@ -220,7 +220,7 @@ class Part:
 def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     """Return every part of a sort, test by test; raises InputError, naming the option: none."""
     parts = [
-        Part(number, name, masks)
+        Part(number, f"{test.test.name}: {name}", masks)
         for number, test in enumerate(setup.tests)
         if isinstance(test, Divisible)
         for name, masks in test.parts.get(sort, {}).items()
@@ -236,11 +236,6 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     return parts
 
 
-def name_of(setup: FitSetup, part: Part) -> str:
-    """Return the name of a part in tables and notes."""
-    return f"{setup.tests[part.test].test.name}: {part.name}"
-
-
 def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
     """Return the values of the nuisance unknowns of every comparison."""
     return {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
@@ -248,7 +243,7 @@ def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
 
 def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
-    name, test = name_of(setup, part), setup.tests[part.test]
+    name, test = part.name, setup.tests[part.test]
     units = {c: "" for c in part.masks}
     own, unknowns = fit_of(setup, part.masks, starts)
     if unknowns is None:
@@ -286,7 +281,7 @@ def errors_left_out(
     tell: Callable[[str | None], None],
 ) -> list[HeldOut]:  # fmt: skip
     """Return the errors at each part of the fit without it, read where the file has them."""
-    names = [name_of(setup, part) for part in parts]
+    names = [part.name for part in parts]
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
     record = StudyRecord(folder, file, "parts", LeftOut, "number", of)
     prepare = functools.partial(_task, setup, parts, starts)
@@ -352,8 +347,8 @@ def validate(
             whole, law = together.setup, together.card.law
             nuisance = nuisance_of(together.problem, together.best.point.unknowns)
             for part, one in zip(parts[form], alone, strict=True):
-                test, name = whole.tests[part.test], name_of(whole, part)
-                by_all = held_out(test, law, whole.make_solver, part.alone, nuisance, name)
+                given = whole.tests[part.test], law, whole.make_solver, part.alone, nuisance
+                by_all = held_out(*given, part.name)
                 judged.append(Judged(form, one, by_all))
             continue
         for k, test in enumerate(together.setup.tests):

@@ -203,7 +203,7 @@ def bubble(tmp_path_factory):
 
 def test_a_frame_is_foretold_by_the_others(bubble, monkeypatch):
     first, second = parts_of(bubble, "frames")
-    assert (first.name, second.name) == ("22 kPa", "59 kPa")
+    assert (first.name, second.name) == ("bubble: 22 kPa", "bubble: 59 kPa")
     found = fit_without(bubble, second, 1)
     measured = bubble.tests[0].fields[1].displacement
     off = measured - measured / 1.1
