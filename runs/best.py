@@ -177,9 +177,9 @@ def _signed(share: float) -> str:
 
 
 TAKEN_OUT_IS = (
-    "the error of the mesh is taken out of the moduli ({} at most): the card is the law of ever finer "
-    "meshes, to first order; objective, residuals and what is drawn of the tests are those of the "
-    "mesh of the fit"
+    "the error of the mesh is taken out of the moduli ({} at most): the card is the law of ever "
+    "finer meshes, to first order; objective, residuals and what is drawn of the tests are those of "
+    "the mesh of the fit"
 )
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
@@ -209,10 +209,9 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
     sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit, out)
     if sure.mesh is not None:
         notes += notes_of_mesh(sure)
-        if out and max(np.abs(off).max() for off in sure.mesh.values()) > LEAST:
-            by = ", ".join(
-                f"{n} {_signed(off[np.abs(off).argmax()])}" for n, off in sure.mesh.items()
-            )
+        most = {name: off[np.abs(off).argmax()] for name, off in sure.mesh.items()}
+        if out and max(map(abs, most.values())) > LEAST:
+            by = ", ".join(f"{name} {_signed(off)}" for name, off in most.items())
             notes.append(Note(TAKEN_OUT, TAKEN_OUT_IS.format(by)))
     if sure.order is not None:
         notes += sure.order.notes

@@ -205,7 +205,7 @@ def _relative(one: HeldOut | None) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of a test, by its number in a setup, named with it; masks : the points kept without."""
+    """A part of a test, named with it; test : its number. masks : the points kept without it."""
 
     test: int
     name: str
