@@ -178,8 +178,8 @@ def _signed(share: float) -> str:
 
 TAKEN_OUT_IS = (
     "the error of the mesh is taken out of the moduli ({} at most): the card is the law of ever "
-    "finer meshes, to first order; objective, residuals and what is drawn of the tests are those of "
-    "the mesh of the fit"
+    "finer meshes, to first order; objective, residuals and what is drawn of the tests are those "
+    "of the mesh of the fit"
 )
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
