@@ -60,7 +60,7 @@ def walk():
             record = run_start(problem, setup.options, project.fit.seed, 0, lambda _: None)
         with entered(steps, "assess the best"):
             best = best_fit(problem, [record], project.fit.tolerance)
-            fit = Fit(setup, problem, with_certainty(setup, problem, best), 0.0)
+            fit = Fit(setup, problem, with_certainty(setup, problem, best), 0.0, None)
             _ = fit.card, fit.findings
         with entered(steps, "write the report"):
             fit.report(Path(folder) / "out")

@@ -328,8 +328,7 @@ def write_fit(fit: Fit, folder: Path) -> Path:
     """Write the folder of a fit; return the page's path. Raises OutputError."""
     store = Store(folder)
     (folder / RESULT).unlink(missing_ok=True)
-    if fit.record is not None:
-        fit.record.write(folder)
+    fit.record.write(folder)
     write_card(fit.card, folder / CARD, fit.project.scales.modulus_unit)
     tables = {MODULI: fit.moduli(), COEFFICIENTS: fit.coefficients(), RESIDUALS: fit.residuals()}
     for name, table in tables.items():
@@ -348,13 +347,8 @@ def _page(fit: Fit, folder: Path) -> Report:
         )
         for t in fit.setup.tests
     }
-    record = [] if fit.record is None else record_tables(fit.record)
     standards = [table for exhibit in exhibits.values() for table in exhibit.standards]
-    files = [
-        *FILES,
-        *([] if fit.record is None else fit.record.files),
-        *(f for exhibit in exhibits.values() for f in exhibit.files),
-    ]
+    files = [*FILES, *fit.record.files, *(f for own in exhibits.values() for f in own.files)]
     card = (folder / CARD).read_text(encoding="utf-8")
     known = all(prepared.known is not None for prepared in fit.setup.tests)
     ranges = result.get("moduli_error_range", {})
@@ -392,7 +386,9 @@ def _page(fit: Fit, folder: Path) -> Report:
                 bounds_table(fit), *coefficients_table(fit),
             ]),
             *([Section("Reports by standards", standards)] if standards else []),
-            Section("The record", [*record, *(t for e in exhibits.values() for t in e.record)]),
+            Section("The record", [
+                *record_tables(fit.record), *(t for e in exhibits.values() for t in e.record),
+            ]),
             Section("How to cite", citation()),
         ],
         files=[f for f in files if f[0] == RESULT or (folder / f[0]).exists()],

@@ -45,8 +45,7 @@ RUNS_TABLE = "runs.csv"
 def write_predictions(predictions: Predictions, folder: Path) -> Path:
     """Write the folder of predictions; return the page's path. Raises OutputError."""
     (folder / RESULT).unlink(missing_ok=True)
-    if predictions.record is not None:
-        predictions.record.write(folder)
+    predictions.record.write(folder)
     several = len(predictions.outcomes) > 1
     exhibits = {
         kind: report_of(kind).show_outcome(outcome, Output(folder, f"{kind}/" if several else ""))
@@ -73,7 +72,6 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
         summary += f" Marked {str(kind)!r}: {marked[kind]}."
     if predictions.worst is not None:
         summary += f" Largest error against measured values: {percent(predictions.worst)}."
-    record = [] if predictions.record is None else record_tables(predictions.record)
     return Report(
         title=predictions.project.title,
         summary=summary,
@@ -95,14 +93,14 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
                 for part in replace(exhibit, facts=()).all_parts()
             ]),
             Section("What to know of the runs", _notes(predictions)),
-            Section("The record", record),
+            Section("The record", record_tables(predictions.record)),
             Section("How to cite", citation()),
         ],
         files=[
             (RUNS_TABLE, "the table of runs with all its columns"), (NOTES, NOTES_ARE),
             (RESULT, "all numbers of this page, for programs"),
             *(file for exhibit in exhibits.values() for file in exhibit.files),
-            *([] if predictions.record is None else predictions.record.files),
+            *predictions.record.files,
         ],
         versions=result["versions"],
     )  # fmt: skip

@@ -63,7 +63,7 @@ class Predictions(Reported):
     project: Project
     each: tuple[PredictedRun, ...]
     wall_s: float
-    record: Record | None = None
+    record: Record
 
     @cached_property
     def outcomes(self) -> Mapping[str, tuple[PredictedOutcome, tuple[int, ...]]]:
@@ -95,7 +95,7 @@ class Predictions(Reported):
             "runs": [self._numbers(i) for i in range(len(self.each))],
             "notes": note_rows(self.notes), "worst_relative_error": self.worst,
             "cached_runs": self.cached, "wall_s": self.wall_s, "versions": versions(),
-            **({} if self.record is None else {"provenance": PROVENANCE}),
+            "provenance": PROVENANCE,
         }  # fmt: skip
 
     @property

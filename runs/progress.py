@@ -70,10 +70,8 @@ class Count:
         elif kind == "Step":
             if one.done == 0:
                 self.begin("increments", one.increments)
-            self.done, self.words = (
-                one.done,
-                f"analysis {one.analysis} of {one.analyses}, {one.part}",
-            )
+            self.done = one.done
+            self.words = f"analysis {one.analysis} of {one.analyses}, {one.part}"
         elif kind == "RunEvent":
             self.done, self.total, self.already = one.done, one.total, self.already + one.again
             if one.run is not None:

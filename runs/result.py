@@ -69,7 +69,7 @@ class Fit(Reported):
     problem: FitProblem
     best: BestFit
     wall_s: float
-    record: Record | None = None
+    record: Record
     judgements: tuple[Judgement, ...] = ()
     agreement: str = ""
 
@@ -509,8 +509,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     }  # fmt: skip
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
-    if fit.record is not None:
-        result["provenance"] = PROVENANCE
+    result["provenance"] = PROVENANCE
     result["tests"] = {name: f.numbers for name, f in fit.findings.items()}
     if len(fit.findings) == 1:
         result |= next(iter(fit.findings.values())).numbers

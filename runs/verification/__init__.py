@@ -82,13 +82,8 @@ def shapes(rows: pd.DataFrame, elements: int, solver: Solver) -> pd.DataFrame:
     mesh = disk_mesh(100.0, elements, "quarter")
     steps = sorted({0.25 * pressures[0], 0.5 * pressures[0], *pressures})
     u = solver.run(BubbleModel(mesh, 0.81, pressures, steps), law).displacement
-    return pd.DataFrame(
-        {
-            "apex": u[:, mesh.node_sets["apex"][0], 2],
-            "du_x": u[..., 0].max(axis=1),
-            "du_y": u[..., 1].max(axis=1),
-        }
-    )
+    apex, (du_x, du_y, _) = u[:, mesh.node_sets["apex"][0], 2], u.max(axis=1).T
+    return pd.DataFrame({"apex": apex, "du_x": du_x, "du_y": du_y})
 
 
 TABLE_MARC_BUBBLE = PUBLISHED / "marc_bubble_profiles.csv"

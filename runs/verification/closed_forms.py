@@ -189,9 +189,8 @@ def sphere_strain(pressure: float) -> float:
     """Return the log strain of a sphere: p r/(2 t) = E/(1 - nu) log(r/R), constant thickness."""
 
     def excess(strain: float) -> float:
-        return E / (1 - NU) * strain - pressure * RADIUS_THIN_WALLS * np.exp(strain) / (
-            2 * THICKNESS_THIN_WALLS
-        )
+        load = pressure * RADIUS_THIN_WALLS * np.exp(strain)
+        return E / (1 - NU) * strain - load / (2 * THICKNESS_THIN_WALLS)
 
     return float(brentq(excess, 0.0, 0.9))
 
@@ -285,16 +284,11 @@ class PlaneEnds:
         sets = {**tube.node_sets, "end": self.end, "low": low}
         mesh = Mesh(tube.points, tube.quads, sets)
         supports = {"symmetry_x": (0,), "symmetry_z": (2,), "end": (2,), "low": (1,)}
-        model = InflatedModel(
-            mesh, THICKNESS_BENT_TUBE, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4
-        )
-        law = HypoelasticLaw.linear(
-            MODULUS_BENT_TUBE, MODULUS_BENT_TUBE, MODULUS_BENT_TUBE / 2.6, 0.3
-        )
+        t, e = THICKNESS_BENT_TUBE, MODULUS_BENT_TUBE
+        model = InflatedModel(mesh, t, tube_warp(mesh, LENGTH), [PRESSURE], supports, 4)
+        law = HypoelasticLaw.linear(e, e, e / 2.6, 0.3)
         self.membrane = closed_membrane(model, law, 1e-9, model.fixed(), Wall(share))
-        self.stretched = (
-            0.2 * PRESSURE * RADIUS_BENT_TUBE / (THICKNESS_BENT_TUBE * MODULUS_BENT_TUBE)
-        )
+        self.stretched = 0.2 * PRESSURE * RADIUS_BENT_TUBE / (t * e)
         start = np.zeros_like(self.points)
         start[self.end, 2] = LENGTH * self.stretched
         self.displacement = _found(self.membrane.equilibrium_from_slack(start, PRESSURE))

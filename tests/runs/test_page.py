@@ -421,7 +421,7 @@ def test_the_noise_that_is_given_makes_the_uncertainty(bubble, tmp_path):
         problem = prepare_fit(project, [*project.tests.values()]).problem()
         point = problem.evaluate(fit.best.point.unknowns, True, warm=False)
         sure = certainty(problem, point, fit.law, fit.best.valid)
-        assert sure.noise == {"bubble": noise}
+        assert sure.noise.level == {"bubble": noise}
         assert problem.comparisons[0].objective.noise_is == "given"
         sigmas.append(sure.sigma["E1"])
     np.testing.assert_allclose(sigmas[1], 10 * sigmas[0], rtol=1e-6)

@@ -124,7 +124,7 @@ def predictions(folder, soft, measured):
         replace(run, record=replace(run.record, seconds=2.0 + i)) for i, run in enumerate(done.each)
     ]
     each[1] = replace(each[1], notes=("made up", Note(SNAP, "also")))
-    return Predictions(done.project, tuple(each), 30.0)
+    return Predictions(done.project, tuple(each), 30.0, done.record)
 
 
 def test_failures_errors_and_notes(tmp_path, seen):
