@@ -367,9 +367,9 @@ def test_certainty_predicts_the_scatter_of_noisy_strip_fits():
     point = fit.evaluate(truth, True)
     predicted = certainty(fit, point, CONSTANT, np.array([0.1, 0.1, 0.1]))
     # Ten loads a strip say their noise to 22 %; the scatter is that of the noise as it is said.
-    assert set(predicted.noise) == set(STRIPS)
-    assert np.mean(list(predicted.noise.values())) == pytest.approx(noise, rel=0.25)
-    scatter = scatter_of(fit, point, predicted.noise)
+    assert set(predicted.noise.level) == set(STRIPS)
+    assert np.mean(list(predicted.noise.level.values())) == pytest.approx(noise, rel=0.25)
+    scatter = scatter_of(fit, point, predicted.noise.level)
     sigma = [predicted.sigma[name][0] for name in ("G12", "E2", "E1")]
     assert sigma == pytest.approx(CONSTANTS.to_coefficients @ scatter / moduli, rel=0.03)
     best, _ = descend(fit, point, 1e-7, 10**6, norms=True)
