@@ -347,8 +347,8 @@ def validate(
             whole, law = together.setup, together.card.law
             nuisance = nuisance_of(together.problem, together.best.point.unknowns)
             for part, one in zip(parts[form], alone, strict=True):
-                given = whole.tests[part.test], law, whole.make_solver, part.alone, nuisance
-                by_all = held_out(*given, part.name)
+                test = whole.tests[part.test]
+                by_all = held_out(test, law, whole.make_solver, part.alone, nuisance, part.name)
                 judged.append(Judged(form, one, by_all))
             continue
         for k, test in enumerate(together.setup.tests):
