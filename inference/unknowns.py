@@ -23,7 +23,7 @@ from .comparison import Comparison, NuisanceOf
 
 @dataclass(frozen=True, eq=False)
 class LawBounds:
-    """Bounds of a law's numbers; made by `of_moduli` or `of_entries`.
+    """Bounds of a law's numbers.
     least, largest : MPa, by modulus, anywhere on the strain range; largest is None where the
     coefficients are bounded. lower, upper : (free,) MPa, of the free coefficients; None where the
     moduli are bounded."""
@@ -38,13 +38,6 @@ class LawBounds:
         """Return bounds (least, largest) of every modulus, MPa; starts draw modulus values."""
         return cls({name: float(low) for name, (low, _) in ranges.items()},
                    {name: float(high) for name, (_, high) in ranges.items()})  # fmt: skip
-
-    @classmethod
-    def of_entries(
-        cls, lower: ArrayLike, upper: ArrayLike, margins: Mapping[str, float]
-    ) -> LawBounds:
-        """Return bounds (free,) MPa of coefficients, and the least of each modulus (`margins`)."""
-        return cls(dict(margins), None, np.array(lower, dtype=float), np.array(upper, dtype=float))
 
     def beside(self, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
         """Return the bounds with those of a form's own constants."""

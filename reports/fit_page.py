@@ -343,7 +343,10 @@ def _page(fit: Fit, folder: Path) -> Report:
     result = fit.result
     exhibits = {
         t.test.name: getattr(report_of(t.test.kind), "show", _plain)(
-            t, fit.tests[t.test.name], fit.findings[t.test.name], fit.output(folder, t.test.name)
+            t,
+            fit.tests[t.test.name],
+            fit.findings[t.test.name],
+            Output.of(folder, t.test.name, len(fit.setup.tests) > 1),
         )
         for t in fit.setup.tests
     }

@@ -201,9 +201,8 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         notes.append(Note(UNKNOWN, words))
     if limit is None and out and "mesh_error" in settings.model_fields_set:
         notes.append(Note(UNKNOWN, NOT_TAKEN_OUT))
-    if limit is not None and (np.abs(limit.step) <= NOTHING * np.abs(slopes.unknowns)).all():
-        out = False
-    out = out and limit is not None
+    moves = limit is not None and np.abs(limit.step) > NOTHING * np.abs(slopes.unknowns)
+    out = out and bool(np.any(moves))
     if limit is not None and out:
         law = problem.unknowns.law(law, slopes.unknowns + limit.step)
     sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit, out)

@@ -41,7 +41,6 @@ from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
 
-R = TypeVar("R")
 #: Digits of a checksum that are shown.
 DIGITS = 12
 #: Differences of lists that are listed one by one; length of texts.
@@ -273,27 +272,10 @@ PRESENTERS = {
 }  # fmt: skip
 
 
-def write_report(result: Any, folder: Path | str) -> Path:
-    """Write all files of a result, report.html among them, and return the page's path.
-    Presenters look at results from above, so that no result imports them. Raises OutputError."""
-    module, function = PRESENTERS.get(type(result).__name__, ("study_pages", "write_study"))
-    page: Path = getattr(import_module(f"bubblefit.reports.{module}"), function)(
-        result, Path(folder)
-    )
-    return page
-
-
 def draw(module: str, charts: str, *given: Any) -> Any:
     """Return the drawing of the charts that a function of a module of `reports` declares."""
     declared = getattr(import_module(f"bubblefit.reports.{module}"), charts)(*given)
     return import_module("bubblefit.reports.vega").Drawing(declared)
-
-
-def finished(result: R, out: Path | str | None) -> R:
-    """Return a result, written into its folder if there is one; raises OutputError."""
-    if out is not None:
-        write_report(result, out)
-    return result
 
 
 def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
@@ -304,24 +286,35 @@ def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
 
 
 class Reported:
-    """A result whose presenter writes a page."""
+    """A result whose presenter writes a page: presenters look from above, no result imports one."""
 
     def report(self, folder: Path | str) -> Path:
         """Write all files of the result into a folder; return the path of report.html."""
-        return write_report(self, folder)
+        module, name = PRESENTERS.get(type(self).__name__, ("study_pages", "write_study"))
+        write = getattr(import_module(f"bubblefit.reports.{module}"), name)
+        page: Path = write(self, Path(folder))
+        return page
 
 
-class Presented:
-    """A result that its presenter writes, with `notes`; `result` is the content of result.json,
-    `table` that of the CSV, `lines` what a terminal shows."""
+class Presented(Reported):
+    """A study, with `notes`; `result` is the content of result.json, `table` that of the CSV,
+    `lines` what a terminal shows."""
 
-    def write(self, folder: Path | str) -> None:
-        """Write all files and the page into a folder; raises OutputError."""
-        write_report(self, folder)
+    write = Reported.report
 
     def plot(self) -> Any:
         """Return a drawing of the study for a notebook, as `Fit.plot_moduli`."""
         return draw("study_pages", "figure", self)
+
+
+R = TypeVar("R", bound=Reported)
+
+
+def finished(result: R, out: Path | str | None) -> R:
+    """Return a result, written into its folder if there is one; raises OutputError."""
+    if out is not None:
+        result.report(out)
+    return result
 
 
 @contextmanager

@@ -17,7 +17,6 @@ from ..experiments.kinds import (
     Findings,
     FittedTest,
     Judgement,
-    Output,
     by_strain,
     notes_beyond,
     notes_of_states,
@@ -343,10 +342,6 @@ class Fit(Reported):
         own = [r for r in self.best.ranked[1:] if r.same_as is None]
         others = [np.array(r.unknowns) for r in own[: BEST - 1]]
         return [self.law, *(unknowns.law(self.law, y) for y in others)]
-
-    def output(self, folder: Path, test: str) -> Output:
-        """Return where a test writes: files carry its name if there are several tests."""
-        return Output.of(folder, test, len(self.setup.tests) > 1)
 
 
 #: Logarithmic strains of `answers`, beside the end of the valid ones.

@@ -6,6 +6,7 @@ import functools
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -174,7 +175,7 @@ def bounds_of(project: Project, form: Form) -> LawBounds:
             raise InputError(path, f"law.bounds.lower[{i}]", problem)
     e, g = (margin.E * unit, margin.G12 * unit) if margin else (MARGIN_E, MARGIN_G)
     margins = {"E1": e, "E2": e, "G12": g}
-    return LawBounds.of_entries(np.array(lower) * unit, np.array(upper) * unit, margins)
+    return LawBounds(margins, None, np.array(lower) * unit, np.array(upper) * unit)
 
 
 def _ordered(project: Project, key: str, pair: Sequence[float], unit: float) -> tuple[float, float]:
@@ -478,24 +479,18 @@ COARSER = 0.5
 
 def coarse_problem(setup: FitSetup) -> FitProblem | None:
     """Return the fit on coarse meshes, run by the solver that leads; None if no test has any."""
-    make = setup.make_leading
-    coarse = {
-        test.test.name: _coarse(test, make, weighting)
-        for test, weighting in zip(setup.tests, setup.weightings, strict=True)
-    }
-    if not any(coarse.values()):
-        return None
-    own = setup.each(lambda test, w: coarse[test.test.name] or test.comparisons(make, w))
-    return setup.problem_of(own)
+    make, coarse = setup.make_leading, []
 
+    def comparisons(test: PreparedTest, weighting: Weighting) -> Sequence[Comparison]:
+        if isinstance(test, Refinable):
+            with suppress(InputError):  # the mesh is as coarse as it can be
+                if own := test.finer(make, weighting, COARSER):
+                    coarse.append(test)
+                    return own
+        return test.comparisons(make, weighting)
 
-def _coarse(test: PreparedTest, make: Any, weighting: Weighting) -> tuple[Comparison, ...]:
-    if not isinstance(test, Refinable):
-        return ()
-    try:
-        return test.finer(make, weighting, COARSER)
-    except InputError:
-        return ()  # the mesh is as coarse as it can be
+    every = setup.each(comparisons)
+    return setup.problem_of(every) if coarse else None
 
 
 def coarse_to_fine(setup: FitSetup, records: Sequence[StartRecord]) -> dict[str, Any] | None:

@@ -32,14 +32,14 @@ MODEL = BubbleModel(
     disk_mesh(100.0, 192, "quarter"), 0.81, PRESSURES, default_increments(PRESSURES)
 )
 MARGINS = {"E1": 5.0, "E2": 5.0, "G12": 0.5}
-ENTRIES = LawBounds.of_entries(1e3 * np.array(LOWER), 1e3 * np.array(UPPER), MARGINS)
+ENTRIES = LawBounds(MARGINS, None, 1e3 * np.array(LOWER), 1e3 * np.array(UPPER))
 CUBIC = Unknowns.of(forms.CUBIC, 0.24, RANGE, ENTRIES)
 NUISANCE = (
     *(Nuisance(name, -20.0, 20.0, "mm") for name in OFFSETS),
     Nuisance("pressure_offset", -0.9e3 * PRESSURES[0], 50.0, "kPa", "pressure_offset", 1e-3),
 )
 EVERYTHING = replace(CUBIC, nuisance=NuisanceOf({"bubble": NUISANCE}))
-CONSTANT_BOUNDS = LawBounds.of_entries([1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0], MARGINS)
+CONSTANT_BOUNDS = LawBounds(MARGINS, None, *np.array([[1.0, 50.0, 50.0], [100.0, 1000.0, 1500.0]]))
 CONSTANT = Unknowns.of(forms.CONSTANT, 0.24, RANGE, CONSTANT_BOUNDS)
 #: Moduli near those of a fit of constants to the fields of the cubics, MPa: G12, E2, E1.
 NEAR = np.array([15.0, 190.0, 330.0])

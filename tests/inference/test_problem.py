@@ -58,7 +58,7 @@ def test_watch_hears_of_every_analysis():
 def test_unknowns_are_moduli_at_chebyshev_points(degree):
     places = np.array([4 * b + k for b in range(3) for k in range(3 - degree, 4)])
     lower, upper = 1e3 * np.array(LOWER)[places], 1e3 * np.array(UPPER)[places]
-    bounds = LawBounds.of_entries(lower, upper, MARGINS)
+    bounds = LawBounds(MARGINS, None, np.array(lower), np.array(upper))
     p = Unknowns.of(forms.Polynomial(degree), 0.24, RANGE, bounds)
     assert p.free == tuple(places) and p.size == p.count == len(places)
     coefficients = LAW.beta[places]
@@ -183,7 +183,7 @@ def test_feasible_starts_are_feasible_and_reproducible():
 def test_bounds_without_positive_moduli_give_no_start():
     lower, upper = (end.copy() for end in CUBIC.box)
     lower[7], upper[7] = 0.1, 1.0  # E2 at zero strain below the margin of 5 MPa
-    bounds = LawBounds.of_entries(lower, upper, MARGINS)
+    bounds = LawBounds(MARGINS, None, np.array(lower), np.array(upper))
     raised(NoFeasibleStart, "bounds", feasible_start, problem(replace(CUBIC, bounds=bounds)), 1, 0)
 
 

@@ -404,12 +404,12 @@ def test_expected_moduli_of_bounds():
     assert expected(LawBounds.of_moduli(ranges)) == ranges
     free = list(LAW.form.free)
     lower, upper = 0.5 * LAW.beta[free], 2.0 * LAW.beta[free]
-    found = expected(LawBounds.of_entries(lower, upper, LEAST))
-    soft = expected(LawBounds.of_entries(-upper, lower, LEAST))
+    found = expected(LawBounds(LEAST, None, lower, upper))
+    soft = expected(LawBounds(LEAST, None, -upper, lower))
     for name, value in (("E1", 600.0), ("E2", 120.0), ("G12", 15.0)):
         np.testing.assert_allclose(found[name], (0.5 * value, 2.0 * value))
         np.testing.assert_allclose(soft[name], (LEAST[name], 0.5 * value))
-    none = expected(LawBounds.of_entries(-upper, -lower, LEAST))
+    none = expected(LawBounds(LEAST, None, -upper, -lower))
     assert none == {name: (least, least) for name, least in LEAST.items()}
 
 

@@ -42,7 +42,7 @@ from ..counted_program import CountedSolver, seen
 MODEL = BubbleModel(disk_mesh(100.0, 96, "quarter"), 0.81, [0.05, 0.15, 0.3])
 KNOWN = HypoelasticLaw.linear(400.0, 250.0, 12.0)
 LOWER, UPPER = np.array([1.0, 50.0, 50.0]), np.array([100.0, 1000.0, 1500.0])
-BOUNDS = LawBounds.of_entries(LOWER, UPPER, {"E1": 5.0, "E2": 5.0, "G12": 0.5})
+BOUNDS = LawBounds({"E1": 5.0, "E2": 5.0, "G12": 0.5}, None, np.array(LOWER), np.array(UPPER))
 
 
 @cache
