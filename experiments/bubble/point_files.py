@@ -159,11 +159,10 @@ def recorded_frames(
         unit = section.unit or place.scales.pressure_unit
         own = [number_in_name(f, PRESSURE_UNITS, pattern, unit, "from_name") for f in files]
         pressures, source = np.array(own), "the files' names"
-    limit = None if section.tolerance is None else section.tolerance * place.scales.pressure
     several, inflations = has_several(pressures), None
     timed = several or inflation != 1 or clock is not None or source == LISTED
     try:
-        how = section.frames, limit, inflation if timed else None
+        how = section.frames, section.tolerance, inflation if timed else None
         chosen, left_out = pressure_log.choose_frames(pressures, asked, *how)
     except InputError as error:
         of_test = error.field.startswith(("pressures", "inflation"))

@@ -46,7 +46,7 @@ from .objective import OFFSETS, amounts_of
 from .point_files import PointFiles, RecordedFrames
 from .prepared import PreparedBubble
 from .registration import Registration
-from .section import DIRECTIONS, Sheet
+from .section import DIRECTIONS, CorrelationSection, Sheet
 from .sheet import at_nodes, states
 from .test import PART, BubbleTest, apex_heights
 
@@ -62,18 +62,8 @@ GUIDE = (
     "Society asks for. What is not given stands in no file that was read: give it in "
     "[bubble.data.points.correlation] before the report leaves the laboratory."
 )
-#: Names on the page of the section's keys for hardware and analysis, which exports of image
-#: correlation do not hold.
-ASKED = {
-    "camera": "camera", "resolution": "image resolution", "lens": "lens and aperture",
-    "field_of_view": "field of view", "scale": "image scale",
-    "stereo": "stereo angle and stand-off", "exposure": "exposure and frame rate",
-    "pattern": "patterning technique", "pattern_size": "pattern feature size",
-    "subset": "subset size", "step": "step size",
-    "strain_window": "strain window and virtual gauge length",
-    "matching": "shape function, matching criterion, interpolant",
-    "prefilter": "prefilter and data filter",
-}  # fmt: skip
+#: Names on the page of the section's keys for hardware and analysis.
+ASKED = {key: own.title for key, own in CorrelationSection.model_fields.items() if own.title}
 #: Columns of inflations.csv, and how the page calls them.
 INFLATIONS = {
     "inflation": "inflation", "pressure_kPa": "pressure, kPa", "first_mm": "apex in the first, mm",

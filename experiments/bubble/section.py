@@ -23,23 +23,24 @@ Words = Annotated[
 
 
 class CorrelationSection(sections.Section):
-    """Words with their units, as they are to stand in a report; no result depends on them."""
+    """Words with their units, as they are to stand in a report; no result depends on them.
+    Titles are of those that exports of image correlation do not hold, as the page calls them."""
 
     software: Words | None = None
-    camera: Words | None = None
-    resolution: Words | None = None
-    lens: Words | None = None
-    field_of_view: Words | None = None
-    scale: Words | None = None
-    stereo: Words | None = None
-    exposure: Words | None = None
-    pattern: Words | None = None
-    pattern_size: Words | None = None
-    subset: Words | None = None
-    step: Words | None = None
-    strain_window: Words | None = None
-    matching: Words | None = None
-    prefilter: Words | None = None
+    camera: Words | None = Field(None, title="camera")
+    resolution: Words | None = Field(None, title="image resolution")
+    lens: Words | None = Field(None, title="lens and aperture")
+    field_of_view: Words | None = Field(None, title="field of view")
+    scale: Words | None = Field(None, title="image scale")
+    stereo: Words | None = Field(None, title="stereo angle and stand-off")
+    exposure: Words | None = Field(None, title="exposure and frame rate")
+    pattern: Words | None = Field(None, title="patterning technique")
+    pattern_size: Words | None = Field(None, title="pattern feature size")
+    subset: Words | None = Field(None, title="subset size")
+    step: Words | None = Field(None, title="step size")
+    strain_window: Words | None = Field(None, title="strain window and virtual gauge length")
+    matching: Words | None = Field(None, title="shape function, matching criterion, interpolant")
+    prefilter: Words | None = Field(None, title="prefilter and data filter")
 
 
 class FilterSection(sections.Section):
@@ -52,19 +53,18 @@ class FilterSection(sections.Section):
 
 
 def facet_of(section: BubbleSection, place: Place) -> Facet | None:
-    """Return the facet in mm, None without one; raises InputError."""
+    """Return the facet, None without one; raises InputError."""
     given = None if section.data.points is None else section.data.points.filter
     if given is None:
         return None
-    at, scale = "data.points.filter", place.scales.length
+    at = "data.points.filter"
     if section.symmetry == "quarter":
         problem = 'a facet reaches over the edge of a quarter; expected symmetry = "full"'
         raise place.error(at, problem)
     if section.match.by != "points":
         raise place.error(at, "surfaces are matched, not points: leave this out")
-    step = None if given.step is None else given.step * scale
     with place.naming(at):
-        return Facet(given.facet * scale, given.order, given.smoothing, step)
+        return Facet(given.facet, given.order, given.smoothing, given.step)
 
 
 class EllipseSection(sections.Section):
@@ -78,15 +78,15 @@ class EllipseSection(sections.Section):
 def outline_of(section: BubbleSection, place: Place, clamp: float | None) -> Outline:
     """Return the edge in mm; raises InputError for a bad ellipse, or one beside a radius.
     clamp : mm, its radius where the section asks for it."""
-    length, ellipse = place.scales.length, section.ellipse
+    ellipse = section.ellipse
     if section.radius is not None and ellipse is not None:
         raise place.error("radius", "expected a radius or [bubble.ellipse], not both")
     if section.radius is not None:
-        known = clamp if section.radius == "clamp" else section.radius * length
+        known = clamp if section.radius == "clamp" else section.radius
         assert known is not None
         outline = Outline.circle(known)
     elif ellipse is not None:
-        outline = Outline(ellipse.major * length, ellipse.minor * length, ellipse.angle)
+        outline = Outline(ellipse.major, ellipse.minor, ellipse.angle)
     else:
         problem = "this key is missing; give the radius of the disk, or [bubble.ellipse]"
         raise place.error("radius", problem)
@@ -236,11 +236,9 @@ LEFT_OPEN = {"turn": 10.0, "tilt": 3.0, "shift": 3.0}
 def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float]:
     """Return one standard deviation of each unknown of the registration (degrees, mm).
     Raises InputError where such an unknown needs more of the test than there is."""
-    nuisance, length = section.nuisance, place.scales.length
-    usual = LEFT_OPEN if nuisance.registration == "fitted" else {}
-    given = {name: getattr(nuisance, name) for name in LEFT_OPEN}
-    scale = {"turn": 1.0, "tilt": 1.0, "shift": length}
-    said = {name: scale[name] * own for name, own in given.items() if own is not None}
+    usual = LEFT_OPEN if section.nuisance.registration == "fitted" else {}
+    given = {name: getattr(section.nuisance, name) for name in LEFT_OPEN}
+    said = {name: own for name, own in given.items() if own is not None}
     found = {**usual, **said}
     if found and section.symmetry == "quarter":
         key = next(iter(said), "registration")
@@ -249,16 +247,17 @@ def fitted_registration(section: BubbleSection, place: Place) -> dict[str, float
 
 
 def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> Sheet:
-    """Return the sheet in mm; pressures in MPa; raises InputError for keys at odds."""
+    """Return the sheet; pressures in MPa; raises InputError for keys at odds."""
     section, offset = of.sheet, of.nuisance.displacement_offset
     for key in ("surface", "rim"):
         if of.data.points is None and getattr(section, key) == "measured":
             raise place.error(f"sheet.{key}", "nothing is measured here: no files are read")
     given, since = section.model_fields_set, None
     if section.from_pressure is not None:
-        near = np.isclose(pressures, section.from_pressure * place.scales.pressure, rtol=1e-6)
+        near = np.isclose(pressures, section.from_pressure, rtol=1e-6)
         if not near.any() or len(pressures) < 2:
-            problem = f"expected one of several 'pressures', got {section.from_pressure:g}"
+            asked = section.from_pressure / place.scales.pressure
+            problem = f"expected one of several 'pressures', got {asked:g}"
             raise place.error("sheet.from_pressure", problem)
         since = int(np.argmax(near))
     quarter, measured = of.symmetry == "quarter", section.surface == "measured"
@@ -283,12 +282,9 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
     ):
         if wrong:
             raise place.error(key, problem)
-    scale = place.scales.length
     return Sheet(
-        measured=measured, degree=section.degree, modes=section.modes,
-        prior=3.0 if section.prior is None else section.prior * scale, slack=section.slack,
-        slack_prior=section.slack_prior,
-        misfit=0.5 if section.misfit is None else section.misfit * scale,
+        measured=measured, degree=section.degree, modes=section.modes, prior=section.prior or 3.0,
+        slack=section.slack, slack_prior=section.slack_prior, misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
     )  # fmt: skip

@@ -14,6 +14,7 @@ from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, Which, pace_of
+from ...readers.sections import whole_in_base_units
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, SectionTest, Studied, divided
 from .point_files import PointFiles, measured_files
@@ -32,12 +33,12 @@ from .section import (
 def merge_increments(
     place: Place, field: str, extra: Sequence[float], pressures: Sequence[float]
 ) -> tuple[float, ...]:
-    """Return load steps (MPa): the pressures (MPa) and the extra ones (in the file's unit) between.
+    """Return load steps (MPa): the pressures and the extra ones between.
     Raises InputError for an extra one, of key `field`, beyond the last pressure."""
     steps = list(pressures)
-    for i, step in enumerate(extra):
-        value = step * place.scales.pressure
+    for i, value in enumerate(extra):
         if value > pressures[-1] * (1 + 1e-9):
+            step = value / place.scales.pressure
             problem = f"expected a step up to the last pressure, got {step:g} beyond it"
             raise place.error(f"{field}[{i}]", problem)
         # 22 kPa written twice must not become two steps one rounding error apart.
@@ -70,7 +71,7 @@ def known_solution(
         at = "data.known_solution.increments"
         steps = merge_increments(place, at, known.increments, pressures)
     return KnownSolution(
-        beta=np.array(known.beta) * place.scales.modulus, form=known.form,
+        beta=np.array(known.beta), form=known.form,
         elements=known.elements or section.elements, increments=steps,
         symmetry=known.symmetry or section.symmetry, solver=known.solver,
     )  # fmt: skip
@@ -180,14 +181,14 @@ class BubbleTest(SectionTest):
 
 def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     """Return the test of a section; raises InputError naming the file and the dotted key."""
-    length, scale, given = place.scales.length, place.scales.pressure, section.pressures
     points = section.data.points
     may_fall = points is not None and points.pressure is None
-    for i, (before, after) in enumerate(pairwise(given or ()), start=1):
+    for i, (before, after) in enumerate(pairwise(section.pressures or ()), start=1):
         if after == before or (after < before and (i == 1 or not may_fall)):
             problem = f"pressures must increase, got {after:g} after {before:g}"
             raise place.error(f"pressures[{i}]", problem)
-    asked = None if given is None else tuple(p * scale for p in given)
+    section = whole_in_base_units(section, place.scales)
+    asked = None if section.pressures is None else tuple(section.pressures)
     measured = measured_files(section, place, asked)
     recorded = None if measured is None else measured.recorded
     pressures = asked if recorded is None else tuple(recorded.pressure.tolist())
@@ -213,13 +214,12 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
             clamp, _ = clamp_radius(fields, measured.registration)
     outline = outline_of(section, place, clamp)
     source = measured or known_solution(section, place, pressures, increments)
-    same = ("weight", "elements", "symmetry", "generator", "objective", "inflation")
+    same = ("weight", "elements", "symmetry", "generator", "objective", "noise", "inflation")
     return BubbleTest(
         name=name, place=place, outline=outline, pressures=pressures, increments=increments,
         data=source, match_by=section.match.by, match_degree=section.match.degree,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
-        noise=None if section.noise is None else section.noise * length,
         facet=facet_of(section, place), sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
         **{key: getattr(section, key) for key in same},

@@ -274,7 +274,6 @@ def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[Point, Point]:
 
 
 CURVE = ("deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3", "wrinkled_share")
-MEASURED = ("test", "deflection_mm", "mean_N", "standard_deviation_N", "repetitions")
 
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
@@ -283,8 +282,9 @@ def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     for test in tests:
         if test.measured:
             s = scatter(test.measured)
-            values = ([test.name] * len(s.mean), s.deflection, s.mean, s.deviation, s.count)
-            parts.append(pd.DataFrame(dict(zip(MEASURED, values, strict=True))))
+            columns = {"test": test.name, "deflection_mm": s.deflection, "mean_N": s.mean}
+            columns |= {"standard_deviation_N": s.deviation, "repetitions": s.count}
+            parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -24,6 +24,7 @@ from bubblefit.experiments.kinds import Fabric, Place, Scales
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.project.project import Project, read_project
 from bubblefit.readers.fields import DisplacementField
+from bubblefit.readers.sections import whole_in_base_units
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.membrane.solver import MembraneSolver
@@ -143,21 +144,21 @@ PLACE = Place(Path("p.toml"), "bubble[0]", Fabric("a fabric", 0.8))
 METRES = replace(PLACE, scales=Scales(pressure=0.1, length=1000.0))
 
 
-def edge(radius: float | None = None, symmetry: str = "full", place: Place = PLACE, **ellipse):
+def edge(radius: float | None = None, symmetry: str = "full", **ellipse):
     own = SimpleNamespace(**({"angle": 0.0} | ellipse)) if ellipse else None
     section: Any = SimpleNamespace(radius=radius, ellipse=own, symmetry=symmetry)
-    return outline_of(section, place, lambda: 98.9)
+    return outline_of(section, PLACE, 98.9)
 
 
 @pytest.mark.parametrize(
     ("said", "found"),
     [
-        ({"radius": 0.1, "place": METRES}, Outline.circle(100.0)), ({}, "radius"),
+        ({"radius": 100.0}, Outline.circle(100.0)), ({}, "radius"),
         ({"radius": 0.81}, Outline.circle(0.81)), ({"radius": 0.8}, "radius"),
         ({"radius": 1.0, "major": 2.0}, "radius"), ({"major": 2.0, "minor": 0.8}, "ellipse.minor"),
         ({"major": 80.0, "minor": 80.0}, Outline(80.0, 80.0)),
         ({"major": 2.0, "minor": 2.1}, "ellipse.minor"),
-        ({"major": 0.2, "minor": 0.1, "angle": 90.0, "symmetry": "quarter", "place": METRES},
+        ({"major": 200.0, "minor": 100.0, "angle": 90.0, "symmetry": "quarter"},
          Outline(200.0, 100.0, 90.0)),
         ({"major": 400.0, "minor": 100.0}, Outline(400.0, 100.0)),
         ({"major": 401.0, "minor": 100.0}, "ellipse.minor"),
@@ -171,12 +172,12 @@ def test_edges_at_their_limits(said, found):
         assert edge(**said) == found
 
 
-def test_load_steps_are_in_the_unit_of_the_file():
-    steps = merge_increments(PLACE, "increments", [30.0, 10.0, 22.0 * (1 + 1e-10)], (0.022, 0.03))
+def test_load_steps_beyond_the_last_are_named_in_the_unit_of_the_file():
+    more = [0.030, 0.010, 0.022 * (1 + 1e-10)]
+    steps = merge_increments(PLACE, "increments", more, (0.022, 0.03))
     assert steps == pytest.approx((0.010, 0.022, 0.03)) and len(steps) == 3
-    assert len(merge_increments(PLACE, "i", [22.0 * (1 + 1e-8)], (0.022, 0.03))) == 3
-    assert merge_increments(METRES, "i", [0.1], (0.022,)) == pytest.approx((0.01, 0.022))
-    said = complaint(merge_increments, PLACE, "increments", [10.0, 30.001], (0.03,))
+    assert len(merge_increments(PLACE, "i", [0.022 * (1 + 1e-8)], (0.022, 0.03))) == 3
+    said = complaint(merge_increments, PLACE, "increments", [0.01, 0.030001], (0.03,))
     assert said.startswith("p.toml: bubble[0].increments[1]: ") and "30.001" in said
 
 
@@ -184,7 +185,7 @@ def sheet(place: Place = PLACE, **said: Any) -> Sheet:
     how = {"pressures": (0.02, 0.2), "symmetry": "full", "of_files": True, "offset": False}
     how |= {key: said.pop(key) for key in [*how] if key in said}
     section: Any = SimpleNamespace(
-        sheet=SheetSection(**said), symmetry=how["symmetry"],
+        sheet=whole_in_base_units(SheetSection(**said), place.scales), symmetry=how["symmetry"],
         nuisance=SimpleNamespace(displacement_offset=how["offset"]),
         data=SimpleNamespace(points="points" if how["of_files"] else None),
     )  # fmt: skip
