@@ -27,20 +27,24 @@ class CorrelationSection(sections.Section):
     Titles are of those that exports of image correlation do not hold, as the page calls them."""
 
     software: Words | None = None
-    camera: Words | None = Field(None, title="camera")
-    resolution: Words | None = Field(None, title="image resolution")
-    lens: Words | None = Field(None, title="lens and aperture")
-    field_of_view: Words | None = Field(None, title="field of view")
-    scale: Words | None = Field(None, title="image scale")
-    stereo: Words | None = Field(None, title="stereo angle and stand-off")
-    exposure: Words | None = Field(None, title="exposure and frame rate")
-    pattern: Words | None = Field(None, title="patterning technique")
-    pattern_size: Words | None = Field(None, title="pattern feature size")
-    subset: Words | None = Field(None, title="subset size")
-    step: Words | None = Field(None, title="step size")
-    strain_window: Words | None = Field(None, title="strain window and virtual gauge length")
-    matching: Words | None = Field(None, title="shape function, matching criterion, interpolant")
-    prefilter: Words | None = Field(None, title="prefilter and data filter")
+    camera: Words | None = Field(default=None, title="camera")
+    resolution: Words | None = Field(default=None, title="image resolution")
+    lens: Words | None = Field(default=None, title="lens and aperture")
+    field_of_view: Words | None = Field(default=None, title="field of view")
+    scale: Words | None = Field(default=None, title="image scale")
+    stereo: Words | None = Field(default=None, title="stereo angle and stand-off")
+    exposure: Words | None = Field(default=None, title="exposure and frame rate")
+    pattern: Words | None = Field(default=None, title="patterning technique")
+    pattern_size: Words | None = Field(default=None, title="pattern feature size")
+    subset: Words | None = Field(default=None, title="subset size")
+    step: Words | None = Field(default=None, title="step size")
+    strain_window: Words | None = Field(
+        default=None, title="strain window and virtual gauge length"
+    )
+    matching: Words | None = Field(
+        default=None, title="shape function, matching criterion, interpolant"
+    )
+    prefilter: Words | None = Field(default=None, title="prefilter and data filter")
 
 
 class FilterSection(sections.Section):
