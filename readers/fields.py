@@ -14,6 +14,7 @@ from .frames import LOST, Array, Frame, FrameOptions, FrameSource, read_frames
 #: What a file must hold: reference place and displacement; the names in the file may differ. The
 #: height z of the reference state is read where it is there.
 QUANTITIES = ("x", "y", "dx", "dy", "dz")
+PLAIN = FrameOptions(QUANTITIES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +43,14 @@ class DisplacementField:
 def read_fields(
     files: Sequence[Path | str],
     pressures: Sequence[float],
-    columns: Mapping[str, str] | None = None,
-    flag_column: str | None = None,
-    comment: str = "#",
-    length_scale: float = 1.0,
+    options: FrameOptions = PLAIN,
     format: str | None = None,
-    options: FrameOptions | None = None,
     frames: Sequence[int] | None = None,
 ) -> tuple[DisplacementField, ...]:
     """Read a frame a pressure (MPa), without a first unmoved one too many in one file."""
     if len(files) > len(pressures) and frames is None:
         problem = f"expected one file a pressure, got {len(files)} for {len(pressures)} pressures"
         raise InputError(None, "files", problem)
-    if options is None:
-        options = FrameOptions(QUANTITIES, columns, flag_column, comment, length_scale)
     read = read_frames(files, options, format)
     if frames is not None:
         read = tuple(read[number] for number in frames)
@@ -94,12 +89,6 @@ def powers(points: Array, degree: int) -> Array:
     return (y[:, :, None] * x[:, None, :]).reshape(len(points), -1)
 
 
-def total_power(degree: int) -> NDArray[np.intp]:
-    """Return i + j of each term x^i y^j, ((degree + 1)^2,)."""
-    falling = np.arange(degree, -1, -1)
-    return (falling[:, None] + falling).ravel()
-
-
 MAX_DEGREE = 12  # beyond, powers of double precision coordinates tell nothing apart
 LEADING = ("pressure_MPa", "direction", "R2", "degree", "scale_mm")  # of surfaces.csv
 
@@ -124,7 +113,8 @@ class DisplacementSurface:
     @property
     def physical(self) -> Array:
         """Return coefficients (3, (degree + 1)^2) of Eq. 4.4 with x and y in mm."""
-        return self.coefficients / self.scale ** total_power(self.degree)
+        falling = np.arange(self.degree, -1, -1)
+        return self.coefficients / self.scale ** (falling[:, None] + falling).ravel()
 
 
 def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:

@@ -174,11 +174,10 @@ def read_times(
     column: str | None = None,
     comment: str = "#",
     decimal: Literal[".", ","] | None = None,
-    format: str | None = None,
 ) -> Array:
     """Read times (n,) in s, one a row, such as those of pictures in the camera's log."""
     named = {} if column is None else {"time": column}
-    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal), format)
+    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal))
     return found.values(found.column("time"), tables.TIME_UNITS)
 
 

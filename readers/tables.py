@@ -430,10 +430,12 @@ def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> lis
     if quantity in named:
         return called(names, named[quantity].strip())
     found = [i for i, name in enumerate(names) if name and means(name, quantity)]
-    if not found and quantity == "elongation":  # a strain alone
-        return [i for i, name in enumerate(names) if STRAIN_WORDS & (own := _words(name))
-                and NEVER.isdisjoint(own)]  # fmt: skip
-    return found
+    return found or (_strains(names) if quantity == "elongation" else [])  # a strain alone
+
+
+def _strains(names: list[str]) -> list[int]:
+    every = map(_words, names)
+    return [i for i, own in enumerate(every) if STRAIN_WORDS & own and NEVER.isdisjoint(own)]
 
 
 def strain_columns(
@@ -442,8 +444,8 @@ def strain_columns(
     """Return the columns of strains along the specimen, the nearest to it first."""
     if "strain" in named:
         return [names[i] for i in called(names, named["strain"].strip())]
-    found = [n for n in names if STRAIN_WORDS & (own := _words(n)) and NEVER.isdisjoint(own)]
-    found = [n for n in found if not units[n] or units[n] in STRAIN_UNITS]
+    strains = [names[i] for i in _strains(names)]
+    found = [n for n in strains if not units[n] or units[n] in STRAIN_UNITS]
     return sorted(found, key=distance_to_strip)
 
 

@@ -232,9 +232,7 @@ def measured_fields(
     """Read the fields at the pressures (MPa) as the files have them; raises InputError."""
     frames = None if data.recorded is None else data.recorded.frames
     with place.naming("data.points"):
-        return read_fields(
-            data.files, pressures, options=data.options, format=data.format, frames=frames
-        )
+        return read_fields(data.files, pressures, data.options, data.format, frames)
 
 
 def apex_heights(model: BubbleModel, history: History) -> np.ndarray:

@@ -55,6 +55,7 @@ could not be confirmed (`camera_axes = false` leaves both). MODEL_ is in the cal
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from ...errors import InputError
@@ -63,31 +64,22 @@ from ..registry import Format, register_format
 from ..tables import read_lines
 from ..text_frames import read_text_rows, text_reader
 
-_ARAMIS = re.compile(rb"\b(aramis|gom|zeiss)\b", re.IGNORECASE)
-_DAVIS = re.compile(rb"\bx\[\w+\].*\bx-displacement\[")
-_PLACE = re.compile(rb'"\s*X( \[\w+\])?\s*"')
-_MOVED = re.compile(rb'"\s*(W|sigma)( \[\w+\])?\s*"')
+#: What the first letters of a file have in them, by its format: a title that names the maker or the
+#: program; headings with their unit right behind; those of either version; quoted ones; a header,
+#: or the row of names without one.
+HEADINGS = {
+    "aramis": (rb"(?i)\b(aramis|gom|zeiss)\b",),
+    "davis": (rb"\bx\[\w+\].*\bx-displacement\[",),
+    "matchid": (rb"(?i)coor\.x|x_pic", rb"(?i)coor\.y|y_pic"),
+    "vic3d": (rb'"\s*X( \[\w+\])?\s*"', rb'"\s*(W|sigma)( \[\w+\])?\s*"'),
+    "dice": (rb"(?s)\A(\*\*\*.*DICe|SUBSET_ID)",),
+}
 
 
-def recognises_aramis(path: Path, head: bytes) -> bool:
-    """Return whether a line of title names the maker or the program."""
-    return bool(_ARAMIS.search(b"\n".join(head[:4096].splitlines()[:10]).replace(b"\0", b"")))
-
-
-def recognises_davis(path: Path, head: bytes) -> bool:
-    """Return whether columns are called x and x-displacement, with a unit right behind."""
-    return bool(_DAVIS.search(head[:4096]))
-
-
-def recognises_matchid(path: Path, head: bytes) -> bool:
-    """Return whether the headings are those of either version."""
-    top = head[:4096].lower()
-    return (b"coor.x" in top and b"coor.y" in top) or (b"x_pic" in top and b"y_pic" in top)
-
-
-def recognises_vic3d(path: Path, head: bytes) -> bool:
-    """Return whether "X" and "W" or "sigma" are quoted headings."""
-    return bool(_PLACE.search(head[:4096]) and _MOVED.search(head[:4096]))
+def is_headed(format: str, path: Path, head: bytes) -> bool:
+    """Return whether a file begins as those of a format do."""
+    top = head[:4096].replace(b"\0", b"")
+    return all(re.search(pattern, top) for pattern in HEADINGS[format])
 
 
 #: The states of DICe.h in which a subset was found; all others are failures of some step.
@@ -96,11 +88,6 @@ NAMES = {
     **{axis: f"MODEL_COORDINATES_{axis.upper()}" for axis in "xyz"},
     **{f"d{axis}": f"MODEL_DISPLACEMENT_{axis.upper()}" for axis in "xyz"},
 }
-
-
-def recognises_dice(path: Path, head: bytes) -> bool:
-    """Return whether the header is DICe's, or the row of names without one."""
-    return (head.startswith(b"***") and b"DICe" in head) or head.startswith(b"SUBSET_ID")
 
 
 def read_dice(path: Path, options: FrameOptions) -> Sequence[Frame]:
@@ -116,11 +103,11 @@ def read_dice(path: Path, options: FrameOptions) -> Sequence[Frame]:
     return [frame_of(rows, options, path, "dice") for rows in every]
 
 
-for name, title, recognises, settings in (
-    ("aramis", "text of ARAMIS or ZEISS Correlate", recognises_aramis, {}),
-    ("davis", "CSV of LaVision DaVis", recognises_davis, {}),
-    ("matchid", "CSV of MatchID Stereo, 2023 or 2024", recognises_matchid, {"camera_axes": True}),
-    ("vic3d", "CSV of VIC-3D", recognises_vic3d, {"upper": True}),
+for name, title, read in (
+    ("aramis", "text of ARAMIS or ZEISS Correlate", text_reader("aramis")),
+    ("davis", "CSV of LaVision DaVis", text_reader("davis")),
+    ("matchid", "CSV of MatchID Stereo, 2023 or 2024", text_reader("matchid", camera_axes=True)),
+    ("vic3d", "CSV of VIC-3D", text_reader("vic3d", upper=True)),
+    ("dice", "solution files of DICe", read_dice),
 ):
-    register_format(Format(name, "frame", title, text_reader(name, **settings), recognises))
-register_format(Format("dice", "frame", "solution files of DICe", read_dice, recognises_dice))
+    register_format(Format(name, "frame", title, read, partial(is_headed, name)))

@@ -7,13 +7,14 @@ import sys
 import time
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from bubblefit.readers import mat_files
-from bubblefit.readers.fields import read_fields
+from bubblefit.readers.fields import PLAIN, read_fields
 from bubblefit.readers.formats import array_exports as npz_files
 from bubblefit.readers.formats.array_exports import array_names, read_arrays
 from bubblefit.readers.frames import FrameOptions, read_frames
@@ -200,7 +201,8 @@ def test_any_dialect_reads_back(
     path = tmp_path_factory.getbasetemp() / "dialect.csv"
     lines = [*above, *(separator.join(row) for row in [heads, *body]), ""]
     path.write_bytes(end.join(lines).encode(encoding))
-    (field,) = read_fields([path], [0.1], flag_column=None if flags is None else "flag")
+    options = replace(PLAIN, flag_column=None if flags is None else "flag")
+    (field,) = read_fields([path], [0.1], options)
     read = np.column_stack([field.points, field.z, field.displacement])
     rounding = 0 if number == "{!r}" else 1e-15
     np.testing.assert_allclose(read, np.array(rows)[good], rtol=rounding)

@@ -34,7 +34,7 @@ def scratch(tmp_path_factory) -> Path:
 
 def test_a_table_becomes_a_field(scratch):
     scratch.write_text("# DIC, frame 7\n\n" + GOOD)
-    (field,) = read_fields([scratch], [0.3], flag_column="flag")
+    (field,) = read_fields([scratch], [0.3], FrameOptions(NAMES, flag_column="flag"))
     assert field.pressure == 0.3
     assert field.dropped == {FLAGGED: 1}
     np.testing.assert_array_equal(field.points, [[1, 2], [7, 8]])
@@ -50,7 +50,7 @@ def test_a_table_becomes_a_field(scratch):
 
 def fields_of(path: Path, text: str, *pressures, **asked):
     path.write_text(text)
-    return read_fields([path], pressures or [1.0], **asked)
+    return read_fields([path], pressures or [1.0], FrameOptions(NAMES, **asked))
 
 
 def test_the_height_of_the_reference_state_is_read_where_it_is_there(scratch):
@@ -83,7 +83,7 @@ def test_points_that_are_doubtful_or_lost(scratch):
     # What does not say its polarity is not used, and said; it may be named either way.
     (field,) = fields_of(scratch, GOOD)
     assert "column 'flag' is not used" in field.source.notes[0] and field.dropped == {}
-    (field,) = fields_of(scratch, GOOD, options=FrameOptions(NAMES, valid_column="flag"))
+    (field,) = fields_of(scratch, GOOD, valid_column="flag")
     np.testing.assert_array_equal(field.points, [[-4, 5]])
 
 
@@ -141,7 +141,7 @@ def test_the_refusal_says_what_is_wrong(scratch, text, words):
     scratch.unlink(missing_ok=True)
     if text is not None:
         scratch.write_bytes(text if isinstance(text, bytes) else text.encode())
-    message = complaint(read_fields, [scratch], [0.1], flag_column="flag")
+    message = complaint(read_fields, [scratch], [0.1], FrameOptions(NAMES, flag_column="flag"))
     assert words in message and "field.csv" in message
 
 
@@ -155,7 +155,11 @@ def test_the_refusal_says_what_is_wrong(scratch, text, words):
 )  # fmt: skip
 def test_arguments_that_do_not_go_together(scratch, change, field):
     scratch.write_text(GOOD)
-    assert field in complaint(read_fields, **{"files": [scratch], "pressures": [0.1]} | change)
+
+    def read(files=(scratch,), pressures=(0.1,), **options):
+        return read_fields(files, pressures, FrameOptions(NAMES, **options))
+
+    assert field in complaint(read, **change)
 
 
 def test_the_real_tests_are_read_whole(shared_data):
@@ -163,7 +167,7 @@ def test_the_real_tests_are_read_whole(shared_data):
         pressures = [float(row["p_MPa"]) for row in csv.DictReader(stream)]
     for test in (1, 2, 3):
         files = [shared_data / f"bubble/grid/test{test}_{i:02d}.csv" for i in range(20)]
-        fields = read_fields(files, pressures, flag_column="flag")
+        fields = read_fields(files, pressures, FrameOptions(NAMES, flag_column="flag"))
         for path, field in zip(files, fields, strict=True):
             rows = [line for line in path.read_text().splitlines() if line[:1] not in "#x"]
             flagged = sum(not line.endswith(",0") for line in rows)
