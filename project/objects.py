@@ -129,21 +129,17 @@ class Law(Keys):
         super().__init__(**{"form": form, "bounds": BOUNDS, **said})
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """A file whose content is in memory: the argument it is of, and its columns by name."""
+#: A file whose content is in memory: the argument that it is of, and its text.
+Held: TypeAlias = tuple[str, str]
 
-    argument: str
-    columns: Mapping[str, Sequence[Any]]
 
-    @property
-    def text(self) -> str:
-        """Return the table; every number in full."""
-        out = io.StringIO()
-        lines = csv.writer(out, lineterminator="\n")
-        lines.writerow(self.columns)
-        lines.writerows(zip(*self.columns.values(), strict=True))
-        return out.getvalue()
+def held(argument: str, columns: Mapping[str, Sequence[Any]]) -> Held:
+    """Return a table by columns as a file; every number in full."""
+    out = io.StringIO()
+    lines = csv.writer(out, lineterminator="\n")
+    lines.writerow(columns)
+    lines.writerows(zip(*columns.values(), strict=True))
+    return argument, out.getvalue()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -205,7 +201,7 @@ class Definition:
         the folder from which the section names it."""
         if not self.files:
             return dict(self.section)
-        texts = {name: file.text for name, file in self.files.items()}
+        texts = {name: text for name, (_, text) in self.files.items()}
         digest = hashlib.sha256("".join(texts.values()).encode()).hexdigest()[:8]
         own = folder / f"{self.prefix}{digest}"
         for name, text in texts.items():
@@ -257,7 +253,7 @@ class Bubble(Definition):
             table = np.column_stack([at, by]).T.tolist()
             columns = {f"{q} [mm]": v for q, v in zip(QUANTITIES, table, strict=True)}
             argument = f"points and displacements, frame {k}"
-            files[f"frame-{k + 1:03d}.csv"] = Held(argument, columns)
+            files[f"frame-{k + 1:03d}.csv"] = held(argument, columns)
         data = {"files": list(files), "format": "csv", "registration": registration}
         said = {"pressures": loads, "radius": radius, "ellipse": ellipse, "sheet": sheet}
         section = _sorted("bubble", {**said, "name": name, **data, **keys})
@@ -296,7 +292,7 @@ class Strips(Definition):
             raise InputError(None, "curves", "expected one curve at least, got none")
         names = ("direction", "specimen", "elongation (mm)", "load (N)")
         files = {
-            "curves.csv": Held("curves", dict(zip(names, zip(*rows, strict=True), strict=True)))
+            "curves.csv": held("curves", dict(zip(names, zip(*rows, strict=True), strict=True)))
         }
         tables = _gauges(gauge, keys, {row[0] for row in rows})
         said = {"width": width, "name": name, "files": list(files), **tables}
@@ -347,7 +343,7 @@ class Biaxial(Definition):
             columns = dict(zip(names, _values(at, table, self.columns).tolist(), strict=True))
             if hasattr(table, "columns") and "ratio" in table.columns:
                 columns["ratio"] = table["ratio"].tolist()
-            files[f"path-{k}.csv"] = Held(at, columns)
+            files[f"path-{k}.csv"] = held(at, columns)
             listed[ratio] = [f"path-{k}.csv"]
         said = {"name": name, "files": listed.get("", listed)}
         super().__init__("biaxial", _sorted("biaxial", {**keys, **said}), files)
@@ -377,7 +373,7 @@ class Cylinder(Definition):
         for k, curve in enumerate(curves):
             found = _values(f"curves[{k}]", curve, ("deflection", "load")).tolist()
             columns = dict(zip(("deflection (mm)", "load (N)"), found, strict=True))
-            files[f"curve-{k + 1}.csv"] = Held(f"curves[{k}]", columns)
+            files[f"curve-{k + 1}.csv"] = held(f"curves[{k}]", columns)
         said = {"diameter": diameter, "pressure": pressure, "name": name}
         data = {"files": list(files)} if files else {}
         super().__init__("cylinder", _sorted("cylinder", {**keys, **said, **data}), files)
@@ -406,20 +402,17 @@ def _per_frame(argument: str, value: Numbers, frames: int | None = None) -> list
     """Return (m, 3) mm of every frame; one array stands for each of so many frames."""
     shape = "(m, 3) or (frames, m, 3)" if frames is not None else "(frames, m, 3)"
     try:
-        parts = [np.asarray(value, dtype=float)]
+        whole = np.asarray(value, dtype=float)
+        parts = list(whole) if whole.ndim == 3 else [whole] * (frames or 1)
     except (TypeError, ValueError):
         try:
             parts = [np.asarray(one, dtype=float) for one in value]
         except (TypeError, ValueError):
             problem = f"expected numbers {shape}, got {type(value).__name__}"
             raise InputError(None, argument, problem) from None
-    whole = parts[0].shape if len(parts) == 1 else f"shapes {[p.shape for p in parts]}"
-    if len(parts) == 1 and parts[0].ndim == 3:
-        parts = list(parts[0])
-    elif len(parts) == 1:
-        parts *= frames or 1
     if not parts or any(p.ndim != 2 or p.shape[1] != 3 for p in parts):
-        raise InputError(None, argument, f"expected {shape}, got {str(whole)[:60]}")
+        got = str([*dict.fromkeys(p.shape for p in parts)])[1:60].rstrip("]")
+        raise InputError(None, argument, f"expected {shape}, got {got}")
     if frames is not None and len(parts) != frames:
         problem = f"expected as many frames as displacements, {frames}, got {len(parts)}"
         raise InputError(None, argument, problem)
@@ -603,6 +596,6 @@ def arguments_named(made: Sequence[Definition]) -> Iterator[None]:
         file = Path(error.path or "")
         for test in made:
             if file.name in test.files and file.parent.name.startswith(test.prefix):
-                at = ", ".join(filter(None, (test.files[file.name].argument, error.field)))
+                at = ", ".join(filter(None, (test.files[file.name][0], error.field)))
                 raise InputError(test.name, at, error.problem) from None
         raise

@@ -112,8 +112,11 @@ def section_as_run(
     return {key: beside_project(own) for key, own in whole.items()}
 
 
-def settings_of(project: Project, tests: Sequence[str]) -> Settings:
-    """Return what a run of these tests is given, options included, as a project file."""
+def settings_of(
+    project: Project, tests: Sequence[str], cards: Sequence[str | Path] | None = None
+) -> Settings:
+    """Return what a run of these tests is given, options included, as a project file.
+    cards : names of the project's cards, and files, that predict; each says its own law."""
     written = project.written
     assert written is not None
     settings: Settings = {**written.common, "law": plain(project.law.model_dump()),
@@ -123,6 +126,10 @@ def settings_of(project: Project, tests: Sequence[str]) -> Settings:
     for name in tests:
         if name in written.tests:  # the others were made from Python, beside the file
             settings.setdefault(project.tests[name].kind, []).append(written.tests[name])
+    if cards is not None:
+        del settings["law"]
+        own = dict(zip(project.cards, _cards(project), strict=True))
+        settings["card"] = [own.get(str(card), {"file": os.path.abspath(card)}) for card in cards]
     return settings
 
 
@@ -134,19 +141,6 @@ def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
         if isinstance(said := fit.get(key), str)
     }
     return {**plain(fit), **folders}
-
-
-def settings_of_predictions(
-    project: Project, tests: Sequence[str], cards: Sequence[str | Path]
-) -> Settings:
-    """Return `settings_of` predictions; cards : names of the project's cards, and files."""
-    written = project.written
-    assert written is not None
-    settings = settings_of(project, tests)
-    del settings["law"]  # each card says its own
-    own = dict(zip(project.cards, _cards(project), strict=True))
-    settings["card"] = [own.get(str(card), {"file": os.path.abspath(card)}) for card in cards]
-    return settings
 
 
 def _cards(project: Project) -> list[Settings]:
@@ -358,20 +352,18 @@ class Project:
                 raise InputError(None, f"weights.{key}", problem)
         given = {n: w for n, t in tests.items()
                  if (w := weights.get(n, weights.get(t.kind))) is not None}  # fmt: skip
-        known = self.definitions
-        made = {name: known[name].with_keys(weight=w) for name, w in given.items() if name in known}
         for name, w in given.items():
             own = tests[name]
             own_kind = isinstance(own, OwnTest)
             tests[name] = own.changed(weight=w) if own_kind else replace(own, weight=float(w))
-        if (written := self.written) is None:
-            return replace(self, tests=tests)
-        said, whole = (
-            {n: {**own, "weight": given[n]} if n in given else own for n, own in sections.items()}
-            for sections in (written.tests, written.whole)
-        )
-        objects = {name: made.get(name, own) for name, own in written.made.items()}
-        written = replace(written, tests=said, whole=whole, made=objects)
+        if (written := self.written) is not None:
+            said, whole = (
+                {n: {**own, "weight": given[n]} if n in given else own for n, own in each.items()}
+                for each in (written.tests, written.whole)
+            )
+            made = {n: own.with_keys(weight=given[n]) if n in given else own
+                    for n, own in written.made.items()}  # fmt: skip
+            written = replace(written, tests=said, whole=whole, made=made)
         return replace(self, tests=tests, written=written)
 
     def with_law(self, form: str, settings: Mapping[str, Any] | None = None) -> Project:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -259,7 +260,8 @@ def _merged(common: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]
 
 #: The one that is shipped: of the kinds of test and solvers that come with bubblefit.
 SHIPPED = TEMPLATES / "project" / "project.schema.json"
-DRAFT, REFERENCE = "https://json-schema.org/draft/2020-12/schema", "#/$defs/"
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+REFERENCE = re.compile(r'"#/\$defs/([^"]+)"')
 
 
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
@@ -316,17 +318,10 @@ def _plain(part: Any) -> Any:
 
 def _used(part: Any, definitions: dict[str, Any]) -> set[str]:
     """Return the names of the definitions that a part of the schema leads to."""
-    used, waiting = set[str](), [part]
-    while waiting:
-        one = waiting.pop()
-        if isinstance(one, dict):
-            target = one.get("$ref")
-            if isinstance(target, str) and (name := target.removeprefix(REFERENCE)) not in used:
-                used.add(name)
-                waiting.append(definitions[name])
-            waiting += one.values()
-        elif isinstance(one, list):
-            waiting += one
+    used, new = set[str](), {*REFERENCE.findall(json.dumps(part))}
+    while new:
+        used |= new
+        new = {*REFERENCE.findall(json.dumps([definitions[name] for name in new]))} - used
     return used
 
 

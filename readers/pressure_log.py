@@ -30,20 +30,11 @@ from .text_frames import SEPARATORS, TOP, Lines, cells_of
 APEX = 0.98
 
 
-@dataclass(frozen=True, eq=False)
-class PressureLog:
-    """Readings: time (k,) s, rising; pressure (k,) MPa; path of the file."""
-
-    time: Array
-    pressure: Array
-    path: Path
-
-
 def read_pressure_log(
     path: Path, of_pressure: Channel = AS_FOUND, of_time: Channel = AS_FOUND,
     format: str | None = None, comment: str = "#", decimal: str | None = None,
-) -> PressureLog:  # fmt: skip
-    """Read a log as a test machine's table: volts become a pressure by their channel."""
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return times (k,) s, rising, and pressures (k,) MPa of a log: a machine's table, or volts."""
     channels = {"time": of_time, "pressure": of_pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
     asked = TableOptions(named, ("time", "pressure"), comment, decimal)
@@ -57,7 +48,7 @@ def read_pressure_log(
         raise InputError(path, at, "times must not go back; is this the log of one test?")
     if len(time) < 2 or not time[-1] > time[0]:
         raise InputError(path, f"column {column!r}", "expected readings at two times or more")
-    return PressureLog(time, pressure, path)
+    return time, pressure
 
 
 def apex_height(frame: Frame) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
 from ..experiments.kinds import Findings, FittedTest, Output, by_strain
 from ..experiments.registry import report_of
-from ..files import __version__, write_notes
+from ..files import __version__, render, write_notes
 from ..inference.linear import PRIOR
 from ..inference.posterior import LEVEL
 from ..materials.card import write_card
@@ -284,28 +284,10 @@ def about_of(project: Project, record: Record | None) -> list[tuple[str, object]
     ]
 
 
-BIBTEX = """@software{{bubblefit,
-  title = {{bubblefit: material models of coated fabrics from bubble inflation tests and strip
-           tests by inverse finite element analysis}},
-  author = {{{{The bubblefit developers}}}},
-  version = {{{version}}},
-  license = {{MIT}}
-}}
-@mastersthesis{{jekel2016,
-  title = {{Obtaining Non-linear Orthotropic Material Models for PVC-Coated Polyester via Inverse
-           Bubble Inflation}},
-  author = {{Jekel, Charles F.}},
-  school = {{Stellenbosch University}},
-  month = mar,
-  year = {{2016}},
-  url = {{https://hdl.handle.net/10019.1/98627}}
-}}"""
-
-
 def citation() -> list[Part]:
     """Return words and BibTeX, as in CITATION.cff of the program."""
     said = f"Please cite bubblefit {__version__} and the thesis whose method it follows:"
-    return [Words([said]), Listing(BIBTEX.format(version=__version__))]
+    return [Words([said]), Listing(render("report/citation.bib.j2", version=__version__).strip())]
 
 
 CARD, MODULI, RESIDUALS = "material.toml", "moduli.csv", "residuals.csv"

@@ -29,7 +29,7 @@ from ..experiments.registry import kind_named
 from ..files import pandas as pd
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
-from ..project.project import Project, card_sources, chosen_cards, settings_of_predictions
+from ..project.project import Project, card_sources, chosen_cards, settings_of
 from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
@@ -235,7 +235,7 @@ def predict(
     pairs = _pairs(chosen, {} if alone else chosen_cards(project, cards), solver)
     sources, settings = [] if alone else card_sources(project, cards), None
     if project.written is not None and sources is not None:
-        settings = settings_of_predictions(project, [test.name for test in chosen], sources)
+        settings = settings_of(project, [test.name for test in chosen], sources)
     named = [(test.name, test) for test in chosen]
     record = Record.of(project, settings, named, solver, command_line)
     records = None

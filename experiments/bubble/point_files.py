@@ -49,7 +49,7 @@ def pressures_by_log(
     height = np.array(heights)
     with place.naming(at):
         times, said = _frame_times(section, files, own, place, folder)
-        seen = times, height, log.time, log.pressure
+        seen = times, height, *log
         if section.offset is None:
             return pressure_log.find_offset(*seen), names, said
         return pressure_log.given_offset(section.offset, *seen), names, said

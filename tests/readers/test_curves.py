@@ -432,8 +432,8 @@ def test_a_workbook(tmp_path):
     assert "line 3, column 'Weg [mm]': expected a number, found nothing" in said
     times = [datetime(2021, 3, 12, 23, 59, 59, 500000), datetime(2021, 3, 13, 0, 0, 1)]
     rows = [["Zeitstempel", "Druck [kPa]"], *([t, 1.5 * i] for i, t in enumerate(times))]
-    log = read_pressure_log(workbook(tmp_path / "d.xlsx", a=rows))
-    assert log.time.tolist() == [86399.5, 86401.0] and log.pressure.tolist() == [0, 0.0015]
+    time, pressure = read_pressure_log(workbook(tmp_path / "d.xlsx", a=rows))
+    assert time.tolist() == [86399.5, 86401.0] and pressure.tolist() == [0, 0.0015]
 
 
 def test_workbooks_that_are_none_or_too_large(tmp_path, monkeypatch):
@@ -465,8 +465,8 @@ def test_the_clock_on_the_wall(scratch, name, first, second, start, end):
     scratch.write_text(f"{name};Load [N];Druck [bar]\n{first};1,5;0,1\n{second};2;0,2\n")
     assert read_times(scratch).tolist() == [start, end]
     assert read_machine_loads(scratch, timed=True)[1].tolist() == [start, end]
-    log = read_pressure_log(scratch)
-    assert log.time.tolist() == [start, end] and log.pressure == pytest.approx([0.01, 0.02])
+    time, pressure = read_pressure_log(scratch)
+    assert time.tolist() == [start, end] and pressure == pytest.approx([0.01, 0.02])
     scratch.write_text(scratch.read_text() + "14.2;1;0,3\n")
     assert f"line 4, column '{name}': expected a time" in complaint(read_times, scratch)
 

@@ -163,9 +163,9 @@ def test_logs_and_biaxial_tables_leave_lost_readings_out(tmp_path):
     stamps = [f"2021-03-12T14:02:{second:06.3f}" for second in range(9)]
     values = [f"{p:.3f}" if p != 4 else "NaN" for p in range(9)]
     path.write_text("\n".join(["timestamp,Druck [mbar]", *rows(stamps, values), "Mean,4"]))
-    log = read_pressure_log(path)
-    np.testing.assert_allclose(log.time - log.time[0], [0, 1, 2, 3, 5, 6, 7, 8])
-    np.testing.assert_allclose(log.pressure, 1e-4 * (log.time - log.time[0]), rtol=1e-12)
+    time, pressure = read_pressure_log(path)
+    np.testing.assert_allclose(time - time[0], [0, 1, 2, 3, 5, 6, 7, 8])
+    np.testing.assert_allclose(pressure, 1e-4 * (time - time[0]), rtol=1e-12)
     names = "Kraft Kette;Kraft Schuss;Dehnung Kette;Dehnung Schuss"
     path.write_bytes(
         f"{names}\nlbf/in;lbf/in;%;%\n0;0;0;0\n---;1;1;1\n10;5;1,5;2\n".encode("latin-1")

@@ -299,9 +299,9 @@ def test_a_log_in_volts(tmp_path):
         (Channel("U_p", "kPa", 100.0), [0.0, 0.0355, 1.0]),
         (Channel("U_p", "bar", 1.0, -0.5), [-0.05, -0.0145, 0.95]),
     ):
-        log = read_pressure_log(path, channel)
-        assert log.pressure == pytest.approx(pressure)
-        assert log.time == pytest.approx([0.0, 60.0, 120.0])
+        time, read = read_pressure_log(path, channel)
+        assert read == pytest.approx(pressure)
+        assert time == pytest.approx([0.0, 60.0, 120.0])
 
 
 @pytest.mark.parametrize(
