@@ -4,12 +4,15 @@ Damping is scaled by diag(J'J) (Marquardt), positivity and bounds are constraint
 is feasible, and a stable equilibrium: a soft membrane can fold, as no test under pressure can show.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import quadprog
 from numpy.typing import NDArray
 
 from ..materials.forms.base import Array
 from .problem import ANALYSES_USED_UP, CONVERGED, LEVEL, Evaluation, FitProblem
+from .unknowns import Unknowns
 
 FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
@@ -53,12 +56,12 @@ def descend(
         # Half-life of one iteration: directions that went flat keep some damping.
         scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
         gradient = j.T @ r
-        a, c = problem.unknowns.inequalities
+        cuts: list[tuple[Array, float]] = []
         for _ in range(MOST_TRIALS):
             if problem.analyses >= max_analyses:
                 return point, ANALYSES_USED_UP
             damped = curvature + damping * np.diag(scale)
-            step = bounded_step(damped, gradient, a, c, point.unknowns)
+            step = bounded_step(problem.unknowns, damped, gradient, point.unknowns, cuts)
             if step is None:
                 damping *= 10.0
                 continue
@@ -69,7 +72,7 @@ def descend(
             if trial is not None and point.stable and not trial.stable:
                 cut = _cut(problem, point.unknowns, trial.unknowns)
                 if cut is not None:
-                    a, c = np.vstack([a, cut[0]]), np.append(c, cut[1])
+                    cuts.append(cut)
                     continue
             elif trial is not None:
                 gained = merit - float(np.sum((trial.residual * root) ** 2))
@@ -100,15 +103,36 @@ def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, fl
     return rows[k], float(0.5 * (before[k] + after[k]))
 
 
+MOST_ROUNDS = 12  # linearisations of the work of a closed path, each where the last one led
+
+
 def bounded_step(
-    hessian: Array, gradient: Array, a: Array, c: Array, y: Array,
-    plane: tuple[Array, float] | None = None,
+    unknowns: Unknowns, hessian: Array, gradient: Array, y: Array,
+    cuts: Sequence[tuple[Array, float]] = (), plane: tuple[Array, float] | None = None,
 ) -> Array | None:  # fmt: skip
-    """Minimise g's + s'Hs/2 subject to a (y + s) >= c; None when the QP has no answer.
-    plane : (row, value), to which the step leads: row (y + s) = value."""
+    """Minimise g's + s'Hs/2 within the bounds of the unknowns at y + s; None where that fails.
+    cuts : (row, least) of row (y + s) >= least. plane : (row, value) of row (y + s) = value."""
+    a, c = unknowns.inequalities
+    if cuts:
+        a, c = np.vstack([a, *(row for row, _ in cuts)]), np.append(c, [least for _, least in cuts])
+    rows = np.empty((0, len(y))), np.empty(0)
+    for _ in range(MOST_ROUNDS):
+        step = _quadratic(hessian, gradient, a, c, y, rows, plane)
+        if step is None or unknowns.within_work(y + step):
+            return step
+        rows = unknowns.work_rows(y + step)
+    return None
+
+
+def _quadratic(
+    hessian: Array, gradient: Array, a: Array, c: Array, y: Array, rows: tuple[Array, Array],
+    plane: tuple[Array, float] | None,
+) -> Array | None:  # fmt: skip
+    """Solve the QP: a (y + s) >= c as far as y keeps it, the same of `rows` wholly."""
     unit = 1.0 / np.sqrt(np.diag(hessian))
     scaled = hessian * unit[:, None] * unit[None, :]
-    room = np.minimum(c - a @ y, 0.0) - 1e-12
+    room = np.append(np.minimum(c - a @ y, 0.0) - 1e-12, rows[1] - rows[0] @ y)
+    a = np.vstack([a, rows[0]])
     if plane is not None:
         row, value = plane
         a, room = np.vstack([row, a]), np.concatenate([[value - row @ y], room])

@@ -117,16 +117,16 @@ def fitted_at(
 ) -> Evaluation | None:
     """Fit with row @ unknowns held at the target, from a neighbour's optimum; None where that
     fails."""
-    a, c = problem.unknowns.inequalities
     limit = problem.analyses + MOST_ANALYSES
     y, (curvature, gradient) = point.unknowns, _squares(point)
-    step = bounded_step(curvature, gradient, a, c, y, (row, target))
+    step = bounded_step(problem.unknowns, curvature, gradient, y, plane=(row, target))
     if step is None:
         return None
     here = _stable(problem, y + step)
     while here is not None and problem.analyses < limit:
         curvature, gradient = _squares(here)
-        step = bounded_step(curvature, gradient, a, c, here.unknowns, (row, target))
+        at = here.unknowns
+        step = bounded_step(problem.unknowns, curvature, gradient, at, plane=(row, target))
         if step is None or -(2.0 * gradient @ step + step @ curvature @ step) < SETTLED:
             break
         value = float(here.residual @ here.residual)

@@ -381,11 +381,11 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
         return Limit(np.zeros_like(best.unknowns), best.residual, error)
     weights = 1.0 / np.maximum(norms, SMALLEST * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
-    a, c = problem.unknowns.inequalities
     curvature = weighted @ best.jacobian
     # An unknown of which the data say nothing stays where it is.
     curvature += np.diag(1e-12 * np.diag(curvature) + 1e-14 * np.trace(curvature))
-    without, there = (bounded_step(curvature, weighted @ residual, a, c, best.unknowns)
+    own, at = problem.unknowns, best.unknowns
+    without, there = (bounded_step(own, curvature, weighted @ residual, at)
                       for residual in (best.residual, best.residual + error))  # fmt: skip
     if without is None or there is None:
         return None

@@ -245,9 +245,10 @@ class Posterior:
 
     def sample(self, count: int, random: np.random.Generator) -> Array:
         """Return `count` draws of all unknowns (count, n), all of which keep the inequalities."""
-        return truncated_draws(
-            self.centre, self.covariance, self.unknowns.inequalities, self.best, count, random
-        )
+        pairs = zip(self.unknowns.inequalities, self.unknowns.work_rows(self.best), strict=True)
+        a, c = (np.concatenate(pair) for pair in pairs)
+        c = np.minimum(c, a @ self.best)  # steps of a fit keep off the bound of the work
+        return truncated_draws(self.centre, self.covariance, (a, c), self.best, count, random)
 
     @cached_property
     def drawn(self) -> Array:

@@ -9,7 +9,7 @@ from ..errors import NoFeasibleStart
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
 from .comparison import Comparison
-from .descent import descend
+from .descent import bounded_step, descend
 from .methods import FitOptions, Method, method_named
 from .problem import CONVERGED, LEVEL, RUNS_USED_UP, Evaluation, FitProblem, Optimum
 from .unknowns import MOST_DRAWS, LawBounds, Unknowns
@@ -132,13 +132,18 @@ def feasible_start(problem: FitProblem, seed: int, number: int) -> Array:
     for coefficients in starts.candidates(unknowns, seed, number):
         tried += 1
         y = unknowns.at(coefficients)
-        point = problem.evaluate(y, False, warm=False)
+        step: Array | None = np.zeros_like(y)
+        if not unknowns.within_work(y):  # the nearest that is
+            step = bounded_step(unknowns, np.eye(len(y)), np.zeros(len(y)), y)
+        y = y if step is None else y + step
+        point = None if step is None else problem.evaluate(y, False, warm=False)
         if point is not None and point.stable:
             return y
         if tried >= MOST_ANALYSES:
             raise NoFeasibleStart(
-                f"start {number}: the analysis failed at all of {tried} random points with "
-                "positive moduli; raise the lower bounds or add increments"
+                f"start {number}: the analysis failed, or the work of a closed path is above its "
+                f"bound, at all of {tried} random points with positive moduli; raise the lower "
+                "bounds or law.closed_path, or add increments"
             )
     raise NoFeasibleStart(
         f"start {number}: none of {MOST_DRAWS} random points inside the bounds has positive "

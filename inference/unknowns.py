@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
+from ..materials.responses import closed_path
 from .comparison import Comparison, NuisanceOf
 
 
@@ -26,12 +27,13 @@ class LawBounds:
     """Bounds of a law's numbers.
     least, largest : MPa, by modulus, anywhere on the strain range; largest is None where the
     coefficients are bounded. lower, upper : (free,) MPa, of the free coefficients; None where the
-    moduli are bounded."""
+    moduli are bounded. work : of the law's closed path at most, a share (`ClosedPath.share`)."""
 
     least: Mapping[str, float]
     largest: Mapping[str, float] | None = None
     lower: Array | None = None
     upper: Array | None = None
+    work: float = np.inf
 
     @classmethod
     def of_moduli(cls, ranges: Mapping[str, tuple[float, float]]) -> LawBounds:
@@ -53,6 +55,11 @@ class LawBounds:
 
 
 SMALLEST = 1e-3  # MPa; a bound that is zero or negative says nothing of the size of a modulus
+#: Corners (a, b) of the closed paths whose work is bounded, in ends of the range: that of a card
+#: is as far as its test reached. Increments of a side.
+CORNERS, SIDE = [(i / 8, j / 8) for i in range(2, 9) for j in range(2, 9)], 16
+WITHIN = 0.04  # of that bound, by which steps keep off it: corners between these reach higher
+SLOPE = 1e-5  # difference of an unknown by which that work is differentiated
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +67,15 @@ class Unknowns:
     """The unknowns y (count,) of a fit, their bounds, and their relation to the law.
     Moduli at control strains, each in units of its modulus' own size, then the nuisance: shared,
     then comparison by comparison. strain_range : ends over which bounds hold. definite_nu12 :
-    Poisson's ratio of a law that has to be positive definite, None where it need not."""
+    Poisson's ratio of a law that has to be positive definite, None where it need not. nu12 : of the
+    law, where it is no unknown."""
 
     form: Form
     strain_range: tuple[float, ...]
     bounds: LawBounds
     nuisance: NuisanceOf = field(default_factory=NuisanceOf)
     definite_nu12: float | None = None
+    nu12: float = 0.0
 
     @classmethod
     def of(
@@ -85,7 +94,7 @@ class Unknowns:
         most = max([nu12, *(n.upper for n in nuisance.shared if n.law_parameter == "nu12")])
         return cls(
             form, tuple(np.asarray(strain_range, dtype=float).tolist()), bounds, nuisance,
-            most if any(c.contracts for c in several) else None,
+            most if any(c.contracts for c in several) else None, nu12,
         )  # fmt: skip
 
     @property
@@ -226,6 +235,30 @@ class Unknowns:
         return scipy.linalg.block_diag(law, box), np.concatenate(
             [*c, low, -high, np.zeros(len(pairs))]
         )
+
+    def work(self, y: Array) -> Array:
+        """Return the work of closed paths of the law to `CORNERS`, shares of that of loading."""
+        warp, fill, _ = self.strain_range
+        law = HypoelasticLaw(self.beta(y), self.nu12, np.array(self.strain_range), form=self.form)
+        law = self.law(law, y)
+        pairs = [(warp * a, fill * b) for a, b in CORNERS]
+        return np.array([closed_path(law, pair, SIDE).share for pair in pairs])
+
+    def within_work(self, y: Array) -> bool:
+        most = self.bounds.work
+        return not np.isfinite(most) or bool((np.abs(self.work(y)) <= most).all())
+
+    def work_rows(self, y: Array) -> tuple[Array, Array]:
+        """Return A, c of `A @ y >= c`, the bounds of that work, linear about y, if any."""
+        if not np.isfinite(self.bounds.work):
+            return np.empty((0, self.count)), np.empty(0)
+        slope, steps = np.zeros((len(CORNERS), self.count)), SLOPE * np.eye(self.count)
+        for k in range(self.size + len(self.nuisance.shared)):
+            slope[:, k] = (self.work(y + steps[k]) - self.work(y - steps[k])) / (2 * SLOPE)
+        rest, most = self.work(y) - slope @ y, (1 - WITHIN) * self.bounds.work
+        a, c = np.vstack([slope, -slope]), np.concatenate([-most - rest, rest - most])
+        bad = ~np.isfinite(c)  # no law: nothing is within
+        return np.where(bad[:, None], 0.0, a), np.where(bad, 1.0, c)
 
     @cached_property
     def stability_rows(self) -> Array:

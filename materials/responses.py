@@ -288,18 +288,24 @@ def closed_path(
     range_ = [float(end) for end in law.strain_range[:2]]
     a, b = ends or [end if end < UNLIMITED else REACH_CLOSED for end in range_]
     plain = law if law.memory is None else replace(law, memory=None)
-    shares = np.arange(1, side + 1) / side
-    corners = np.array([(0.0, 0.0), (a, 0.0), (a, b), (0.0, b), (0.0, 0.0)])
-    strain, stress, work = np.zeros((1, 3)), np.zeros((1, 3)), [0.0]
-    for start, end in pairwise(corners):
-        for share in shares:
-            new = np.array([[*(start + share * (end - start)), 0.0]])
-            after, _ = plain.increment(strain, new, stress)
-            work.append(float(0.5 * ((after + stress) * (new - strain)).sum()))
-            strain, stress = new, after
-    return ClosedPath(
-        (a, b), float(np.sum(work)), float(np.sum(work) / np.sum(work[: 2 * side + 1]))
-    )
+    shares = np.arange(1, side + 1)[:, None] / side
+    corners = [np.array([*corner, 0.0]) for corner in ((0, 0), (a, 0), (a, b), (0, b), (0, 0))]
+    path = np.concatenate([start + shares * (end - start) for start, end in pairwise(corners)])
+    work = _work(plain.pieces, plain.coupling, path)
+    return ClosedPath((a, b), float(work.sum()), float(work.sum() / work[: 2 * side].sum()))
+
+
+@compiled()
+def _work(pieces, coupling, path):  # type: ignore[no-untyped-def]
+    """Return (n,) MPa, the work of each increment of strain from rest to path (n, 3), or NaN."""
+    work, tangent, slopes = np.full(len(path), np.nan), np.empty((3, 3)), np.empty(SLOPES)
+    h, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3)
+    for n in range(len(path)):
+        if not stress_update(pieces, coupling, path[n], h, s_old, s, tangent, slopes):
+            break
+        work[n] = 0.5 * ((s + s_old) * (path[n] - h)).sum()
+        h, s_old = path[n], s.copy()
+    return work
 
 
 #: kN/m: no fabric carries more. Halvings by which the end is found; increments of the law.

@@ -112,8 +112,8 @@ class Law(Keys):
     """The form of the moduli, and between what they are looked for: the keys of [law].
 
     form : a name, or a class or an object of one's own. bounds : [least, largest] of E1, E2 and G12
-    in MPa, those of coated fabrics unless given. Keywords beside nu12, strain_range and margin are
-    settings of the form, such as knots.
+    in MPa, those of coated fabrics unless given. Keywords beside nu12, strain_range, margin and
+    closed_path are settings of the form, such as knots.
     """
 
     section = LawSection

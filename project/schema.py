@@ -114,6 +114,7 @@ class LawSection(Section):
     strain_range: StrainTriple | None = None
     bounds: Annotated[BoundsSection | None, Unit("modulus")] = None
     margin: Annotated[MarginSection | None, Unit("modulus")] = None
+    closed_path: Positive | None = None
     memory: MemorySection | None = None
 
 

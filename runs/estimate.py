@@ -179,7 +179,7 @@ def _fitted(
     problem = WeightedProblem.of(own, np.concatenate(factors))
     # Nearest to moduli in the middle of their bounds that keep all bounds.
     y = np.ones(problem.unknowns.count)
-    step = bounded_step(np.eye(len(y)), np.zeros(len(y)), *problem.unknowns.inequalities, y)
+    step = bounded_step(problem.unknowns, np.eye(len(y)), np.zeros(len(y)), y)
     first = problem.evaluate(y if step is None else y + step, True)
     if first is None:
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)

@@ -427,7 +427,8 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
             check_carries(solver, law)
         except InputError as error:
             raise InputError(project.path, "law.form", error.problem) from None
-        bounds = bounds_of(project, law.form)
+        most = np.inf if project.law.closed_path is None else project.law.closed_path / 100
+        bounds = replace(bounds_of(project, law.form), work=most)
         make = functools.partial(make_solver, project)
         ready = []
         for test in tests:

@@ -83,8 +83,7 @@ def _from_stiffer(
     shear = problem.unknowns.shear
     y, target = best.unknowns, best.unknowns.copy()
     target[shear] *= factor
-    a, c = problem.unknowns.inequalities
-    step = bounded_step(np.eye(len(y)), y - target, a, c, y)
+    step = bounded_step(problem.unknowns, np.eye(len(y)), y - target, y)
     point = None if step is None else problem.evaluate(y + step, True)
     if point is None or not point.stable:
         return best, LEVEL

@@ -80,6 +80,7 @@ class Record:
         a, c = self.problem.unknowns.inequalities
         finite = bool(np.isfinite(y).all())
         positive = finite and bool((a @ y >= c - 10 * CONSTRAINT_TOLERANCE).all())
+        positive = positive and self.problem.unknowns.within_work(y)
         # Eq. 4.9 as flags: what is not positive is not worth an analysis, and may not survive it.
         if not finite or (self.flags and not positive):
             return Look(self.bad, none, positive, False)
@@ -155,16 +156,17 @@ class NloptMethod:
             for name in ("positive", "analysed"):
                 optimiser.add_inequality_constraint(partial(record.flag, name), FLAG_TOLERANCE)
         else:
-            a, c = unknowns.inequalities
-            rows, limit = a @ record.basis, c - a @ record.origin
 
-            def linear(result: Array, x: Array, gradient: Array) -> None:
-                result[:] = limit - rows @ x
+            def bounded(result: Array, x: Array, gradient: Array) -> None:
+                y = record.unknowns(x)
+                pairs = zip(unknowns.inequalities, unknowns.work_rows(y), strict=True)
+                a, c = (np.concatenate(pair) for pair in pairs)
+                result[:] = c - a @ y
                 if gradient.size:
-                    gradient[:] = -rows
+                    gradient[:] = -a @ record.basis
 
-            most = np.full(len(rows), CONSTRAINT_TOLERANCE)
-            optimiser.add_inequality_mconstraint(linear, most)
+            rows = len(unknowns.inequalities[1]) + len(unknowns.work_rows(start)[1])
+            optimiser.add_inequality_mconstraint(bounded, np.full(rows, CONSTRAINT_TOLERANCE))
         optimiser.set_maxeval(options.max_analyses)
         optimiser.set_ftol_rel(RELATIVE_E)
         optimiser.set_xtol_rel(RELATIVE_X)
