@@ -18,10 +18,9 @@ import pandas as pd
 from ..errors import InputError, OutputError
 from ..errors import lines as note_lines
 from ..errors import rows as note_rows
-from ..experiments.biaxial.data import plain_ratio
 from ..experiments.biaxial.evaluation import evaluate_test, lines_of, numbers_of
 from ..experiments.biaxial.prepared import PreparedBiaxial
-from ..experiments.biaxial.test import BiaxialTest
+from ..experiments.biaxial.test import BiaxialTest, plain_ratio
 from ..experiments.cycles.evaluation import cycles
 from ..experiments.strips import gauge
 from ..files import __version__, replacing

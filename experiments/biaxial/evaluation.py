@@ -21,9 +21,8 @@ from ...inference.assessment import UNCERTAIN
 from ...materials import designers
 from ...materials.designers import POINTS, USUAL, Evaluation, LinearPath, Options, line_of
 from ..kinds import UNMATCHED, UNSTABLE
-from .data import BiaxialPath, Which, evaluated_paths
 from .prepared import PERCENT
-from .test import BiaxialTest
+from .test import BiaxialPath, BiaxialTest, Which, evaluated_paths
 
 #: Of a loading's range: how near both loads must be to those of the first row.
 BACK = 0.01

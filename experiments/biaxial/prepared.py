@@ -17,8 +17,16 @@ from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, Doubt, Expected, MakeSolver, Masks, Planning, Weighting
 from ..measured import PERCENT, USUAL_NOISE, PreparedParts, StrainObjective
-from .data import BiaxialPath, BiaxialTable, Cycle, nearest_ratio
-from .test import BiaxialSection, BiaxialTest, TablesSection, reach_of
+from .test import (
+    BiaxialPath,
+    BiaxialSection,
+    BiaxialTable,
+    BiaxialTest,
+    Cycle,
+    TablesSection,
+    nearest_ratio,
+    reach_of,
+)
 
 #: Strains at the end of a path: no coated fabric ends below or above.
 LEAST_END, MOST_END = 5e-4, 0.5

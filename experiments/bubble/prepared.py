@@ -283,15 +283,13 @@ def resampled(
     targets: tuple[FieldTarget, ...], own: Mesh, reading: SmoothReading | FacetReading
 ) -> tuple[FieldTarget, ...]:
     """Return the targets of a mesh at the same places of another, by its reading."""
-    found: list[tuple[Array, scipy.sparse.csr_matrix]] = []
-    moved = []
+    moved, before, sample = [], None, None
     for target in targets:
         rest = target.at(own.points)[:, :2] if target.at_rest is None else target.at_rest
         places = np.ascontiguousarray(rest)
-        sample = next((s for p, s in found if np.array_equal(p, places)), None)
-        if sample is None:
-            sample = _sample(reading, places)
-            found.append((places, sample))
+        # Frames of one camera mostly have the same places.
+        if before is None or not np.array_equal(before, places):
+            before, sample = places, _sample(reading, places)
         moved.append(replace(target, sample=sample))
     return tuple(moved)
 

@@ -4,15 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.experiments.biaxial.data import (
+from bubblefit.experiments.biaxial.test import (
     KNOWN,
+    BiaxialSection,
+    TablesSection,
     evaluated_paths,
     find_cycles,
     nearest_ratio,
     plain_ratio,
+    read,
     read_biaxial_table,
 )
-from bubblefit.experiments.biaxial.test import BiaxialSection, TablesSection, read_biaxial
 from bubblefit.experiments.kinds import Fabric, Place
 from bubblefit.materials.designers import shares
 from bubblefit.readers.bending import BendingCurve, model_error, read_bending_curves, scatter
@@ -261,4 +263,4 @@ def test_a_file_listed_for_a_ratio_is_of_that_ratio(tmp_path):
     )
     place = Place(tmp_path / "project.toml", "biaxial[0]", Fabric("fabric", 0.8))
     section = BiaxialSection(data=TablesSection(files=[flat.name]))
-    complaint_with(["flat.csv", "no loading"], read_biaxial, place, section)
+    complaint_with(["flat.csv", "no loading"], read, place, section, "flat")
