@@ -263,4 +263,4 @@ def test_a_file_listed_for_a_ratio_is_of_that_ratio(tmp_path):
     )
     place = Place(tmp_path / "project.toml", "biaxial[0]", Fabric("fabric", 0.8))
     section = BiaxialSection(data=TablesSection(files=[flat.name]))
-    complaint_with(["flat.csv", "no loading"], read, place, section, "flat")
+    complaint_with(["flat.csv", "no loading"], read, section, place, "flat")
