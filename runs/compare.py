@@ -25,7 +25,7 @@ from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import Task
 from .fit import stored_fit
-from .folder import Presented, check_asked, finished
+from .folder import Presented, check_asked, finished, shown
 from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
@@ -276,17 +276,11 @@ class LawComparison(Presented):
 
     def lines(self) -> list[str]:
         result = self.result
-        lines = [
-            f"error: {result['objective_is']}",
-            f"{'moduli':<12}{'coefficients':>13}{'fitted':>12}{'cross-validated':>18}",
-        ]
-        for form in result["forms"]:
-            error = form["cross_validated"]
-            validated = "a fold failed" if error is None else f"{error:.4g}"
-            lines.append(
-                f"{form['form']:<12}{form['coefficients']:>13}{form['fitted']:>12.4g}{validated:>18}"
-            )
-        lines.append(f"the data's own noise: {result['noise']:.4g}")
+        table = self.table().rename(columns={"cross_validated": "cross-validated"})
+        table.index = pd.Index([form.name for form in self.forms])
+        said = shown(table[["coefficients", "fitted", "cross-validated"]], "a fold failed")
+        noise = f"the data's own noise: {result['noise']:.4g}"
+        lines = [f"error: {result['objective_is']}", *said, noise]
         if result["simplest_as_good"] is not None:
             lines.append(
                 f"least at specimens left out: {result['least_cross_validated']}; simplest within "

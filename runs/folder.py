@@ -135,12 +135,6 @@ class Store:
             write_text(self.path / RUN, json.dumps(content, indent=1) + "\n")
         return resume
 
-    def forget(self) -> None:
-        """Remove result.json and run.json: nothing is left to resume; raises OutputError."""
-        with output_errors(self.path):
-            for name in (RESULT, RUN):
-                (self.path / name).unlink(missing_ok=True)
-
     def finish(self, result: Mapping[str, Any]) -> None:
         """Write result.json, after everything else; raises OutputError."""
         write_text(self.path / RESULT, json_text(result))
@@ -182,6 +176,11 @@ def write_table(table: pd.DataFrame, path: Path | str, digits: int | None = 9) -
             form = None if digits is None else f"%.{digits}g"
             table.to_csv(temporary, index=False, float_format=form, lineterminator="\n")
     return path
+
+
+def shown(table: pd.DataFrame, missing: str = "nan") -> list[str]:
+    """Return a table as lines of a terminal, its index first, numbers with four digits."""
+    return table.to_string(float_format="{:.4g}".format, na_rep=missing).splitlines()
 
 
 RUNS = "runs"

@@ -23,7 +23,7 @@ from ..experiments.kinds import (
     other_thickness,
 )
 from ..experiments.registry import kind_named, report_of
-from ..files import __version__, json_text, write_notes, write_text
+from ..files import __version__, json_text, output_errors, write_notes, write_text
 from ..materials.card import MaterialCard
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project, chosen_cards, fitted_card
@@ -31,7 +31,7 @@ from ..solvers.base import History, Solver, check_carries
 from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import once, run_cache
 from .executor import Task, executor_of
-from .folder import RESULT, KeptAnalyses, Store, draw
+from .folder import RESULT, RUN, KeptAnalyses, Store, draw
 from .progress import Listener, listener
 from .starts import timed
 
@@ -256,8 +256,10 @@ def begin_study(
     """
     if out is None:
         return None
-    for name in fits if overwrite else ():
-        Store(Path(out) / name).forget()
+    with output_errors(out):
+        for fit in fits if overwrite else ():
+            for name in (RESULT, RUN):
+                (Path(out) / fit / name).unlink(missing_ok=True)
     Store(Path(out)).begin({"version": __version__, **of}, resume, overwrite, records)
     return Path(out)
 

@@ -39,7 +39,7 @@ from .best import reached_by
 from .compare import candidates, errors, fit_of, plain
 from .executor import Task
 from .fit import stored_fit
-from .folder import Presented, check_asked, check_unused, finished
+from .folder import Presented, check_asked, check_unused, finished, shown
 from .predictions import predict
 from .progress import Listener, listener
 from .setup import FitSetup, fingerprints, prepare_fit
@@ -179,14 +179,9 @@ class Validation(Presented):
 
     def lines(self) -> list[str]:
         table = self.table()
-        wide = max([20, *(2 + len(name) for name in table["test"])])
-        head = "left out" if self.leave != "tests" else "test left out"
-        said = [f"{'law':14}{head:{wide}}{'compared':24}{'predicted':>12}{'fitted':>10}  unit"]
-        for row in table.itertuples():
-            said.append(
-                f"{row.law:14}{row.test:{wide}}{row.compared:24}{row.foretold_rms:12.4g}"
-                f"{row.fitted_rms:10.4g}  {row.unit}"
-            )
+        table.index = pd.Index(list(table["law"]))
+        named = table.rename(columns={"foretold_rms": "predicted", "fitted_rms": "fitted"})
+        said = shown(named[["test", "compared", "predicted", "fitted", "unit"]])
         said += [
             f"{one.law}, {one.predicted.test}: {one.predicted.words}"
             for one in self.judged

@@ -19,7 +19,7 @@ from ..materials.forms.base import COMPONENTS
 from ..project.project import Project
 from .compare import errors
 from .fit import stored_fit
-from .folder import Presented, check_asked, finished
+from .folder import Presented, check_asked, finished, shown
 from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints
@@ -127,18 +127,12 @@ class WeightStudy(Presented):
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        tests = {name: max(12, 2 + len(name)) for name in self.ended[0].relative}
-        half = [f"{name} at {self.strain(name, 0.5):.3g}" for name in COMPONENTS]
-        lines = [
-            f"weight of {self.counted}, times what the project says; {ERROR}; moduli in MPa",
-            f"{'weight':>8}" + "".join(f"{name:>{wide}}" for name, wide in tests.items())
-            + "".join(f"{words:>16}" for words in half),
-        ]  # fmt: skip
-        middle = PLACES.index(0.5)
-        for run in self.ended:
-            values = "".join(f"{run.relative[name]:>{wide}.4g}" for name, wide in tests.items())
-            moduli = "".join(f"{run.moduli[name][middle]:>16.4g}" for name in COMPONENTS)
-            lines.append(f"{run.count:>8.3g}{values}{moduli}")
+        table = self.table()
+        table.index = pd.Index([f"{run.count:.3g}" for run in self.ended])
+        names = [name for name in table if name.startswith("relative ")]
+        names += [f"{name}_MPa at {self.strain(name, 0.5):.4g}" for name in COMPONENTS]
+        head = f"weight of {self.counted}, times what the project says; {ERROR}"
+        lines = [head, *shown(table[names])]
         for name in COMPONENTS:
             low, high = self.change(name)
             sigma = self.sigma(name)

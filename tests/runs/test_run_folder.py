@@ -451,10 +451,6 @@ def test_what_is_gone_on_with_is_kept(tmp_path):
     assert (tmp_path / RUN).read_text() == before
     store.begin({}, False, True, ("starts",))
     assert not (tmp_path / "starts").exists()
-    store.finish({})
-    for _ in range(2):
-        store.forget()
-        assert not store.used
 
 
 def test_what_a_killed_process_had_begun_to_write_goes(tmp_path):

@@ -303,7 +303,7 @@ def test_a_card_is_judged_without_a_fit(project, tmp_path):
     found = row["foretold_rms"], row["foretold_relative"]
     assert found == pytest.approx((rms, relative), rel=1e-4) and np.isnan(row["fitted_rms"])
     assert "made, two: warp strain 11.8 % is beyond 10 %" in done.output
-    assert f"{rms:12.4g}" in done.output
+    assert f" {rms:.4g} " in done.output
     again = in_process(*command, cwd=tmp_path, code=2)
     assert "--overwrite" in again.output + again.stderr
     thick = MaterialCard(LAW, 1.0, "thick")
