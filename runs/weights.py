@@ -129,7 +129,7 @@ class WeightStudy(Presented):
     def lines(self) -> list[str]:
         table = self.table()
         table.index = pd.Index([f"{run.count:.3g}" for run in self.ended])
-        names = [name for name in table if name.startswith("relative ")]
+        names = [f"relative {test}" for test in self.ended[0].relative]
         names += [f"{name}_MPa at {self.strain(name, 0.5):.4g}" for name in COMPONENTS]
         head = f"weight of {self.counted}, times what the project says; {ERROR}"
         lines = [head, *shown(table[names])]
