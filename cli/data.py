@@ -37,7 +37,6 @@ from ..runs.fit import check
 from ..runs.folder import Record, Store, data_rows, this_run, write_table
 from . import options as given
 from .options import check_out, columns_named, frame_options
-from .progress import LiveLine
 from .terminal import FILE, command, group, show, written_to
 
 
@@ -63,7 +62,7 @@ def check_command(**options: Any) -> None:
     """
     read = read_project(options["project"], given.data_folders(options["data"]))
     folder = given.folder_of(options, "check")
-    with LiveLine("steps", given.quiet(options)) as progress:
+    with given.LiveLine("steps", given.quiet(options)) as progress:
         found = check(
             read, options["tests"] or None, options["trust"], out=folder, progress=progress
         )

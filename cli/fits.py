@@ -15,7 +15,6 @@ from ..errors import lines as note_lines
 from ..experiments.kinds import READING
 from ..inference.methods import method_names
 from . import options as given
-from .progress import LiveLine
 from .terminal import FILE, WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
         if kind is not None and name in project.tests and project.tests[name].kind != kind:
             problem = f"{name!r} is no test of this command's kind; use `bubblefit fit`"
             raise InputError(path, "--test", problem)
-    with resumable(folder), LiveLine("starts", given.quiet(options), starts) as progress:
+    with resumable(folder), given.LiveLine("starts", given.quiet(options), starts) as progress:
         result = fit(
             project, options["tests"] or kind, starts=options["starts"], trust=options["trust"],
             out=folder, resume=options["resume"], overwrite=options["overwrite"],

@@ -22,7 +22,6 @@ from ..runs.simulation import simulate_cards
 from ..solvers.registry import solver_settings
 from . import options as given
 from .options import command_line, data_folders, with_solver
-from .progress import LiveLine
 from .terminal import FILE, WORSE, command, group, resumable, show, written_to
 
 CYLINDER = "cylinder"
@@ -61,7 +60,7 @@ def run_predictions(
     if options["fail_above"] is not None and not measured_tests(project, tests):
         problem = "no test has measured loads to compare with; leave it out"
         raise InputError(project.path, "--fail-above", problem)
-    with resumable(folder), LiveLine("runs", given.quiet(options)) as progress:
+    with resumable(folder), given.LiveLine("runs", given.quiet(options)) as progress:
         predictions = predict(
             project, tests, cards, samples=options["samples"], jobs=options["jobs"],
             scheduler=options["scheduler"], out=folder, resume=options["resume"],
@@ -158,7 +157,7 @@ def run_simulation(command: str, options: dict[str, Any], kind: str | None = Non
     tests = project.chosen(options["tests"] or kind)
     cards = chosen_cards(project, options["cards"])
     folder = given.result_folder(options, "simulated")
-    with resumable(folder), LiveLine("increments", options["as_json"]) as progress:
+    with resumable(folder), given.LiveLine("increments", options["as_json"]) as progress:
         done = simulate_cards(
             project,
             tests,

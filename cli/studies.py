@@ -22,13 +22,12 @@ from ..runs.profile import profile
 from ..runs.refinement import Refined, refine
 from . import options as given
 from .fits import fit_options, settings_given
-from .progress import LiveLine
 from .terminal import Decorator, command, group, resumable, show, written_to
 
 
 def run_study(
     study: Callable[..., Any], name: str, project: Project, options: Mapping[str, Any],
-    progress: LiveLine, **own: Any,
+    progress: given.LiveLine, **own: Any,
 ) -> None:  # fmt: skip
     """Run a study into its output folder, and print its lines, or result.json with --json."""
     folder = given.folder_of(options, name)
@@ -48,7 +47,7 @@ def run_fits(
     """Run a study of several fits, each from `starts` unless the command says how many."""
     project = settings_given(given.read_with_solver(options), options)
     starts = options["starts"] or starts
-    progress = LiveLine("starts", given.quiet(options), starts)
+    progress = given.LiveLine("starts", given.quiet(options), starts)
     common = {"starts": starts, "trust": options["trust"], "command_line": given.command_line()}
     run_study(study, name, project, options, progress, **common, **own)
 
@@ -101,7 +100,7 @@ def profile_command(moduli: tuple[str, ...], strain: str | None, **options: Any)
         name, equals, strains = text.partition("=")
         own = given.numbers(strains, "--modulus") if equals else common
         asked.setdefault(name, []).extend(own)
-    progress = LiveLine("sides", given.quiet(options))
+    progress = given.LiveLine("sides", given.quiet(options))
     chosen = {"moduli": asked or None, "card": options["card"]}
     run_study(profile, "profile", project, options, progress, **chosen)
 
@@ -134,7 +133,7 @@ def bootstrap_command(over: str, samples: int, **options: Any) -> None:
     bootstrap.csv, coefficients.csv, bootstrap.png, report.html and result.json.
     """
     own = {"over": over, "samples": samples, "card": options["card"], "seed": options["seed"]}
-    progress = LiveLine("samples", given.quiet(options))
+    progress = given.LiveLine("samples", given.quiet(options))
     run_study(bootstrap, "bootstrap", given.read_to_refit(options), options, progress, **own)
 
 
@@ -175,7 +174,7 @@ def plan_command(strain: str | None, noises: tuple[str, ...], **options: Any) ->
     own = {name: options[name] for name in ("card", "rank", "specimens")}
     own["strain"] = None if strain is None else given.numbers(strain, "--strain")
     own["noise"] = dict(map(_noise, noises))
-    progress = LiveLine("tests", given.quiet(options))
+    progress = given.LiveLine("tests", given.quiet(options))
     run_study(plan, "plan", given.read_with_solver(options), options, progress, **own)
 
 
@@ -297,7 +296,7 @@ def run_with_card(
 ) -> None:
     """Read the project, run the study of a card, write its folder and print its lines."""
     project = given.read_with_solver(options, need_data=False)
-    progress = LiveLine("increments", options["as_json"])
+    progress = given.LiveLine("increments", options["as_json"])
     run_study(study, name, project, options, progress, card=options["card"], **own)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -51,9 +51,13 @@ class LoadCurve:
     def until_largest_load(self) -> LoadCurve:
         """Return the curve without the rows after its largest load."""
         end = int(np.argmax(self.load)) + 1
-        kept = {n: v[:end] for n in ("elongation", "load", "time", "frame")
+        return self.part(slice(end), cut=len(self.load) - end)
+
+    def part(self, rows: slice, **changes: Any) -> LoadCurve:
+        """Return the curve of these rows, with other values of its fields."""
+        kept = {n: v[rows] for n in ("elongation", "load", "time", "frame")
                 if (v := getattr(self, n)) is not None}  # fmt: skip
-        return replace(self, **kept, cut=len(self.load) - end)
+        return replace(self, **kept, **changes)
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
@@ -147,12 +151,9 @@ def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
         # Noise about zero, before the load comes on, is no restart.
         reached = max(reached, value if value > 1e-2 * u.max() else 0.0)
     return tuple(
-        replace(
-            curve, specimen=f"{curve.specimen} {number}", elongation=u[a:b], load=curve.load[a:b],
-            time=None if curve.time is None else curve.time[a:b], frame=None,
-        )
+        curve.part(slice(a, b), specimen=f"{curve.specimen} {number}")
         for number, (a, b) in enumerate(pairwise([*starts, len(u)]), start=1)
-    )  # fmt: skip
+    )
 
 
 def _labels(

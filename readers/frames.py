@@ -57,8 +57,6 @@ class Frame:
         if self.points.shape != self.displacement.shape or self.points.shape[1:] != (3,):
             shapes = f"{self.points.shape} and {self.displacement.shape}"
             raise ValueError(f"expected (m, 3) points and displacements, got {shapes}")
-        if self.sigma is not None and self.sigma.shape != self.points.shape[:1]:
-            raise ValueError(f"expected (m,) sigma, got {self.sigma.shape}")
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,9 @@ ModulusUnit = Literal["GPa", "MPa", "Pa"]
 PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
 LengthUnit = Literal["mm", "m", "in"]
 Name = Annotated[str, Field(min_length=1, max_length=300)]
-#: MPa per unit.
+#: MPa, or mm, per unit.
 MODULUS_UNITS: dict[str, float] = {"GPa": 1000.0, "MPa": 1.0, "Pa": 1e-6}
-#: MPa per unit.
 PRESSURE_UNITS: dict[str, float] = {"kPa": 1e-3, "MPa": 1.0, "bar": 0.1, "Pa": 1e-6}
-#: mm per unit.
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 #: Beyond, products of a few numbers overflow.
 HUGE = 1e18

@@ -255,11 +255,12 @@ def moduli_charts(
     of charts then shows the deviation from it in percent. band : (2, 3, k) MPa, ends of the band
     of the first fit; not drawn where it is not finite."""
     x, charts = 100 * strains, []
+    others: dict[str, Any] = {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
     for m, (title, label) in enumerate(PANELS):
         own = None if band is None else (band[0, m], band[1, m])
         dot = band is not None and truth is None
         series = [line("best", x[m], fits[0, m], own, ends=dot)]
-        series += [line(x=x[m], y=curve, **_next(fits)) for curve in fits[1:, m]]
+        series += [line(x=x[m], y=curve, **others) for curve in fits[1:, m]]
         drawn = [fits[:, m].max()]
         if truth is not None:
             series.append(line("known", x[m], truth[m], colour=1, dashes=1))
@@ -269,7 +270,14 @@ def moduli_charts(
         alt = f"{title}: from {first:.3g} MPa at rest to {last:.3g} MPa at {x[m, -1]:.3g} %"
         charts.append(Chart(f"{title}{cut}", label, MODULUS, series, alt, from_zero=True, top=top))
     if truth is not None:
-        charts += [_deviation(m, x[m], fits[:, m], truth[m]) for m in range(3)]
+        percent = np.maximum(100 * np.abs(fits / truth - 1), SAME)
+        for m, (title, label) in enumerate(PANELS):
+            said = f"best: at most {percent[0, m].max():.2g} %"
+            # Dips where curves cross say nothing.
+            first, *more = np.maximum(percent[:, m], percent[:, m].max() / 10**DRAWN_DECADES)
+            series = [line("best", x[m], first), *(line(x=x[m], y=y, **others) for y in more)]
+            up, title = "deviation from known, %", f"{title}: {said}"
+            charts.append(Chart(title, label, up, series, said, log_y=True))
     return Charts("moduli", charts, caption, columns=3)
 
 
@@ -280,22 +288,6 @@ def axis_top(curves: float, upper: ArrayLike) -> tuple[float, str]:
     if high <= MOST * curves:
         return max(curves, 1.04 * high), ""
     return MOST * curves, f": its band goes to {high:.3g} MPa"
-
-
-def _next(fits: Array) -> dict[str, Any]:
-    """Return name and look of every fit after the best."""
-    return {"name": f"next {len(fits) - 1}", "colour": 6, "faint": True}
-
-
-def _deviation(m: int, strain: Array, fits: Array, truth: Array) -> Chart:
-    percent = np.maximum(100 * np.abs(fits / truth - 1), SAME)
-    worst = float(percent[0].max())
-    # Dips where curves cross say nothing.
-    least = float(percent.max()) / 10**DRAWN_DECADES
-    first, *others = np.maximum(percent, least)
-    series = [line("best", strain, first), *(line(x=strain, y=y, **_next(fits)) for y in others)]
-    label, said = "deviation from known, %", f"best: at most {worst:.2g} %"
-    return Chart(f"{PANELS[m][0]}: {said}", PANELS[m][1], label, series, said, log_y=True)
 
 
 def moduli_together(strains: Array, moduli: Array) -> Charts:

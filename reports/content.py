@@ -117,10 +117,6 @@ class Report:
     def parts(self) -> Iterator[Part]:
         return (part for section in self.sections for part in section.parts)
 
-    @property
-    def tables(self) -> list[Table]:
-        return [part for part in self.parts if isinstance(part, Table)]
-
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:

@@ -9,7 +9,7 @@ import pytest
 from bubblefit import files
 from bubblefit.cli import terminal
 from bubblefit.cli.main import main
-from bubblefit.cli.progress import COMPILING, LiveLine
+from bubblefit.cli.options import COMPILING, LiveLine
 from bubblefit.cli.terminal import EVENTS, Events
 from bubblefit.runs.starts import EvaluationRecord, StartRecord
 from click import Group

@@ -74,7 +74,7 @@ def reported(fit, folder, monkeypatch):
 
 
 def titled(report, title):
-    (table,) = [table for table in report.tables if table.title == title]
+    (table,) = [p for p in report.parts if p.part == "table" and p.title == title]
     return table
 
 
@@ -369,7 +369,7 @@ def test_only_what_is_predicted_is_judged(tmp_path, monkeypatch):
     monkeypatch.setattr(run_pages, "write_report", lambda folder, page: pages.append(page))
     failed.report(tmp_path / "out")
     (page,) = pages
-    (notes,) = [table for table in page.tables if table.title == "Notes"]
+    (notes,) = [p for p in page.parts if p.part == "table" and p.title == "Notes"]
     assert notes.header == ["test", "card", "wall", "kind", "note"]
     assert all(len(row) == 5 for row in notes.rows) and notes.text == (1, 2, 3, 4)
     assert {row[2] for row in notes.rows} == {"slack", "rigid wall"}
