@@ -426,9 +426,6 @@ class Predicted(Protocol):
     def arrays(self, model: Any, history: History) -> Mapping[str, Array]:
         """Return the arrays of a history that are kept; raises SolverFailure if they do not fit."""
 
-    def early(self, model: Any, history: History) -> str:
-        """Return the solver's reason for an end before the last frame, "" where it came so far."""
-
     def measured(self, test: Any) -> bool:
         """Return whether a test has anything measured to compare runs with."""
 
@@ -469,7 +466,7 @@ def record_of(
         try:
             return RunRecord(
                 seconds if outcome.seconds is None else outcome.seconds,
-                early=kind.early(model, outcome),
+                early=outcome.early,
                 strain=np.maximum(np.abs(outcome.strain_min) * [0, 0, 1], outcome.strain_max),
                 arrays=kind.arrays(model, outcome), iterations=outcome.iterations,
                 unstable=outcome.unstable, remarks=tuple(map(as_note, outcome.remarks)),

@@ -349,14 +349,13 @@ def prepare(test: BubbleTest, law: HypoelasticLaw, make_solver: MakeSolver) -> P
     if test.rising < len(test.pressures) and law.memory is None:
         problem = "'all' needs a law with a memory: say [law.memory] warp = 'fitted' and fill"
         raise test.place.error("inflation", problem)
+    known, registration, own = None, None, False
     if isinstance(test.data, KnownSolution):
         fields, known, own = _computed(test, test.data, law, make_solver)
-        surfaces = _surfaces(test, fields, computed=True)
-        prepared = PreparedBubble(test, fields, surfaces, known, by_this_model=own)
     else:
         fields, registration = read_measured(test)
-        surfaces = _surfaces(test, fields, computed=False)
-        prepared = PreparedBubble(test, fields, surfaces, None, registration)
+    surfaces = _surfaces(test, fields, computed=known is not None)
+    prepared = PreparedBubble(test, fields, surfaces, known, registration, own)
     with test.place.naming():
         sheet = measured_sheet(test.sheet, test.outline, prepared.matched)
     return replace(prepared, sheet=sheet)

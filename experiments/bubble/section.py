@@ -38,9 +38,7 @@ class CorrelationSection(sections.Section):
     pattern_size: Words | None = Field(default=None, title="pattern feature size")
     subset: Words | None = Field(default=None, title="subset size")
     step: Words | None = Field(default=None, title="step size")
-    strain_window: Words | None = Field(
-        default=None, title="strain window and virtual gauge length"
-    )
+    strain_window: Words | None = Field(default=None, title="strain window, virtual gauge length")
     matching: Words | None = Field(
         default=None, title="shape function, matching criterion, interpolant"
     )

@@ -52,7 +52,7 @@ def arrays_of(model: CylinderModel | BeamModel, history: History) -> Mapping[str
     """
     deflection = np.array([0.0, *model.deflections])
     reached = len(history.load)
-    if reached < len(deflection) and not early_end(model, history):
+    if reached < len(deflection) and not history.early:
         where = f"at {deflection[reached - 1]:g} of {deflection[-1]:g} mm"
         raise SolverFailure(f"the results end {where}, and do not say why", "")
     if history.cavity_pressure is None or history.cavity_volume is None:
@@ -63,11 +63,6 @@ def arrays_of(model: CylinderModel | BeamModel, history: History) -> Mapping[str
     ends = history.displacement[0], history.displacement[-1]
     values = (deflection[:reached], *known, *ends, wrinkled)
     return dict(zip((field.name for field in fields(BendingRun)), values, strict=True))
-
-
-def early_end(model: CylinderModel | BeamModel, history: History) -> str:
-    """Return the solver's reason for an end before the last deflection, else ""."""
-    return "" if len(history.load) > len(model.deflections) else history.early
 
 
 #: The initial stiffness is that of a straight line through at least so many frames.
@@ -102,6 +97,11 @@ class Against:
 
     reference: float
     pairs: Mapping[str, tuple[float, float] | None]
+
+    @property
+    def ratios(self) -> Mapping[str, float | None]:
+        """Return predicted over measured by quantity."""
+        return {name: pair and pair[0] / pair[1] for name, pair in self.pairs.items()}
 
 
 def against_measured(
@@ -436,8 +436,8 @@ class CylinderOutcome:
             "reached_mm": m and m.reached,
         }
         if m is not None and m.against is not None:
-            for name, pair in m.against.pairs.items():
-                row[f"{name.replace(' ', '_')}_over_measured"] = pair and pair[0] / pair[1]
+            ratios = m.against.ratios.items()
+            row |= {f"{n.replace(' ', '_')}_over_measured": ratio for n, ratio in ratios}
         if number in self.spreads:
             sigma = zip(places, self.sigma(number).values(), strict=True)
             row |= {f"load_at_{p}_sigma_N": value for p, value in sigma}
@@ -518,7 +518,6 @@ class CylinderPredicted:
     """Predictions of cylinders."""
 
     arrays = staticmethod(arrays_of)
-    early = staticmethod(early_end)
     outcome = CylinderOutcome
 
     def depends_on(self, model: CylinderModel | BeamModel) -> Sequence[object]:

@@ -325,10 +325,10 @@ def _to(found: tuple[float, float, float] | None, form: str) -> str | None:
 def _write_tables(
     outcome: CylinderOutcome, tests: Sequence[CylinderTest], out: Output
 ) -> list[Shown]:
-    curves = [outcome.curve(i) for i in range(len(outcome.runs))]
-    for run, curve in zip(outcome.runs, curves, strict=True):
-        for k, column in enumerate((run.test.name, run.card, run.wall)):
-            curve.insert(k, ("test", "card", "wall")[k], column)
+    curves = [
+        pd.DataFrame({"test": r.test.name, "card": r.card, "wall": r.wall, **outcome.curve(i)})
+        for i, r in enumerate(outcome.runs)
+    ]
     what = "every curve: deflection, load, pressure, volume, wrinkled share"
     files = [out.write(CURVES, pd.concat(curves), what, None)]
     if any(test.measured for test in tests):

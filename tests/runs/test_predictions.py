@@ -217,9 +217,6 @@ class StrutKind:
     def arrays(self, model, history):
         return {"force": history.load}
 
-    def early(self, model, history):
-        return history.early
-
     def measured(self, test):
         return True
 

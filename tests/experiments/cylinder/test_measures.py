@@ -14,7 +14,6 @@ from bubblefit.experiments.cylinder.predicted import (
     against_measured,
     arrays_of,
     bending_measures,
-    early_end,
     inflation_strain,
     initial_stiffness,
     knee_point,
@@ -250,8 +249,6 @@ def test_what_is_kept():
     # An early end is a result where the solver says why.
     short = history(2, early="no equilibrium")
     assert arrays_of(MODEL, short)["deflection"].tolist() == [0.0, 10.0]
-    assert early_end(MODEL, short) == "no equilibrium"
-    assert early_end(MODEL, history(3, early="said after the end")) == ""
 
 
 @pytest.mark.parametrize(
