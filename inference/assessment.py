@@ -10,6 +10,7 @@ from ..errors import Note, NoteKind
 from ..materials.card import band_at
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
+from .comparison import Nuisance
 from .linear import (
     LEFT,
     POINTS,
@@ -35,11 +36,13 @@ LARGEST_SIGMA = 0.25
 ON_BOUND = 1e-6
 
 
-def moduli_error(law: HypoelasticLaw, known: HypoelasticLaw, reached: Array) -> dict[str, float]:
+def moduli_error(
+    law: HypoelasticLaw, known: HypoelasticLaw, reached: Array, points: int = POINTS
+) -> dict[str, float]:
     """Return the largest relative error of each modulus up to the strains reached (3,)."""
     errors = {}
     for name, component in COMPONENTS.items():
-        strain = np.linspace(0.0, reached[component], POINTS)
+        strain = np.linspace(0.0, reached[component], points)
         errors[name] = float(
             np.max(np.abs(law.modulus(name, strain) / known.modulus(name, strain) - 1.0))
         )
@@ -192,23 +195,14 @@ AS_BEFORE = 0.9  # of a prior: the data add next to nothing to it
 CORRELATED = 0.5  # correlations that are worth saying
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """The uncertainty of one unknown beside the moduli, in `unit`.
-    name : with its comparison where there are several. prior : None without one. correlation : with
-    each modulus in the middle of its strains. shared : one for all tests. why : reason why the data
-    may say nothing of it."""
+@dataclass(frozen=True, kw_only=True)
+class Verdict(Nuisance):
+    """An unknown beside the moduli with its uncertainty, named with its comparison among several.
+    correlation : with each modulus in the middle of its strains."""
 
-    name: str
-    unit: str
     value: float
     sigma: float
-    lower: float
-    upper: float
-    prior: float | None
     correlation: dict[str, float]
-    shared: bool
-    why: str = ""
 
     @property
     def on(self) -> str:
@@ -265,8 +259,8 @@ def verdicts(posterior: Posterior, ends: Array) -> tuple[Verdict, ...]:
             modulus: float(slope @ covariance[:size, k]) / max(sigma * spread[modulus], 1e-300)
             for modulus, slope in slopes.items()
         }
-        known = one.lower, one.upper, one.prior, correlation, one.shared, one.why
-        found.append(Verdict(name, one.unit, value, sigma, *known))
+        own = {**vars(one), "name": name, "correlation": correlation}
+        found.append(Verdict(**own, value=value, sigma=sigma))
     return tuple(found)
 
 

@@ -41,10 +41,9 @@ from ..solvers.decks import CODE, file_mark
 from ..solvers.process import ANSWER_S, Unwanted, connected, unless
 from ..solvers.process import check as check_scheduler
 from ..solvers.scratch import remove_interrupted, sweep_left
-from .starts import EvaluationRecord, MeshName, StartRecord, run_start
+from .starts import Event, MeshName, StartRecord, run_start
 
 log = logging.getLogger(__name__)
-Record = EvaluationRecord | StartRecord
 #: Does the task of a number; what it reports on the way and what it returns are records.
 Task = Callable[[int, Callable[[Any], None]], Any]
 #: Returns the record of a lost task from its number and the reason.
@@ -110,7 +109,7 @@ class Executor:
     def run_starts(
         self, build: Callable[[], FitProblem], options: FitOptions, seed: int,
         numbers: Sequence[int], mesh: MeshName = "full",
-    ) -> Iterator[Record | None]:  # fmt: skip
+    ) -> Iterator[Event | None]:  # fmt: skip
         """Fit every start, as `run_tasks`; build : the problem, once a process. mesh : of it."""
 
         def lost(number: int, why: str) -> StartRecord:

@@ -25,6 +25,7 @@ from ..experiments.kinds import (
 from ..experiments.own import OwnTest
 from ..experiments.registry import kinds
 from ..files import __version__, html_table, one_blas_thread
+from ..inference.assessment import moduli_error
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..materials.forms.base import COMPONENTS
 from ..project.objects import Definition, Law, plain
@@ -50,7 +51,7 @@ from .setup import UNCOUNTED, FitSetup, Saw, coarse_problem, fingerprints, prepa
 from .starts import (
     HISTORY,
     STARTS,
-    EvaluationRecord,
+    Event,
     MeshName,
     RunningFiles,
     Stage,
@@ -97,11 +98,7 @@ def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
     """Return the largest relative difference of a modulus of two optima over their strains."""
     one, other = (problem.unknowns.law(problem.law, np.array(record.unknowns)) for record in (a, b))
     ends = np.maximum(a.reached, b.reached)
-    apart = []
-    for name, component in COMPONENTS.items():
-        strain = np.linspace(0.0, ends[component], POINTS)
-        apart.append(np.abs(one.modulus(name, strain) / other.modulus(name, strain) - 1.0).max())
-    return float(max(apart))
+    return max(moduli_error(one, other, ends, POINTS).values())
 
 
 #: Times as many starts are wanted where the best optimum was found once.
@@ -135,9 +132,6 @@ def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Proj
         f"{ended[0].objective:.4g}, the next {ended[1].objective:.4g}): there may be a better one, "
         f"and more starts are wanted (--starts {MORE * len(ended)} --starts-from random)"
     )
-
-
-Event = EvaluationRecord | StartRecord
 
 
 def every_start(

@@ -307,8 +307,6 @@ def proposals(
 
 #: Solver that leads the fit if the project's gives no derivatives.
 SURROGATE = "membrane"
-#: Where a project names its solver.
-SOLVER_KEY = "fit.solver"
 #: Keys of [fit] that change no start; the solver counts by its identity.
 UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlier")
 
@@ -420,7 +418,7 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
         fit = project.fit
         options = project.options_of(fit.solver)
         # Once here, in one line, rather than as the failure of every analysis.
-        solver = usable_solver(fit.solver, options, project.path, SOLVER_KEY, project.run_cache)
+        solver = usable_solver(fit.solver, options, project.path, "fit.solver", project.run_cache)
         shared_unknowns(project)  # says now what is wrong with them
         law = law_of(project, [test.reach for test in tests])
         try:

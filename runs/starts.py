@@ -89,6 +89,9 @@ class StartRecord:
         return TypeAdapter(cls).validate_json(text)
 
 
+Event = EvaluationRecord | StartRecord
+
+
 def run_start(
     problem: FitProblem, options: FitOptions, seed: int, number: int,
     tell: Callable[[EvaluationRecord], None], mesh: MeshName = "full",
@@ -172,7 +175,7 @@ class RunningFiles:
             self._rows = open(self.store.path / HISTORY, "ab", buffering=0)
         return done
 
-    def add(self, record: EvaluationRecord | StartRecord) -> None:
+    def add(self, record: Event) -> None:
         """Append to history.csv or starts.jsonl at once; raises OutputError."""
         assert self._rows is not None and self._starts is not None
         with output_errors(self.store.path):
@@ -247,7 +250,7 @@ def _table(rows: Iterable[Sequence[Any]]) -> str:
 log = logging.getLogger(__name__)
 
 
-def log_record(record: EvaluationRecord | StartRecord | None) -> None:
+def log_record(record: Event | None) -> None:
     """Log an analysis or the end of a start; nothing for None."""
     if isinstance(record, EvaluationRecord):
         left = "failed" if record.objective is None else f"objective {record.objective:.6g}"

@@ -4,6 +4,4 @@ import nlopt
 
 from .slsqp import NloptMethod
 
-FIRST_STEP = 0.1  # of each bound's width
-
-METHOD = NloptMethod(nlopt.LN_COBYLA, 2000, FIRST_STEP)
+METHOD = NloptMethod(nlopt.LN_COBYLA, 2000, first_step=0.1)

@@ -151,20 +151,18 @@ def thin_walls() -> Iterator[Number]:
     radius = RADIUS_THIN_WALLS * float(np.exp(strain[1]))
     hoop = TUBE_MPA * radius / THICKNESS_THIN_WALLS
     steps = TUBE_MPA * np.array([0.05, *np.arange(1, 11) / 10])
-    exact = (radius, hoop / 2, hoop)
-    names = (("radius", "mm"), ("axial stress", "MPa"), ("hoop stress", "MPa"))
     model, solver = tube_model(24, 12, 600.0, steps), MembraneSolver(1e-9)
-    for (name, unit), ours, theirs in zip(
-        names, in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress), exact, strict=True
-    ):
+    found = in_the_middle(model, solver.run(model, ISOTROPIC), solver.stress)
+    exact, names = (radius, hoop / 2, hoop), ("radius", "axial stress", "hoop stress")
+    for name, unit, ours, theirs in zip(names, ("mm", "MPa", "MPa"), found, exact, strict=True):
         what, source = f"{name} of a capped tube", "p r/t and p r/(2 t)"
         yield Number(what, ours, theirs, unit, ALLOWED_THIN_WALLS, source)
     strain_of_sphere = sphere_strain(SPHERE_MPA)
     radius = RADIUS_THIN_WALLS * float(np.exp(strain_of_sphere))
     found = sphere((0.01, 0.1, 0.4, SPHERE_MPA))
     exact = (radius, 4 / 3 * np.pi * radius**3, E / (1 - NU) * strain_of_sphere)
-    names = (("radius", "mm"), ("volume", "mm3"), ("stress", "MPa"))
-    for (name, unit), ours, theirs in zip(names, found, exact, strict=True):
+    names = ("radius", "volume", "stress")
+    for name, unit, ours, theirs in zip(names, ("mm", "mm3", "MPa"), found, exact, strict=True):
         yield Number(f"{name} of a sphere", ours, theirs, unit, ALLOWED_THIN_WALLS, "p r/(2 t)")
 
 
