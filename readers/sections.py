@@ -100,7 +100,8 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         count = error["ctx"]["min_length" if kind == "too_short" else "max_length"]
         return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
-    return f"expected {expected}, got {_short(given)}"
+    got = repr(given)
+    return f"expected {expected}, got {got if len(got) <= 60 else f'{got[:57]}...'}"
 
 
 def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -108,11 +109,6 @@ def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
         yield annotation
     for inside in getattr(annotation, "__args__", ()):
         yield from _sections(inside)
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def model_of(section: type[BaseModel], dotted: str) -> type[BaseModel]:

@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from ..errors import InputError, check_one_of
 from ..files import replacing, write_text
 from ..meshes.mesh import Mesh, meshio_of
 from ..solvers.base import History
@@ -224,13 +224,10 @@ FLAT = 0.2
 def history(name: str, history: History, quantity: str, component: int, frame: int) -> Charts:
     """Return the deformed mesh coloured by its strain or stress: a tube from the side."""
     count = len(history.load)
-    for field, good, expected in (
-        ("quantity", quantity in DRAWN, " or ".join(DRAWN)),
-        ("component", component in (0, 1, 2), "0 (warp), 1 (fill) or 2 (shear)"),
-        ("frame", -count <= frame < count, f"{-count} to {count - 1}"),
-    ):
-        if not good:
-            raise InputError(None, field, f"expected {expected}")
+    check_one_of(quantity, DRAWN, "quantity")
+    check_one_of(component, range(len(WAYS)), "component")
+    if not -count <= frame < count:
+        raise InputError(None, "frame", f"expected {-count} to {count - 1}, got {frame}")
     what, unit, factor = DRAWN[quantity]
     every = history.strain() if quantity == "strain" else history.stress()
     values, rest = factor * every[frame, :, component], history.mesh.points

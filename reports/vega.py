@@ -92,13 +92,16 @@ CONFIG: Spec = {
 
 
 def save(path: Path | str, charts: Charts) -> Path:
-    """Write charts as PNG, SVG or PDF by suffix; raises ValueError, OutputError."""
+    """Write charts as PNG, SVG or PDF by suffix; InputError : another one. OutputError."""
     if not charts.charts:
         raise ValueError(f"{charts.name}: nothing to draw")
-    content = rendered(charts, Path(path).suffix.lower())
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(path, "", f"expected a name that ends in {', '.join(SUFFIXES)}")
+    content = rendered(charts, path.suffix.lower())
     with replacing(path) as temporary:
         temporary.write_bytes(content)
-    return Path(path)
+    return path
 
 
 def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, str]:
@@ -109,8 +112,6 @@ def saved(out: Output, name: str, charts: Charts, caption: str) -> tuple[str, st
 
 def rendered(charts: Charts, suffix: str) -> bytes:
     """Return charts as the bytes of a file of this suffix."""
-    if suffix not in SUFFIXES:
-        raise ValueError(f"{suffix}: expected {', '.join(SUFFIXES)}")
     return _drawn(suffix[1:], picture(charts))
 
 
@@ -126,9 +127,7 @@ class Drawing:
         return picture(self.charts)
 
     def save(self, path: Path | str) -> Path:
-        """Write PNG, SVG or PDF by suffix; InputError : another one. OutputError."""
-        if Path(path).suffix.lower() not in SUFFIXES:
-            raise InputError(Path(path), "", f"expected a name that ends in {', '.join(SUFFIXES)}")
+        """Write as `save`."""
         return save(path, self.charts)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:

@@ -121,8 +121,8 @@ def test_files(tmp_path):
     assert text.count(f'fill="{vega.COLOURS["from least"][0]}"') >= 1
     assert "one &amp; &lt;two&gt;" in text
     for file, own, words in (("none.png", Charts("c", [], ""), "nothing to draw"),
-                             ("c.bmp", charts, r"expected \.png")):  # fmt: skip
-        raised(ValueError, words, save, tmp_path / file, own)
+                             ("c.bmp", charts, r"ends in \.png")):  # fmt: skip
+        raised((ValueError, InputError), words, save, tmp_path / file, own)
 
 
 def test_the_figure_of_the_page():
