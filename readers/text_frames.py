@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
@@ -328,16 +328,12 @@ LEAST_ROWS = 3
 UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
 
 
-def text_reader(
-    format: str, **settings: Any
-) -> Callable[[Path, frames.FrameOptions], Sequence[frames.Frame]]:
-    """Return the reader of a format that is text; settings of `read_text_rows`."""
-
-    def read(path: Path, options: frames.FrameOptions) -> Sequence[frames.Frame]:
-        every = read_text_rows(path, options, **settings)
-        return [frames.frame_of(rows, options, path, format) for rows in every]
-
-    return read
+def read_text(
+    path: Path, options: frames.FrameOptions, format: str, **settings: Any
+) -> list[frames.Frame]:
+    """Read the frames of a text file; format : its name. settings : of `read_text_rows`."""
+    every = read_text_rows(path, options, **settings)
+    return [frames.frame_of(rows, options, path, format) for rows in every]
 
 
 def read_text_rows(

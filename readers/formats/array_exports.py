@@ -48,7 +48,7 @@ from .. import mat_files
 from ..frames import Array, Frame, FrameOptions, FrameRows, frame_of
 from ..mat_files import LARGEST, RATIO, SMALL, is_mat, numbers_of, read_variables
 from ..registry import Format, register_format
-from ..text_frames import read_text_rows
+from ..text_frames import read_text
 
 PLACES, MOVED = [f"{axis} deformed" for axis in "xyz"], [f"d{axis}" for axis in "xyz"]
 
@@ -270,8 +270,7 @@ def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
         head = file.read(128)
     if not head.startswith(ARCHIVE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
-        every = read_text_rows(path, deformed, camera_axes=True)
-        return [frame_of(rows, deformed, path, "pyaldic") for rows in every]
+        return read_text(path, deformed, "pyaldic", camera_axes=True)
     there = (read_variables if is_mat(head) else read_arrays)(path, ("points3D", *"UVW"))
     points = there.get("points3D")
     if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:

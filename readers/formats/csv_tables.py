@@ -4,6 +4,7 @@ Load polynomials: direction, gauge_length_mm, final_length_mm, c1, c2 ..., c0, d
 """
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...errors import InputError
 from ..curves import LoadPolynomial, PublishedPolynomial, direction_named
 from ..registry import Format, register_format
 from ..tables import read_table
-from ..text_frames import text_reader
+from ..text_frames import read_text
 
 
 def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
@@ -42,7 +43,8 @@ def read_polynomials(path: Path) -> dict[str, PublishedPolynomial]:
     return read
 
 
-register_format(Format("csv", "frame", "columns of text in any dialect", text_reader("csv")))
+plain = partial(read_text, format="csv")
+register_format(Format("csv", "frame", "columns of text in any dialect", plain))
 register_format(
     Format("csv", "load polynomials", "columns direction, lengths, c1, c2 ...", read_polynomials)
 )

@@ -59,10 +59,10 @@ from functools import partial
 from pathlib import Path
 
 from ...errors import InputError
-from ..frames import Frame, FrameOptions, frame_of
+from ..frames import Frame, FrameOptions
 from ..registry import Format, register_format
 from ..tables import read_lines
-from ..text_frames import read_text_rows, text_reader
+from ..text_frames import read_text
 
 #: What the first letters of a file have in them, by its format: a title that names the maker or the
 #: program; headings with their unit right behind; those of either version; quoted ones; a header,
@@ -90,7 +90,7 @@ NAMES = {
 }
 
 
-def read_dice(path: Path, options: FrameOptions) -> Sequence[Frame]:
+def read_dice(path: Path, options: FrameOptions, format: str) -> Sequence[Frame]:
     """Read the one frame of a file; without a stereo model it is refused."""
     top = "\n".join(text for _, text in read_lines(path, "***", any_encoding=True)[:3])
     if NAMES["x"] not in top and not options.columns:
@@ -99,15 +99,16 @@ def read_dice(path: Path, options: FrameOptions) -> Sequence[Frame]:
     good = "STATUS_FLAG", SUCCESSFUL
     # Without a stereo model, of columns that the user names, the model's are not asked for.
     names = {key: name for key, name in NAMES.items() if name in top}
-    every = read_text_rows(path, options, comment="***", names=names, status=good, camera_axes=True)
-    return [frame_of(rows, options, path, "dice") for rows in every]
+    settings = {"comment": "***", "names": names, "status": good, "camera_axes": True}
+    return read_text(path, options, format, **settings)
 
 
 for name, title, read in (
-    ("aramis", "text of ARAMIS or ZEISS Correlate", text_reader("aramis")),
-    ("davis", "CSV of LaVision DaVis", text_reader("davis")),
-    ("matchid", "CSV of MatchID Stereo, 2023 or 2024", text_reader("matchid", camera_axes=True)),
-    ("vic3d", "CSV of VIC-3D", text_reader("vic3d", upper=True)),
+    ("aramis", "text of ARAMIS or ZEISS Correlate", read_text),
+    ("davis", "CSV of LaVision DaVis", read_text),
+    ("matchid", "CSV of MatchID Stereo, 2023 or 2024", partial(read_text, camera_axes=True)),
+    ("vic3d", "CSV of VIC-3D", partial(read_text, upper=True)),
     ("dice", "solution files of DICe", read_dice),
 ):
-    register_format(Format(name, "frame", title, read, partial(is_headed, name)))
+    known = partial(is_headed, name)
+    register_format(Format(name, "frame", title, partial(read, format=name), known))
