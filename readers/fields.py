@@ -1,5 +1,7 @@
 """Displacement fields of a bubble, and surfaces through points: Eq. 4.4, spheres of Eq. A.6."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
