@@ -236,7 +236,7 @@ def bootstrap(
     tell, others = listener(progress), len(record.rows) + len(missing) - samples
     tell(len(record.rows) - others, samples, "")
     prepare = functools.partial(_task, found, groups, project.fit.seed)
-    for _ in record.run(project, prepare, missing, "samples"):
+    for _ in record.run(project, prepare, missing):
         tell(len(record.rows) - others, samples, "")
     # Every process runs the optimum once more.
     before = found.analyses + min(project.fit.jobs or cores(), len(missing))

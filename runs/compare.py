@@ -154,7 +154,7 @@ def errors_of_folds(
     depends = {**fingerprints(setup, setup.problem()), "folds": count, "starts": starts}
     record = StudyRecord(folder, VALIDATION, "folds", FoldError, "fold", depends)
     prepare = functools.partial(_task, setup, parts, starts)
-    for event in record.run(setup.project, prepare, range(len(parts)), "folds"):
+    for event in record.run(setup.project, prepare, range(len(parts))):
         tell(event)
     return tuple(record.rows[fold] for fold in sorted(record.rows))
 

@@ -32,7 +32,7 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project, card_sources, chosen_cards, settings_of
 from ..project.schema import Cards
 from ..solvers.base import BandedSolver, BandEnd, Solver, check_carries
-from ..solvers.registry import solver_named, usable_solver
+from ..solvers.registry import usable_solver
 from ..solvers.run_cache import digest_of
 from .executor import Task, executor_of
 from .folder import (
@@ -45,6 +45,7 @@ from .folder import (
     versions,
 )
 from .progress import Listener, listener
+from .setup import make_solver
 from .simulation import attempt
 from .starts import log_run
 
@@ -390,15 +391,12 @@ def _runner(project: Project, pairs: Sequence[PredictedRun]) -> Task:
 
 def _solvers(project: Project) -> Callable[[BandEnd | None], Solver]:
     """Return what makes the project's solver for an end of its band, once each."""
-    name = project.fit.solver
-    options = project.options_of(name)
     made: dict[str, Solver] = {}
 
     def solver_of(end: BandEnd | None) -> Solver:
         key = "" if end is None else end.name
         if key not in made:
-            more = {} if end is None else end.options
-            made[key] = solver_named(name, project.run_cache, **{**options, **more})
+            made[key] = make_solver(project, **({} if end is None else end.options))
         return made[key]
 
     return solver_of

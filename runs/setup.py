@@ -453,9 +453,9 @@ def _starts(setup: FitSetup) -> Starts:
     return proposals(folder, fingerprints(setup, problem), columns, scales.modulus)
 
 
-def make_solver(project: Project, name: str | None = None) -> Solver:
+def make_solver(project: Project, name: str | None = None, **more: Any) -> Solver:
     named = name or project.fit.solver
-    return solver_named(named, project.run_cache, **project.options_of(named))
+    return solver_named(named, project.run_cache, **{**project.options_of(named), **more})
 
 
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:

@@ -294,11 +294,12 @@ class StudyRecord(Generic[R]):
             write_text(self._path, json.dumps(content, indent=1) + "\n")
 
     def run(
-        self, project: Project, prepare: Callable[[], Task], keys: Iterable[Any], what: str
+        self, project: Project, prepare: Callable[[], Task], keys: Iterable[Any]
     ) -> Iterator[R | None]:
         """Run the tasks of the keys without a row; yield each row written, None now and then."""
         missing = [key for key in keys if key not in self.rows]
-        for row in executor_of(project).run_tasks(prepare, missing, what) if missing else ():
+        tasks = executor_of(project).run_tasks(prepare, missing, self._name) if missing else ()
+        for row in tasks:
             if row is not None:
                 self.write(row)
             yield row

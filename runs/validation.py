@@ -280,7 +280,7 @@ def errors_left_out(
     of = {**fingerprints(setup, setup.problem()), "parts": names, "starts": starts}
     record = StudyRecord(folder, file, "parts", LeftOut, "number", of)
     prepare = functools.partial(_task, setup, parts, starts)
-    for row in record.run(setup.project, prepare, range(len(parts)), "parts"):
+    for row in record.run(setup.project, prepare, range(len(parts))):
         tell(None if row is None else f"without {names[row.number]}")
     judged = []
     for row in (record.rows[k] for k in range(len(parts))):
