@@ -6,7 +6,7 @@ The apex of a conditioned sheet is higher than that of the first loading at the 
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -122,8 +122,9 @@ def find_cycles(load: Array) -> list[Cycle]:
     cycles = []
     for k in range(0, len(rows) - 1, 2):
         end = rows[k + 2] if k + 2 < len(rows) else least
-        cycles.append(Cycle(k // 2 + 1, rows[k], rows[k + 1], end, k + 2 < len(rows)))
-    return [c if c.end - c.peak >= 5 else replace(c, unloaded=False) for c in cycles]
+        unloaded = k + 2 < len(rows) and end - rows[k + 1] >= 5
+        cycles.append(Cycle(k // 2 + 1, rows[k], rows[k + 1], end, unloaded))
+    return cycles
 
 
 def turns(load: Array, back: float = BACK, again: float = AGAIN, floor: float = FLOOR) -> list[int]:

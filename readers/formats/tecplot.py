@@ -20,7 +20,7 @@ from ...errors import InputError
 from ...files import pandas as pd
 from ..frames import Frame, FrameOptions, FrameRows, Heading, columns_of, frame_of, heading_of
 from ..registry import Format, register_format
-from ..tables import read_lines
+from ..tables import is_number, read_lines
 
 _VARIABLES = re.compile(rb"^[ \t]*+VARIABLES[ \t]*+=", re.IGNORECASE | re.MULTILINE)
 _WORD = re.compile(r"^\s*(TITLE|VARIABLES|ZONE|DATASETAUXDATA|TEXT|GEOMETRY)\b", re.IGNORECASE)
@@ -96,7 +96,11 @@ def _numbers(
     try:
         flat = _flat([text for _, text in lines], width)
     except ValueError:
-        raise InputError(path, *_first_bad(lines)) from None
+        tokens = ((n, token) for n, text in lines for token in text.replace(",", " ").split())
+        bad = (own for own in tokens if not is_number(own[1]) and own[1].casefold() != "nan")
+        number, token = next(bad, (line, "nothing else"))
+        problem = f"expected a number, found {token[:40]!r}"
+        raise InputError(path, f"line {number}", problem) from None
     if not flat.size or flat.size % width:
         problem = f"expected {width} numbers a point, found {flat.size} numbers in the zone"
         raise InputError(path, f"line {line}", problem)
@@ -117,16 +121,6 @@ def _flat(lines: list[str], width: int) -> NDArray[np.float64]:
         )  # fmt: skip
         return table.to_numpy().ravel()
     return np.array(" ".join(lines).replace(",", " ").split(), dtype=float)
-
-
-def _first_bad(lines: list[tuple[int, str]]) -> tuple[str, str]:
-    for number, text in lines:
-        for token in text.replace(",", " ").split():
-            try:
-                float(token)
-            except ValueError:
-                return f"line {number}", f"expected a number, found {token[:40]!r}"
-    return "", "expected numbers"
 
 
 def _with_vectors(headings: list[Heading]) -> list[Heading]:
