@@ -1,7 +1,7 @@
 """Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison.
 
 The model is that of [[cylinder]] in `experiments/cylinder`: the card that is fitted predicts the
-measured loads best. Its derivatives are differences of whole bendings (`solvers/membrane`).
+measured loads best.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from ..kinds import Array, MakeSolver, Masks, Place, Weighting
 from ..measured import MeasuredKind, PreparedWhole
 from ..strips.prepared import LoadObjective
 
-#: Frames of a bending, unless the section says otherwise: each costs an analysis an unknown.
+#: Frames of a bending, unless the section says otherwise.
 FRAMES = 12
 #: Noise of one load: of the largest, unless given; values that are taken to be independent.
 NOISE, INDEPENDENT = 0.02, 5.0

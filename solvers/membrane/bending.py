@@ -1,5 +1,6 @@
 """Bending of an inflated membrane: gas of constant mass, rigid bodies, a collar that moves."""
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Note, NoteKind, SolverFailure
-from ...materials.law import HypoelasticLaw
+from ...materials.law import HypoelasticLaw, law_beside, usual_step
 from ...meshes.cylinder_model import (
     Bending,
     ClosedGas,
@@ -53,6 +54,66 @@ OVERPRESSURE = 50.0
 STEP, LEAST_STEP, MOST_GROWTH = 0.01, 1e-4, 2.0
 #: An increment in which the volume grows by a larger share is passed by volume.
 MOST_GROWTH_INFLATED = 0.1
+#: Largest change of a modulus between a membrane and its neighbours.
+SHARE = 1e-5
+
+
+class Neighbours:
+    """Membranes of laws next to that of another one, a parameter and a step each, on its way.
+
+    A neighbour's state is its own. Its equilibrium at a level is found from that of the membrane by
+    two steps with the membrane's tangent, which holds gas, contact, cords and wrinkles: one step
+    leaves an error of second order, which contact makes 1e-3 of a slope. steps (k,).
+    """
+
+    def __init__(self, membrane: ClosedMembrane, parameters: Sequence[str]) -> None:
+        law, self.each, self.steps = membrane.law, [], np.ones(len(parameters))
+        acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}  # others of a form stay zero
+        for k, name in enumerate(parameters):
+            if name in acting:
+                self.steps[k] = usual_step(law, name, 1.0, SHARE)
+            beside = law_beside(law, name, self.steps[k]) if name in acting else law
+            self.each.append(_copied(membrane, beside))
+        self.moved = [np.zeros_like(membrane.reference) for _ in self.each]
+
+    def on(self, membrane: ClosedMembrane) -> None:
+        """Go on beside a membrane with other supports, which has the state of the one before."""
+        before = self.each
+        self.each = [_copied(membrane, own.law) for own in before]
+        for own, old in zip(self.each, before, strict=True):
+            own.strain_old[:], own.stress_old[:] = old.strain_old, old.stress_old
+
+    def follow(self, membrane: ClosedMembrane, u: Array) -> None:
+        """Move to the equilibria beside u (n, 3), that of the membrane, before it is accepted."""
+        if not self.each:
+            return
+        membrane.unbalance(u, membrane.pressure, with_tangent=True)
+        membrane.factor()
+        free = membrane.free
+        for k, own in enumerate(self.each):
+            to = u.copy()
+            own.unbalance(to, membrane.pressure, with_tangent=False)
+            for _ in range(2):
+                off = (own.residual - membrane.residual)[free]
+                to.reshape(-1)[free] -= membrane.tangent.solve(off)
+                if not np.isfinite(own.unbalance(to, membrane.pressure, with_tangent=False)):
+                    raise SolverFailure("no derivative: no valid stress next to an equilibrium")
+            own.accept()
+            self.moved[k] = to
+
+    def slopes(self, here: Array, there: Sequence[Array]) -> Array:
+        """Return derivatives (..., k) of a quantity by its values at the neighbours."""
+        columns = [(own - here) / step for own, step in zip(there, self.steps, strict=True)]
+        return np.stack(columns, axis=-1) if columns else np.zeros((*here.shape, 0))
+
+
+def _copied(membrane: ClosedMembrane, law: HypoelasticLaw) -> ClosedMembrane:
+    """Return a membrane with a state of its own, that of the other one, and another law."""
+    own = copy.copy(membrane)
+    for name in ("strain_old", "stress_old", "strain_new", "stress_new", "wrinkle", "residual"):
+        setattr(own, name, getattr(membrane, name).copy())
+    own.law, own.cords = law, copy.deepcopy(membrane.cords)
+    return own
 
 
 def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
@@ -87,53 +148,80 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
         membrane.drag(0.0, start)
 
 
+class Bodies:
+    """Supports, and collars by their way, around an inflated membrane."""
+
+    def __init__(self, membrane: ClosedMembrane, plan: Bending, inflated: Array) -> None:
+        self.membrane, self.way = membrane, np.asarray(plan.direction, dtype=float)
+        position = membrane.reference + inflated
+        self.posts = [brought_to_touch(body, position, -self.way, BITE) for body in plan.supports]
+        self.collars: list[RigidCylinder] = []
+        membrane.penalty, membrane.bodies = plan.penalty, self.posts
+        if plan.weight:
+            weight = membrane.node_weight(plan.weight)
+            membrane.dead = np.outer(weight, -self.way).reshape(-1)
+
+    def close(self, plan: Bending, inflated: Array, pressure: float) -> None:
+        """Bring the collars to touch the membrane at rest on its supports, and close the gas in."""
+        position = self.membrane.reference + inflated
+        self.collars = [brought_to_touch(body, position, self.way, 0.0) for body in plan.collars]
+        volume, _ = self.membrane.cavity.measure(position)
+        closed = plan.gas.closed_in(pressure, volume) if plan.gas.constant == "mass" else None
+        self.membrane.gas, self.membrane.pressure = closed, pressure
+
+    def move(self, moved: float) -> None:
+        """Move the collars by a way (mm) from where they touched."""
+        at = [np.asarray(body.centre) + moved * self.way for body in self.collars]
+        moves = zip(self.collars, at, strict=True)
+        collars = [replace(body, centre=tuple(to.tolist())) for body, to in moves]
+        self.membrane.bodies = (*self.posts, *collars)
+
+    def pushes(self) -> Array:
+        """Return forces (bodies, 3) N on the meshed part, zero of collars that are not there."""
+        own = [push.sum(axis=0) for push in self.membrane.contact]
+        return np.array(own + [np.zeros(3)] * (len(self.posts) + len(self.collars) - len(own)))
+
+
 def analyse(
     membrane: ClosedMembrane, model: InflatedModel, inflated: Array, pressure: float,
-    extremes: tuple[Array, Array], sides: NDArray[np.bool_], asked: Asked,
-) -> History:  # fmt: skip
+    extremes: tuple[Array, Array], sides: NDArray[np.bool_], asked: Asked, beside: Neighbours,
+) -> tuple[History, Array]:  # fmt: skip
     """Return the frames of the bending: the inflated state and every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `wrinkled` a share of
     `sides` (elements,). Without an equilibrium on the way the history ends with the last good
-    frame.
+    frame. And derivatives of displacements, (frames, nodes, 3, k).
     """
     plan = model.bending
     assert plan is not None
-    way = np.asarray(plan.direction, dtype=float)
-    position = membrane.reference + inflated
-    posts = [brought_to_touch(body, position, -way, BITE) for body in plan.supports]
-    membrane.penalty = plan.penalty
-    resting = np.zeros((len(posts) + len(plan.collars), 3))
+    way, membrane.pressure = np.asarray(plan.direction, dtype=float), pressure
+    bodies = Bodies(membrane, plan, inflated)
+    others = [Bodies(own, plan, u) for own, u in zip(beside.each, beside.moved, strict=True)]
     if plan.weight:
-        membrane.dead = np.outer(membrane.node_weight(plan.weight), -way).reshape(-1)
-        membrane.bodies = posts
         found = membrane.equilibrium(inflated, pressure)
         found = settled(membrane, inflated) if found is None else found
         if found is None:
             raise SolverFailure("no equilibrium of the inflated tube under its weight")
+        beside.follow(membrane, found)
         membrane.accept()
-        inflated, position = found, membrane.reference + found
-        resting[: len(posts)] = [push.sum(axis=0) for push in membrane.contact]
-    collars = [brought_to_touch(body, position, way, 0.0) for body in plan.collars]
-    volume, _ = membrane.cavity.measure(position)
-    membrane.gas = plan.gas.closed_in(pressure, volume) if plan.gas.constant == "mass" else None
-    membrane.pressure = pressure
+        inflated = found
+    bodies.close(plan, inflated, pressure)
+    for own, u in zip(others, beside.moved, strict=True):
+        own.close(plan, u, pressure)
+    volume, _ = membrane.cavity.measure(membrane.reference + inflated)
     membrane.keep_tangent = True
-
-    def bodies(moved: float) -> tuple[RigidCylinder, ...]:
-        at = [np.asarray(body.centre) + moved * way for body in collars]
-        moves = zip(collars, at, strict=True)
-        return (*posts, *(replace(body, centre=tuple(to.tolist())) for body, to in moves))
 
     low, high = (extreme.copy() for extreme in extremes)
     path, moves = [inflated], [0.0]
     wrinkle = membrane.wrinkle.copy()
-    gas, pushes = [(pressure, volume)], [resting]
+    gas, pushes = [(pressure, volume)], [bodies.pushes()]
+    rates = [(beside.slopes(inflated, beside.moved),
+              beside.slopes(pushes[0], [own.pushes() for own in others]))]  # fmt: skip
     remarks: list[Note] = []
     snaps: list[float] = []
     early = ""
     wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
-    moving = Moving(membrane, bodies)
+    moving = Moving(membrane, bodies.move)
     # A displacement without equilibrium ends the history, and is no failure.
     try:
         steps = march(moving, plan.displacements, asked, (0.0, inflated), len(model.pressures))
@@ -142,13 +230,18 @@ def analyse(
                 wanted - moves[-1]
             ):
                 snaps.append(wanted)
+            for own in others:
+                own.move(wanted)
+            beside.follow(membrane, found)
             work = membrane.wrinkle_work(wrinkle)
             wrinkle = membrane.wrinkle.copy()
             membrane.accept()
             path.append(found)
             moves.append(wanted)
             gas.append((membrane.pressure, membrane.volume))
-            pushes.append(np.array([push.sum(axis=0) for push in membrane.contact]))
+            pushes.append(bodies.pushes())
+            rates.append((beside.slopes(found, beside.moved),
+                          beside.slopes(pushes[-1], [own.pushes() for own in others])))  # fmt: skip
             wrinkled.append(membrane.wrinkled_share(sides))
             of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
             now = membrane.reference + found
@@ -167,7 +260,7 @@ def analyse(
         remarks.append(Note(SNAP, f"snaps, or nearly, before {where} mm of deflection"))
     words = f"rigid bodies penetrate {deepest:.3g} mm at most"
     remarks.append(Note(PENETRATION, words))
-    most = float(np.abs(np.array(pushes)[:, len(posts) :].sum(axis=1) @ way).max())
+    most = float(np.abs(np.array(pushes)[:, len(plan.supports) :].sum(axis=1) @ way).max())
     if membrane.wrinkle_stiffness is not None and most > 0:
         words = (
             f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
@@ -175,17 +268,21 @@ def analyse(
         )
         remarks.append(Note(WRINKLES, words))
     # The other half takes up forces normal to a symmetry plane.
-    force = model.copies * np.array(pushes)[frames] * ~membrane.cavity.symmetric
+    whole = model.copies * ~membrane.cavity.symmetric
+    force = np.array(pushes)[frames] * whole
     reactions: dict[str, Array] = {}
-    for i, body in enumerate((*posts, *collars)):
+    for i, body in enumerate((*plan.supports, *plan.collars)):
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
-    return History(
-        reactions[collars[0].name] @ way, np.array(path)[frames], low, high, reactions,
+    by_collars = np.array([own[len(plan.supports) :].sum(axis=0) for _, own in rates])[frames]
+    history = History(
+        reactions[plan.collars[0].name] @ way, np.array(path)[frames], low, high, reactions,
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
         iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
         remarks=tuple(remarks), early=early, relaxed=membrane.wrinkle_stiffness is not None,
+        load_slope=np.einsum("fik,i->fk", by_collars, whole * way) if beside.each else None,
     )  # fmt: skip
+    return history, np.array([own for own, _ in rates])[frames]
 
 
 class Moving(Loading):
@@ -193,14 +290,12 @@ class Moving(Loading):
 
     most_cuts = 3
 
-    def __init__(
-        self, membrane: ClosedMembrane, bodies: Callable[[float], tuple[RigidCylinder, ...]]
-    ) -> None:
-        self.membrane, self.bodies = membrane, bodies
+    def __init__(self, membrane: ClosedMembrane, move: Callable[[float], None]) -> None:
+        self.membrane, self.move = membrane, move
         self.expected = np.zeros_like(membrane.reference)
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        self.membrane.bodies = self.bodies(level)
+        self.move(level)
         found = self.membrane.equilibrium(start, self.membrane.pressure)
         # Newton's iteration fails where wrinkles come and go, and at a limit load.
         return found if found is not None else settled(self.membrane, start)
@@ -246,16 +341,20 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
 def analyse_inflated(
     membrane: ClosedMembrane, model: InflatedModel, asked: Asked
 ) -> tuple[History, Array]:
-    """Return the history of inflation or bending of a fresh membrane; no derivatives."""
-    if asked.parameters or asked.guess is not None:
-        raise InputError(None, "parameters", "a closed membrane takes no parameters or guess")
+    """Return the history of inflation or bending of a fresh membrane, and derivatives."""
+    if asked.guess is not None:
+        raise InputError(None, "guess", "a closed membrane takes none")
+    beside = Neighbours(membrane, asked.parameters)
     levels = np.array(model.pressures)
     volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
     sides, filling = np.ones(len(model.mesh.quads), dtype=bool), Filling(membrane)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     record = Record(membrane, len(levels))
     membrane.keep_tangent = False
+    rates = np.zeros((*record.path.shape, len(asked.parameters)))
     for i, u in enumerate(march(filling, levels, asked)):
+        beside.follow(membrane, u)
+        rates[i] = beside.slopes(u, beside.moved)
         record.accept(i, u)
         volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
     remarks = tuple(
@@ -271,22 +370,24 @@ def analyse_inflated(
         bent = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
         bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
-        if bent.cords is not None:
-            bent.cords.begin(membrane.reference + record.path[-1])
+        beside.on(bent)
+        for own, u in [(bent, record.path[-1]), *zip(beside.each, beside.moved, strict=True)]:
+            if own.cords is not None:
+                own.cords.begin(own.reference + u)
         bent.iterations = membrane.iterations
         extremes = (record.low, record.high)
         start = (record.path[-1], float(levels[-1]))
-        history = analyse(bent, model, *start, extremes, sides, asked)
-        history = replace(history, remarks=(*remarks, *history.remarks))
-    else:
-        sets = model.mesh.node_sets
-        reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
-        history = History(
-            levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
-            cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
-            wrinkled=wrinkled, remarks=remarks, relaxed=membrane.wrinkle_stiffness is not None,
-        )  # fmt: skip
-    return history, np.zeros((*history.displacement.shape, 0))
+        history, slopes = analyse(bent, model, *start, extremes, sides, asked, beside)
+        return replace(history, remarks=(*remarks, *history.remarks)), slopes
+    sets = model.mesh.node_sets
+    reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
+    history = History(
+        levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
+        cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
+        wrinkled=wrinkled, remarks=remarks, relaxed=membrane.wrinkle_stiffness is not None,
+        load_slope=np.zeros((len(levels), len(beside.each))) if beside.each else None,
+    )  # fmt: skip
+    return history, rates
 
 
 class Filling(Loading):

@@ -1,16 +1,15 @@
 """The embedded membrane solver: it picks the analysis of a model."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from ...errors import InputError, SolverFailure
+from ...errors import InputError
 from ...files import __version__
-from ...materials.law import HypoelasticLaw, law_beside, usual_step
+from ...materials.law import HypoelasticLaw
 from ...materials.responses import bar
 from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
@@ -26,14 +25,10 @@ from .newton import Asked, Membrane
 
 
 class Analysis(NamedTuple):
-    """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results.
-
-    differentiates : else derivatives are differences of whole runs.
-    """
+    """Functions (model, law, tolerance, wall) -> membrane; (membrane, model, asked) -> results."""
 
     prepare: Callable[..., Membrane | strip.Patch | beam.Beam]
     analyse: Callable[..., tuple[History, Array]]
-    differentiates: bool = True
 
 
 #: By class of a model; the wall is None where none was given.
@@ -41,8 +36,8 @@ ANALYSES: dict[type, Analysis] = {
     BubbleModel: Analysis(bubble.prepare, bubble.analyse),
     MeasuredShape: Analysis(bubble.prepare, bubble.balance),
     UniaxialModel: Analysis(strip.prepare, strip.analyse),
-    InflatedModel: Analysis(closed.prepare, bending.analyse_inflated, False),
-    CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder, False),
+    InflatedModel: Analysis(closed.prepare, bending.analyse_inflated),
+    CylinderModel: Analysis(bending.prepare, bending.analyse_cylinder),
     PatchModel: Analysis(strip.prepare_patch, strip.analyse_patch),
     TubeModel: Analysis(strip.prepare_tube, strip.analyse_tube),
     BeamModel: Analysis(beam.prepare, beam.analyse),
@@ -50,8 +45,6 @@ ANALYSES: dict[type, Analysis] = {
 # The bands are too small to share: where another program uses a core, BLAS threads that wait for
 # each other made an analysis 12 to 290 times slower (benchmarks/bench_cost.py analysis).
 BLAS = ThreadpoolController()
-#: Largest change of a modulus in a step of the differences of closed membranes.
-SHARE = 1e-3
 
 
 class MembraneSolver:
@@ -103,8 +96,7 @@ class MembraneSolver:
         """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
 
         The parameters are every entry of the law's beta (per MPa) unless given; those of the model
-        are per unit of theirs. Derivatives of a load are in the history (`load_slope`). Those of
-        closed membranes, whose walls wrinkle and touch, are differences; none by thickness.
+        are per unit of theirs. Derivatives of a load are in the history (`load_slope`).
         """
         known = parameters_of(law, model)
         if parameters is None:
@@ -112,25 +104,7 @@ class MembraneSolver:
         unknown = [name for name in parameters if name not in known]
         if unknown:
             raise InputError(None, "parameters", f"{unknown} not among {known}")
-        if not analysis_of(ANALYSES, model, self.name).differentiates:
-            return self._differences(model, law, parameters)
         return self._analyse(model, law, parameters, guess)
-
-    def _differences(
-        self, model: CylinderModel | InflatedModel, law: HypoelasticLaw, parameters: Sequence[str]
-    ) -> tuple[History, Array]:
-        """Return the history of a closed membrane and its slopes, by differences of whole runs."""
-        here, slopes, loads = self.run(model, law), [], []
-        acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}
-        for name in parameters:
-            step = usual_step(law, name, 1.0, SHARE)
-            # A form may have entries that stay zero.
-            there = self.run(model, law_beside(law, name, step)) if name in acting else here
-            if len(there.load) < len(here.load):
-                raise SolverFailure(there.early, self.name)
-            slopes.append((there.displacement[: len(here.load)] - here.displacement) / step)
-            loads.append((there.load[: len(here.load)] - here.load) / step)
-        return replace(here, load_slope=np.stack(loads, axis=-1)), np.stack(slopes, axis=-1)
 
     @property
     def stress(self) -> Array:
