@@ -183,6 +183,8 @@ PLAIN, BRAID = ("axial", "hoop", "shear"), (
 )  # fmt: skip
 #: m/s^2 of self weight.
 GRAVITY = 9.80665
+#: kg/m^2 beyond which one layer of a fabric is given in g/m^2.
+HEAVIEST = 50.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -286,7 +288,9 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
     }  # fmt: skip
     if isinstance(section, CylinderSection) and beam:
         return _beam(section, shared)
-    usual = RigidSupports()
+    usual, mass = RigidSupports(), own.mass_per_area or 0.0
+    if mass > HEAVIEST:
+        raise place.error("mass_per_area", f"expected kg/m^2, 0.9 for 900 g/m^2; got {mass:g}")
     with place.naming(keys=KEYS):
         collar, saddle = (
             None if one is None else Collar(**one.model_dump(exclude_none=True))
@@ -305,7 +309,7 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
                 own.support_diameter or usual.diameter,
                 saddle,
             ),
-            mass_per_area=own.mass_per_area or 0.0,
+            mass_per_area=mass,
             collar=collar or usual_collar(own.diameter),
             gas=Gas(**own.gas.model_dump(exclude_none=True)),
             reading=curve_reading(own.diameter, own.places, own.slope_over),

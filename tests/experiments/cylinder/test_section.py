@@ -116,6 +116,7 @@ D, P, SOFT = "diameter = 150", "pressure = 90\n", 'name = "soft"'
         (D, "diameter = 280", ["cylinder[0].collar", "inner_diameter"]),
         (P, f"{P}span = 2960\n", ["cylinder[0].span", "fit"]),
         (P, f"{P}seam_width = 300\n", ["cylinder[0].seam_width"]),
+        (P, f"{P}mass_per_area = 900\n", ["cylinder[0].mass_per_area", "kg/m^2"]),
         ('"150 mm, 90 kPa"', '"high"', ["cylinder[1].name", "twice"]),
         (P, P + "collar = { inner_diameter = 140, length = 100 }\n",
          ["cylinder[0].collar.inner_diameter", "150"]),
