@@ -1,13 +1,12 @@
 """Variables of MATLAB's files, version 5 and 7.3, and members of HDF5 files, read with suspicion.
 
 Arrays, text, cell arrays as lists, struct arrays as lists of dicts, by the first index first;
-objects become None. Version 5 is parsed here, after MathWorks' "MAT-File Format": scipy.io 1.17
-crashes or hangs on hostile files (tests/readers/test_hostile_frames.py). HDF5 needs h5py, an extra
-(`pip install "bubblefit[hdf5]"`); nothing outside the file is read.
+objects become None. scipy.io and HDF5 crash or hang on some damaged files: both are tried in a
+process of their own first. HDF5 needs h5py, an extra (`pip install "bubblefit[hdf5]"`); nothing
+outside the file is read.
 """
 
-import struct
-import zlib
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
@@ -15,25 +14,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import Later, content_of, ends, reading
+from ..files import Later, ends, reading
 
 h5py: Any = Later("h5py")
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-#: Within which a file of HDF5 must be read once.
+#: Within which a file must be read once.
 SECONDS = 60.0
 #: Bytes of one array at most, a compressed one's always, and by what it has packed (numbers do
 #: not pack a hundredfold).
 LARGEST, SMALL, RATIO = 2**30, 2**26, 100
 #: Cells and structs within each other; parts of a variable of 7.3, which may refer to each other.
 DEEPEST, MOST_PARTS = 16, 10**5
-_MATRIX, _COMPRESSED = 14, 15
-_DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"}
-_DTYPES |= {12: "i8", 13: "u8", 16: "u1", 17: "u2", 18: "u4"}
-_CELL, _STRUCT, _CHARACTERS, _FIRST_NUMBER, _LAST_NUMBER = 1, 2, 4, 6, 15
 
 
 def is_mat(head: bytes) -> bool:
@@ -43,11 +39,10 @@ def is_mat(head: bytes) -> bool:
 
 def variable_names(path: Path, head: bytes) -> Collection[str] | None:
     """Return the names of the variables; None of a damaged file."""
+    names = _names_73 if head[512:520] == SIGNATURE else _names_5
     try:
-        if head[512:520] == SIGNATURE:
-            check_readable(path, partial(_names_73, path))
-            return _names_73(path)
-        return [name for name, _, _ in _parts_5(path)]
+        check_readable(path, partial(names, path))
+        return names(path)
     except InputError:
         return None
 
@@ -58,17 +53,9 @@ def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
         head = file.read(520)
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
-    if head[512:520] == SIGNATURE:
-        check_readable(path, partial(_variables_73, path, wanted))
-        return _variables_73(path, wanted)
-    found = {}
-    for name, order, body in _parts_5(path, wanted):
-        try:
-            found[name] = MatrixParts(body, order).matrix(0)
-        except (ValueError, struct.error, MemoryError, RecursionError, OverflowError) as error:
-            problem = f"cannot be read; is the file damaged? ({str(error)[:100]})"
-            raise InputError(path, f"variable {name!r}", problem) from None
-    return found
+    read = _variables_73 if head[512:520] == SIGNATURE else _variables_5
+    check_readable(path, partial(read, path, wanted))
+    return read(path, wanted)
 
 
 def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
@@ -80,116 +67,48 @@ def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
     return value.astype(float)
 
 
-def _parts_5(path: Path, wanted: Collection[str] | None = None) -> Iterator[tuple[str, str, bytes]]:
-    """Yield name, byte order and content of the variables, the latter whole where `wanted`."""
+@contextmanager
+def _by_scipy(path: Path) -> Iterator[None]:
+    """Turn the errors of scipy.io, which are of any class, into an InputError."""
     try:
-        content = content_of(path)
-        order = {b"IM": "<", b"MI": ">"}[content[126:128]]
-    except (OSError, KeyError):
-        raise InputError(path, "", "is not a MAT-file; is it damaged?") from None
-    at = 128
-    while at + 8 <= len(content):
-        kind, size = struct.unpack_from(f"{order}II", content, at)
-        body = content[at + 8 : at + 8 + size]
-        at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
-        if len(body) < size:
-            raise InputError(path, "", "ends within a variable; is it damaged?")
-        try:
-            if kind == _COMPRESSED:
-                first = zlib.decompressobj().decompress(body, 4096)
-                name = MatrixParts(first[8:], order).name()
-                if wanted is not None and name in wanted:
-                    whole = zlib.decompressobj()
-                    first = whole.decompress(body, min(LARGEST, max(SMALL, RATIO * size)))
-                    if whole.unconsumed_tail:
-                        raise ValueError(f"{len(first)} bytes and more of {size}")
-                yield name, order, first[8:]
-            elif kind == _MATRIX:
-                name = MatrixParts(body, order).name()
-                yield name, order, body
-        except (ValueError, struct.error, zlib.error) as error:
-            problem = f"holds a variable that cannot be read; is it damaged? ({str(error)[:100]})"
-            raise InputError(path, "", problem) from None
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        why = " ".join(str(error).split())[:100]
+        problem = f"cannot be read as a MAT-file; is it damaged? ({why})"
+        raise InputError(path, "", problem) from None
 
 
-class MatrixParts:
-    """Read the parts of one matrix in turn; ValueError or struct.error where it is damaged."""
+def _names_5(path: Path) -> list[str]:
+    with _by_scipy(path):
+        return [str(name) for name, _, _ in scipy.io.whosmat(path, appendmat=False)]
 
-    def __init__(self, content: bytes, order: str) -> None:
-        self.content, self.order, self.at = content, order, 0
 
-    def name(self) -> str:
-        """Return the variable's name, from the parts before its numbers."""
-        self.part()
-        self.part()
-        return self.part()[1].decode("latin-1")
+def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+    with _by_scipy(path):
+        most = min(LARGEST, max(SMALL, RATIO * path.stat().st_size))
+        for name, shape, _ in scipy.io.whosmat(path, appendmat=False):
+            if name in wanted and 8 * math.prod(shape) > most:
+                problem = f"says {shape} numbers, more than the file holds; is it damaged?"
+                raise InputError(path, f"variable {name!r}", problem)
+        found = scipy.io.loadmat(path, variable_names=[*wanted], appendmat=False)
+        return {name: _plain(found[name], 0) for name in wanted if name in found}
 
-    def part(self) -> tuple[int, bytes]:
-        """Return type and content of the next part."""
-        kind, size = struct.unpack_from(f"{self.order}II", self.content, self.at)
-        if kind >> 16:
-            size, kind, start, step = kind >> 16, kind & 0xFFFF, self.at + 4, 8
-        else:
-            start, step = self.at + 8, 8 + size + -size % 8
-        body = self.content[start : start + size]
-        if len(body) < size:
-            raise ValueError("a part is longer than the variable")
-        self.at += step
-        return kind, body
 
-    def matrix(self, depth: int) -> Any:
-        """Return the value; its name is passed over."""
-        if depth > DEEPEST:
-            raise ValueError("nested too deeply")
-        if not self.content:
-            return np.zeros((0, 0))
-        flags = struct.unpack_from(f"{self.order}I", self.part()[1])[0]
-        kind, logical = flags & 0xFF, bool(flags & 0x200)
-        if kind > _LAST_NUMBER or kind in (3, 5):
-            return None
-        shape = [int(n) for n in np.frombuffer(self.part()[1], f"{self.order}i4")]
-        count = int(np.prod(shape, dtype=object))
-        if len(shape) < 2 or min(shape) < 0:
-            raise ValueError(f"no shape: {shape[:8]}")
-        self.part()
-        if kind == _CELL:
-            return self.several(count, depth)
-        if kind == _STRUCT:
-            return self.structs(count, depth)
-        numbers = self.numbers()
-        if kind == _CHARACTERS:
-            return _text(numbers)
-        if not _FIRST_NUMBER <= kind <= _LAST_NUMBER or numbers.size != count:
-            raise ValueError(f"{numbers.size} numbers for a shape of {shape[:8]}")
-        value = numbers.reshape(shape, order="F")
-        return value != 0 if logical else value
-
-    def numbers(self) -> np.ndarray:
-        """Return the numbers of the next part, flat."""
-        kind, body = self.part()
-        dtype = np.dtype(self.order + _DTYPES[kind]) if kind in _DTYPES else None
-        if dtype is None or len(body) % dtype.itemsize:
-            raise ValueError(f"numbers of an unknown kind {kind}")
-        return np.frombuffer(body, dtype)
-
-    def several(self, count: int, depth: int) -> list[Any]:
-        """Return the next matrices."""
-        if count > (len(self.content) - self.at) // 8:
-            raise ValueError(f"{count} parts in {len(self.content)} bytes")
-        return [MatrixParts(self.part()[1], self.order).matrix(depth + 1) for _ in range(count)]
-
-    def structs(self, count: int, depth: int) -> list[dict[str, Any]]:
-        """Return the elements of a struct array."""
-        (length,) = struct.unpack_from(f"{self.order}i", self.part()[1])
-        text = self.part()[1]
-        if length < 1 or len(text) % length:
-            raise ValueError(f"field names of {length} letters")
-        starts = range(0, len(text), length)
-        names = [text[i : i + length].split(b"\0")[0].decode("latin-1") for i in starts]
-        if not names:
-            return []
-        values = iter(self.several(count * len(names), depth))
-        return [{name: next(values) for name in names} for _ in range(count)]
+def _plain(value: Any, depth: int) -> Any:
+    """Return the value of a variable that scipy.io has read."""
+    own = scipy.io.matlab
+    if not isinstance(value, np.ndarray) or depth > DEEPEST:
+        return None
+    if isinstance(value, (own.MatlabObject, own.MatlabFunction, own.MatlabOpaque)):
+        return None
+    flat, names = value.ravel(order="F"), value.dtype.names
+    if names:
+        return [{name: _plain(one[name], depth + 1) for name in names} for one in flat]
+    if value.dtype == object:
+        return [_plain(one, depth + 1) for one in flat]
+    return "".join(flat) if value.dtype.kind == "U" else value
 
 
 def _names_73(path: Path) -> list[str]:
@@ -249,9 +168,9 @@ def _text(numbers: np.ndarray) -> str:
 
 
 def check_readable(path: Path, read: Callable[[], object]) -> None:
-    """Try a reading, picklable, in another process: HDF5 loops or crashes on some damaged files."""
+    """Try a reading, picklable, in another process: libraries crash on some damaged files."""
     if not ends(read, SECONDS):
-        problem = "cannot be read as HDF5: its library fails on it; is it damaged?"
+        problem = "cannot be read: the library for such files fails on it; is it damaged?"
         raise InputError(path, "", problem)
 
 

@@ -19,7 +19,6 @@ from bubblefit.readers.formats import array_exports as npz_files
 from bubblefit.readers.formats.array_exports import array_names, read_arrays
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.mat_files import (
-    MatrixParts,
     array_of,
     check_readable,
     is_mat,
@@ -73,10 +72,6 @@ def variable(kind: int, shape: list[int], rest: bytes) -> bytes:
     return flags + part(5, struct.pack(f"<{len(shape)}i", *shape)) + name + rest
 
 
-def value(kind: int, shape: list[int], rest: bytes):
-    return MatrixParts(variable(kind, shape, rest), "<").matrix(0)
-
-
 def doubles(*numbers: float) -> bytes:
     return part(9, struct.pack(f"<{len(numbers)}d", *numbers))
 
@@ -86,30 +81,26 @@ def fields(length: int, names: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("kind", "shape", "rest", "words"),
+    ("kind", "shape", "rest"),
     [
-        (1, [2**31 - 1, 2**31 - 1], b"", "parts in"),
-        (1, [1, 3], part(14, b"") * 2, "3 parts in 64 bytes"),
-        (2, [2**31 - 1, 1], fields(8, b"a" * 8), "parts"),
-        (2, [1, 1], fields(0, b"ab"), "field names of 0 letters"),
-        (2, [1, 1], fields(-1, b"ab"), "field names of -1 letters"),
-        (2, [1, 1], fields(3, b"abcd"), "field names of 3 letters"),
-        (6, [3], doubles(1, 2, 3), "no shape: [3]"),
-        (6, [2, -1], doubles(1), "no shape: [2, -1]"),
-        (6, [2, 2], doubles(1, 2, 3), "3 numbers for a shape of [2, 2]"),
-        (6, [2**31 - 1, 2], doubles(0, 0), "2 numbers for a shape"),
-        (6, [1, 3], doubles(1, 2)[:-8], "longer than the variable"),
-        (6, [1, 1], struct.pack("<II", 9, 2**31), "longer than the variable"),
-        (6, [1, 1], part(9, b"\0" * 12), "unknown kind 9"),
-        *[(6, [1, 1], part(n, b"\0" * 8), f"kind {n}") for n in (8, 10, 11, 14, 15, 99)],
+        (1, [2**31 - 1, 2**31 - 1], b""),
+        (1, [1, 3], part(14, b"") * 2),
+        (2, [2**31 - 1, 1], fields(8, b"a" * 8)),
+        (2, [1, 1], fields(0, b"ab")),
+        (6, [2, -1], doubles(1)),
+        (6, [2, 2], doubles(1, 2, 3)),
+        (6, [2**31 - 1, 2], doubles(0, 0)),
+        (6, [1, 3], doubles(1, 2)[:-8]),
+        (6, [1, 1], struct.pack("<II", 9, 2**31)),
+        *[(6, [1, 1], part(n, b"\0" * 8)) for n in (8, 10, 11, 14, 15, 99)],
     ],
 )
-def test_mat_files_that_promise_too_much(tmp_path, kind, shape, rest, words):
+def test_mat_files_that_promise_too_much(tmp_path, kind, shape, rest):
     path, body = tmp_path / "a.mat", variable(kind, shape, rest)
     for content in (mat(body), mat(zlib.compress(part(14, body)), 15)):
         path.write_bytes(content)
         message = complaint(read_variables, path, ["X"])
-        assert words in message and "is the file damaged?" in message
+        assert message.startswith(str(path)) and "is it damaged?" in message
 
 
 def test_a_bomb_in_a_mat_file(tmp_path):
@@ -120,7 +111,8 @@ def test_a_bomb_in_a_mat_file(tmp_path):
     for _ in range(128):
         bomb += packer.compress(b"\0" * 2**20)
     path.write_bytes(mat(bomb + packer.flush(), 15))
-    assert "cannot be read; is it damaged?" in complaint(read_variables, path, ["X"])
+    said = complaint(read_variables, path, ["X"])
+    assert "says (16777216, 1) numbers, more than the file holds" in said
 
 
 def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
@@ -144,7 +136,9 @@ def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path):
 @pytest.mark.parametrize("read", [lambda: time.sleep(60), lambda: os.kill(os.getpid(), 9)])
 def test_what_hdf5_hangs_or_crashes_on_is_refused(tmp_path, monkeypatch, read):
     monkeypatch.setattr(mat_files, "SECONDS", 0.2)
-    assert "its library fails on it" in complaint(check_readable, tmp_path / "a", read)
+    assert "the library for such files fails on it" in complaint(
+        check_readable, tmp_path / "a", read
+    )
     monkeypatch.setattr(mat_files, "SECONDS", 20.0)
     check_readable(tmp_path / "a", lambda: None)
 
@@ -209,13 +203,6 @@ def test_any_dialect_reads_back(
     assert sum(field.dropped.values()) == len(rows) - sum(good)
 
 
-@pytest.mark.parametrize(("kind", "code"), [*enumerate("bBhHiIf", 1), (12, "q"), (13, "Q")])
-def test_every_type_of_numbers(kind, code):
-    body = struct.pack(f"<6{code}", 1, 2, 3, 4, 5, 6)
-    for matrix in (6, 7, 15):  # along the first index first
-        assert value(matrix, [2, 3], part(kind, body)).tolist() == [[1, 3, 5], [2, 4, 6]]
-
-
 def test_files(tmp_path):
     path, body = tmp_path / "a.mat", variable(6, [1, 1], doubles(4))
     path.write_bytes(mat(body))
@@ -223,20 +210,19 @@ def test_files(tmp_path):
     assert is_mat(head) and is_mat(head[:128]) and not is_mat(head[:127])
     assert variable_names(path, head) == ["X"]
     assert read_variables(path, ["X", "Y"])["X"].tolist() == [[4.0]]
-    # What is neither a matrix nor packed is passed over; a size is filled up to eight bytes.
-    other = struct.pack("<II", 7, 5) + b"\0" * 8 + part(14, body.replace(b"X", b"Y")) + b"\0" * 7
-    path.write_bytes(mat(body) + other)
-    assert variable_names(path, head) == ["X", "Y"]
-    assert read_variables(path, ["Y"])["Y"].tolist() == [[4.0]]
-    for content, words in (
-        (mat(body)[:-1], "ends within a variable"), (b"MATLAB 4".ljust(140), "is not a MAT-file;"),
-        (b"x" * 200, "is not a MAT-file of version 5 or 7.3"),
-        (mat(body)[:126] + b"XX" + mat(body)[128:], "is not a MAT-file;"),
-    ):  # fmt: skip
+    for content in (mat(body)[:-1], b"MATLAB 4".ljust(140), mat(body)[:126] + b"XX" + body):
         path.write_bytes(content)
-        assert complaint(read_variables, path, ["X"]).startswith(f"{path}: {words}")
-    path.write_bytes(mat(body)[:-1])
+        assert "is it damaged?" in complaint(read_variables, path, ["X"])
+    path.write_bytes(b"x" * 200)
+    assert "is not a MAT-file of version 5 or 7.3" in complaint(read_variables, path, ["X"])
+    path.write_bytes(mat(body)[:140])
     assert variable_names(path, head) is None
+    savemat(path, {"t": "text", "l": np.array([True, False]), "o": np.array([[1, "a"]], object),
+                   "s": np.array([(1, 2.5), (3, 4.5)], [("a", "i4"), ("b", "f8")])})  # fmt: skip
+    found = read_variables(path, ["t", "l", "o", "s"])
+    assert found["t"] == "text" and found["l"].tolist() == [[1, 0]]
+    assert found["o"][0].tolist() == [[1]] and found["o"][1] == "a"
+    assert [one["b"].item() for one in found["s"]] == [2.5, 4.5]
     path.unlink()
     assert "No such file or directory" in complaint(read_variables, path, ["X"])
     where = {"a": np.array([[True, False]]), "b": "text", "c": np.array(["x"])}
