@@ -30,8 +30,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from .errors import NOTES, BubblefitError, InputError, Note, OutputError, PlugInFailure, rows
 
 if TYPE_CHECKING:
+    import filelock as filelock
     import jinja2
     import pandas as pandas
+    import psutil as psutil
 
 V = TypeVar("V")
 __version__ = "0.2.0"
@@ -255,8 +257,6 @@ def known(value: Any) -> Any:
 
 def remove_unfinished(folder: Path | str) -> None:
     """Remove the temporary files of `replacing` that processes which are gone left in a folder."""
-    import psutil
-
     for path in Path(folder).glob(".*"):
         found = re.fullmatch(r"\..*\.(\d+)(\.[^.]*)?", path.name)
         if found is None or not path.is_file():
@@ -279,7 +279,7 @@ class Later:
 
 
 if not TYPE_CHECKING:
-    pandas = Later("pandas")
+    filelock, pandas, psutil = Later("filelock"), Later("pandas"), Later("psutil")
 
 # Templates
 

@@ -1,7 +1,7 @@
 """Kinds of test by name: the folders beside this file, and those of other distributions."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -21,14 +21,20 @@ NEEDED = ("name", "title", "section", "fitted", "predicted", "studied", "read", 
 warn_once = cache(logging.getLogger(__name__).warning)
 
 
-def kinds() -> Mapping[str, Kind]:
-    """Return every kind by name: ours, those that are fitted first, then those of plug-ins.
+def kind_names() -> tuple[str, ...]:
+    """Return the names of all kinds, ours and then those of plug-ins, importing none."""
+    return names_with(GROUP, _folders())
+
+
+def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:
+    """Return kinds by name, all or some: ours, those that are fitted first, then plug-ins'.
     Plug-ins that do not work are logged and left out."""
-    ours = sorted((kind_named(name) for name in _folders()), key=lambda k: (not k.fitted, k.name))
-    known = {kind.name: kind for kind in ours}
+    chosen = kind_names() if names is None else names
+    ours = [kind_named(name) for name in _folders() if name in chosen]
+    known = {kind.name: kind for kind in sorted(ours, key=lambda k: (not k.fitted, k.name))}
     for plug_in in plug_ins(GROUP):
         try:
-            if plug_in.name not in known:
+            if plug_in.name in chosen and plug_in.name not in known:
                 known[plug_in.name] = kind_named(plug_in.name)
         except PlugInFailure as error:
             warn_once("%s", str(error))
@@ -45,8 +51,7 @@ def kind_named(name: str) -> Kind:
         return made
     plug_in = plug_in_named(GROUP, name)
     if plug_in is None:
-        known = ", ".join(names_with(GROUP, _folders()))
-        raise InputError(None, "kind", f"{name!r} is not one of: {known}")
+        raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
     made = plug_in.load("kind of test", NEEDED)
     return made
 

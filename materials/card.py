@@ -5,6 +5,8 @@ covariance of the free coefficients, and `[certainty.band]`, the ends of the fit
 without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
+from __future__ import annotations
+
 import functools
 import json
 import math
@@ -189,7 +191,7 @@ class MaterialCard:
     ) -> list[Path]:
         """Write the material for another program; InputError: unfit; OutputError: file there."""
         # Formats take cards, and one of them is a solver's own: they are found at run time.
-        formats = import_module("bubblefit.solvers.registry").FORMATS
+        formats = import_module("bubblefit.solvers.exports").FORMATS
         if name not in formats:
             raise InputError(None, "name", f"expected one of {', '.join(formats)}, got {name!r}")
         written: list[Path] = formats[name].write_files(

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ..errors import InputError, check_one_of, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.own import OwnTest
-from ..experiments.registry import kind_named, kinds
+from ..experiments.registry import kind_named, kind_names, kinds
 from ..files import content_of, is_file, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
@@ -298,7 +298,7 @@ class Project:
             if held is not None and Path(file := card.get("file", "")).parent == held.absolute():
                 write_text(data / Path(file).name, Path(file).read_text(encoding="utf-8"))
                 card["file"] = f"{data.name}/{Path(file).name}"
-        for kind in kinds():
+        for kind in kind_names():
             for k, said in enumerate(settings.get(kind, [])):
                 if (own := made[said["name"]]).files:
                     placed = own.placed(data, path.parent)
@@ -418,18 +418,17 @@ class Project:
 
         fitted : only those that a fit can match, or only those that are predicted. InputError.
         """
-        known = kinds()
         names = None if which is None else [which] if isinstance(which, str) else list(which)
         able = [t for t in self.tests.values() if fitted in (None, kind_named(t.kind).fitted)]
         for name in names or ():
-            if name not in self.tests and name not in known:
+            if name not in self.tests and name not in kind_names():
                 problem = f"there is no test {name!r}; the project has: {', '.join(self.tests)}"
                 raise InputError(self.path, "--test", problem)
         tests = tuple(t for t in able if names is None or t.name in names or t.kind in names)
         if not tests:
             kind = {None: "", True: " to be fitted", False: " to be predicted"}[fitted]
             of = "" if names is None else f" among {', '.join(names)}"
-            able_kinds = [f"[[{k.name}]]" for k in known.values() if fitted in (None, k.fitted)]
+            able_kinds = [f"[[{k.name}]]" for k in kinds().values() if fitted in (None, k.fitted)]
             problem = f"the project has no test{kind}{of}; add {' or '.join(able_kinds)}"
             raise InputError(self.path, "", problem)
         return tests
@@ -499,13 +498,14 @@ def _tests(
     tests: dict[str, Test] = {}
     said, whole = dict[str, Settings](), dict[str, Settings]()
     objects: dict[str, Definition] = {}
-    names = [name for kind in kinds() for name in _names(kind, file.tests(kind))]
+    present = kinds([kind for kind in kind_names() if file.tests(kind)])
+    names = [name for kind in present for name in _names(kind, file.tests(kind))]
     if isinstance(data, Mapping):
         for name in data:
             if name not in names:
                 problem = f"there is no test {name!r}; the project has: {', '.join(names)}"
                 raise InputError(place.path, "--data", problem)
-    for name, kind in kinds().items():
+    for name, kind in present.items():
         sections = file.tests(name)
         for i, (section, own) in enumerate(zip(sections, _names(name, sections), strict=True)):
             folder = data.get(own) if isinstance(data, Mapping) else data
@@ -521,7 +521,7 @@ def _tests(
         given = [one for one in made if one.kind == name]
         objects |= dict(zip(_names(name, sections), given, strict=bool(made)))
     if isinstance(data, Path) and not any(map(_reads, tests.values())):
-        at = next((f"{k}[0].data" for k in kinds() if file.tests(k)), "data")
+        at = next((f"{kind}[0].data" for kind in present), "data")
         raise InputError(place.path, at, NO_FILES)
     common = {name: getattr(file, name).model_dump() for name in ("fabric", "units")}
     cards = [card.model_dump(exclude_none=True) for card in file.card]

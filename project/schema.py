@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from ..errors import InputError
 from ..experiments.kinds import Place
-from ..experiments.registry import kind_named, kinds
+from ..experiments.registry import kind_named, kind_names, kinds
 from ..files import TEMPLATES, plug_in_named, plug_ins, toml_of
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
@@ -148,7 +148,7 @@ class FitSection(Section):
     coarse_to_fine: bool = False
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
-    unknowns: UnknownsSection = UnknownsSection()
+    unknowns: UnknownsSection = UnknownsSection.model_construct()
     mesh_error: Literal["told", "taken out"] = "taken out"
     cache: bool | Name = True
 
@@ -191,9 +191,9 @@ class ProjectFile(Section):
     """A whole project file; its subclass from `project_file` has a list of tests a kind."""
 
     fabric: FabricSection
-    units: UnitsSection = UnitsSection()
-    law: LawSection = LawSection()
-    fit: FitSection = FitSection()
+    units: UnitsSection = UnitsSection.model_construct()
+    law: LawSection = LawSection.model_construct()
+    fit: FitSection = FitSection.model_construct()
     card: Annotated[list[CardSection], Field(max_length=MANY, default_factory=list)]
     solver: Annotated[dict[str, dict[str, Any]], Field(default_factory=dict)]
 
@@ -203,13 +203,14 @@ class ProjectFile(Section):
 
 
 @functools.cache
-def project_file() -> type[ProjectFile]:
-    """Return the model with the sections of all kinds that are there."""
-    several, tests = Field(max_length=MANY), dict[str, Any]()
-    for name, kind in kinds().items():
-        section: Any = kind.section
-        tests[name] = Annotated[list[section], several], []
-    tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in kinds()}
+def project_file(names: frozenset[str]) -> type[ProjectFile]:
+    """Return the model of a file with tests of these kinds; of others it knows the names only."""
+    several, tests, known = Field(max_length=MANY), dict[str, Any](), kinds(names)
+    for name in kind_names():
+        if name in known or name not in names:  # else a plug-in that does not work
+            section: Any = known[name].section if name in known else dict[str, Any]
+            tests[name] = Annotated[list[section], several], []
+    tables: dict[str, Any] = {name: (dict[str, Any], {}) for name in tests}
     defaults = create_model("Defaults", **tables)
     return create_model("Project", __base__=ProjectFile, defaults=(defaults, defaults()), **tests)
 
@@ -220,7 +221,7 @@ def validated(content: Mapping[str, Any], path: Path) -> ProjectFile:
     test."""
     if isinstance(content.get("project"), dict) and "kind" in content["project"]:
         raise InputError(path, "project.kind", OLD)
-    model = project_file()
+    model = project_file(frozenset(content.keys() & kind_names()))
     for name in content.keys() - model.model_fields.keys():
         if plug_in_named("bubblefit.tests", name) is not None:
             kind_named(name)  # says why it is not among the model's
@@ -268,7 +269,7 @@ REFERENCE = re.compile(r'"#/\$defs/([^"]+)"')
 def project_schema(with_plug_ins: bool = True) -> dict[str, Any]:
     """Return the schema of a whole file, as plain data.
     A test may have its keys from [defaults.KIND], so that none is required here."""
-    schema = project_file().model_json_schema()
+    schema = project_file(frozenset(kind_names())).model_json_schema()
     definitions, properties = schema["$defs"], schema["properties"]
     theirs = set() if with_plug_ins else {one.name for one in plug_ins("bubblefit.tests")}
     own = [name for name in kinds() if name not in theirs]

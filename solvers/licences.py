@@ -18,9 +18,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from filelock import lock_descriptor
-
 from ..errors import BubblefitError, InputError, LicenceDenied, SolverFailure
+from ..files import filelock
 from . import base
 from .process import CONNECT_S, check_wanted, dask, kept_open
 from .scratch import remove
@@ -161,7 +160,7 @@ def _any(place: Path, name: str, count: int) -> int | None:
         file = _opened(path)
         try:
             # A file that was tidied away meanwhile is not the one of that name now.
-            if lock_descriptor(file, blocking=False) and os.path.samestat(
+            if filelock.lock_descriptor(file, blocking=False) and os.path.samestat(
                 os.fstat(file), os.lstat(path)
             ):
                 with suppress(OSError, TypeError):

@@ -1,5 +1,7 @@
 """Other processes: programs in a group of their own, with a log and no orphans, and Dask's."""
 
+from __future__ import annotations
+
 import logging
 import math
 import os
@@ -14,10 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-import psutil
-
 from ..errors import InputError
-from ..files import given
+from ..files import given, psutil
 
 T = TypeVar("T")
 #: Open files that programs inherit, and whether anybody still wants what they compute.

@@ -12,13 +12,10 @@ from pydantic import ValidationError
 
 from ..errors import BubblefitError, InputError, PlugInFailure, SolverFailure
 from ..files import Group, PlugIn, names_with, plug_in_named, plug_ins
-from ..materials.exports import curves, designers, subroutines
-from ..materials.exports.base import CSV, Format
 from ..readers.sections import first_error
 from .bars import TOLERANCE, difference, strip_stresses
 from .base import Diagnosis, Solver, SolverCheck
 from .calculix.executable import OFFER as CALCULIX
-from .calculix.library import FORMAT
 from .licences import licensed
 from .marc.settings import OFFER as MARC
 from .membrane.settings import OFFER as MEMBRANE
@@ -38,14 +35,6 @@ GROUP: Group = "bubblefit.solvers"
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
     "calculix": CALCULIX, "marc": MARC, "membrane": MEMBRANE
-}  # fmt: skip
-#: Every format in which a card can be exported.
-FORMATS: Mapping[str, Format] = {
-    each.name: each
-    for each in (
-        subroutines.NLELAST, subroutines.HYPELA2, subroutines.UMAT, curves.FABRIC, curves.MAT34,
-        curves.LAW58, *designers.FORMATS, CSV, FORMAT,
-    )
 }  # fmt: skip
 #: Attributes of a solver.
 NEEDED = ("name", "external", "progress", "identity", "run", "check")

@@ -18,10 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-import psutil
-from filelock import lock_descriptor
-
 from ..errors import OutputError, SolverFailure
+from ..files import filelock, psutil
 from .process import log_tail
 
 log = logging.getLogger(__name__)
@@ -175,7 +173,7 @@ def claim(folder: Path) -> int | None:
     try:
         number = os.open(folder / OWNER, os.O_RDWR | os.O_CREAT, 0o600)
         with suppress(OSError):  # a file system without locks: the process's number will do
-            lock_descriptor(number, blocking=False)
+            filelock.lock_descriptor(number, blocking=False)
         os.write(number, "\n".join(_self()).encode())
     except OSError as error:
         log.info("%s: its owner cannot be written: %s", folder, error.strerror)
@@ -233,7 +231,7 @@ def _left(folder: Path) -> bool:
         return False
     try:
         with suppress(OSError):  # no locks here
-            if not lock_descriptor(number, blocking=False):
+            if not filelock.lock_descriptor(number, blocking=False):
                 return False
         said = os.read(number, 1000).decode(errors="replace").split("\n")
     finally:

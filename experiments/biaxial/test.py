@@ -299,7 +299,7 @@ class TablesSection(Section):
     files: Annotated[list[str] | dict[str, list[str]], BeforeValidator(_files)]
     folder: str = ""
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection()
+    columns: ColumnsSection = ColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     strain_unit: StrainUnit | None = None
     decimal: Literal[".", ","] | None = None

@@ -120,8 +120,8 @@ class LogSection(sections.Section):
     format: str | None = None
     comment: str = "#"
     decimal: Literal[".", ","] | None = None
-    pressure: ChannelSection = ChannelSection()
-    time: ChannelSection = ChannelSection()
+    pressure: ChannelSection = ChannelSection.model_construct()
+    time: ChannelSection = ChannelSection.model_construct()
     rate: sections.Positive | None = None
     times: Name | None = None
     times_column: Name | None = None
@@ -327,7 +327,7 @@ class PointsSection(sections.Section):
     folder: str = ""
     reference: Name | None = None
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection()
+    columns: ColumnsSection = ColumnsSection.model_construct()
     flag_column: str | None = None
     valid_column: str | None = None
     decimal: Literal[".", ","] | None = None
@@ -338,7 +338,7 @@ class PointsSection(sections.Section):
     pressure: PressureSection | None = None
     registration: RegistrationSection | None = None
     filter: FilterSection | None = None
-    correlation: CorrelationSection = CorrelationSection()
+    correlation: CorrelationSection = CorrelationSection.model_construct()
 
 
 class DataSection(sections.Section):
@@ -382,7 +382,7 @@ class BubbleSection(sections.Section):
     generator: Literal["blocks", "gmsh"] = "blocks"
     objective: Literal["e", "mm"] = "e"
     noise: sections.Length | None = None
-    match: MatchSection = MatchSection()
-    nuisance: NuisanceSection = NuisanceSection()
-    sheet: SheetSection = SheetSection()
+    match: MatchSection = MatchSection.model_construct()
+    nuisance: NuisanceSection = NuisanceSection.model_construct()
+    sheet: SheetSection = SheetSection.model_construct()
     data: DataSection

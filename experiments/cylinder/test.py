@@ -115,8 +115,8 @@ class MeasuredSection(Section):
     files: FileNames | None = None
     folder: str = ""
     format: str | None = None
-    deflection: ChannelSection = ChannelSection()
-    load: ChannelSection = ChannelSection()
+    deflection: ChannelSection = ChannelSection.model_construct()
+    load: ChannelSection = ChannelSection.model_construct()
     repetition: str | None = None
     preload: Number = 0.0
     zero: Literal["none", "first", "line"] = "none"
@@ -146,8 +146,8 @@ class BentSection(Section):
     places: Lengths | None = None
     slope_over: Length | None = None
     cap_warp: Literal["x", "y"] = "x"
-    gas: GasSection = GasSection()
-    measured: MeasuredSection = MeasuredSection()
+    gas: GasSection = GasSection.model_construct()
+    measured: MeasuredSection = MeasuredSection.model_construct()
 
 
 class CylinderSection(BentSection):

@@ -84,7 +84,7 @@ class CurvesSection(Section):
     files: Annotated[list[str] | FilesSection | None, BeforeValidator(_files)] = None
     folder: str = ""
     format: str | None = None
-    columns: ColumnsSection = ColumnsSection()
+    columns: ColumnsSection = ColumnsSection.model_construct()
     load_unit: LoadUnit | None = None
     length_unit: LengthUnit | None = None
     decimal: Literal[".", ","] | None = None
@@ -122,7 +122,7 @@ class StripsSection(Section):
     match: Match = "polynomial"
     objective: Unit = "N"
     weight: Weight = 1.0
-    weights: WeightsSection = WeightsSection()
+    weights: WeightsSection = WeightsSection.model_construct()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,7 +24,7 @@ from bubblefit.materials.forms.base import COMPONENTS, UNLIMITED, form_named
 from bubblefit.materials.forms.polynomial import CONSTANT, LoadRatio
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.exports import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays

@@ -23,7 +23,7 @@ from bubblefit.materials.designers import (
 from bubblefit.materials.exports.curves import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response, trellis_curve, uniaxial_curve
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.exports import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -31,7 +31,7 @@ from bubblefit.materials.responses import (
     uniaxial_curve,
 )
 from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
-from bubblefit.solvers.registry import FORMATS
+from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -16,7 +16,8 @@ from bubblefit.materials.memory import Memory
 from bubblefit.materials.point_law import RIGHT, load_angle
 from bubblefit.materials.responses import bar, biaxial_response, closed_path, piece_constants
 from bubblefit.solvers.base import check_carries
-from bubblefit.solvers.registry import FORMATS, solver_named
+from bubblefit.solvers.exports import FORMATS
+from bubblefit.solvers.registry import solver_named
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad

@@ -15,6 +15,7 @@ from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.meshes.tube import Refinement, cylinder_mesh
+from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.marc.cylinder import (
     ABOVE,
     BELOW,
@@ -26,7 +27,6 @@ from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
 from bubblefit.solvers.marc.sheets import analyse_bubble, bubble_deck, strip_deck
 from bubblefit.solvers.marc.solver import MarcSolver
-from bubblefit.solvers.registry import FORMATS
 from hypothesis import given
 from hypothesis import strategies as st
 

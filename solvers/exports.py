@@ -1,0 +1,16 @@
+"""Formats of other programs in which a card can be exported, by name."""
+
+from collections.abc import Mapping
+
+from ..materials.exports import curves, designers, subroutines
+from ..materials.exports.base import CSV, Format
+from .calculix.library import FORMAT
+
+#: Here, not in `materials/`, because the one for CalculiX is its solver's own.
+FORMATS: Mapping[str, Format] = {
+    each.name: each
+    for each in (
+        subroutines.NLELAST, subroutines.HYPELA2, subroutines.UMAT, curves.FABRIC, curves.MAT34,
+        curves.LAW58, *designers.FORMATS, CSV, FORMAT,
+    )
+}  # fmt: skip
