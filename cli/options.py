@@ -1,4 +1,4 @@
-"""What several commands share: arguments and options, objects made of them, and progress.
+"""Arguments and options of several commands, the objects made of them, and progress.
 
 Progress is a live line on a terminal, a plain line a minute elsewhere, and events for machines.
 """

@@ -195,7 +195,7 @@ class FitProblem:
 
 @dataclass(eq=False)
 class WeightedProblem(FitProblem):
-    """The same comparisons and unknowns with every residual multiplied by a factor, (m,)."""
+    """Comparisons and unknowns of a problem, with every residual multiplied by a factor, (m,)."""
 
     factors: Array = field(default_factory=lambda: np.empty(0))
 

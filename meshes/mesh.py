@@ -206,7 +206,7 @@ def volume_and_gradient(
 
 @compiled()
 def _enclosed(points, quads, values, slopes, weight, origin, gradient):  # type: ignore[no-untyped-def]
-    """Volume; adds its derivative to `gradient` (n, 3). All Gauss weights are one."""
+    """Return the volume; add its derivative to `gradient` (n, 3). All Gauss weights are one."""
     volume = 0.0
     x, a, normal = np.empty((4, 3)), np.empty((2, 3)), np.empty(3)
     for e in range(quads.shape[0]):

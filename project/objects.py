@@ -109,7 +109,7 @@ class Registration(Keys):
 
 
 class Law(Keys):
-    """The form of the moduli, and between what they are looked for: the keys of [law].
+    """The form of the moduli, and their bounds: the keys of [law].
 
     form : a name, or a class or an object of one's own. bounds : [least, largest] of E1, E2 and G12
     in MPa, those of coated fabrics unless given. Keywords beside nu12, strain_range, margin and

@@ -103,7 +103,7 @@ class MemorySection(Section):
 
 
 class LawSection(Section):
-    """[law]: the form of the moduli, and between what they are looked for.
+    """[law]: the form of the moduli, and their bounds.
     Keys beyond these belong to a form (knots, breaks); it checks them."""
 
     model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
@@ -119,7 +119,7 @@ class LawSection(Section):
 
 
 class UnknownSection(Section):
-    """[fit.unknowns.NAME]: between what it is looked for, and what is known of it before."""
+    """[fit.unknowns.NAME]: bounds of an unknown, and the standard deviation of its prior."""
 
     bounds: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     prior: Positive | None = None
@@ -133,7 +133,7 @@ class UnknownsSection(Section):
 
 
 class FitSection(Section):
-    """[fit]: how it is looked for."""
+    """[fit]: starts, method and solver of a fit."""
 
     starts: Annotated[int, Field(ge=1)] = 50
     seed: Annotated[int, Field(ge=0)] = 1

@@ -181,7 +181,7 @@ def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a test was: rate of strain on loading, 1/s, and longest hold, s; NaN: not known."""
+    """The pace of a test: rate of strain on loading, 1/s, and longest hold, s; NaN: not known."""
 
     rate: float = math.nan
     hold: float = math.nan

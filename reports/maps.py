@@ -42,7 +42,7 @@ class Packed:
 
     @property
     def values(self) -> Array:
-        """The array, within half a `step`; raises ValueError: data damaged, or of another shape."""
+        """Return the array, within half a `step`; ValueError: damaged, or of another shape."""
         count = prod(self.shape)
         try:
             # One byte more than expected shows longer data, which are not unpacked.

@@ -95,36 +95,36 @@ class Bootstrap(Presented):
 
     @property
     def strains(self) -> dict[str, Array]:
-        """Strains (n,) by modulus, up to those that the tests reached."""
+        """Return strains (n,) by modulus, up to those that the tests reached."""
         valid = self.found.best.valid
         return {name: np.linspace(0.0, valid[c], PLACES) for name, c in COMPONENTS.items()}
 
     @cached_property
     def unknowns(self) -> Array:
-        """Unknowns of the optimiser, (samples, count)."""
+        """Return the unknowns of the optimiser, (samples, count)."""
         return np.array([sample.unknowns for sample in self.samples])
 
     @cached_property
     def moduli(self) -> dict[str, Array]:
-        """Moduli of the samples, MPa (samples, n) by name."""
+        """Return the moduli of the samples, MPa (samples, n) by name."""
         own = self.found.problem.unknowns
         each = [moduli_of(own, y, self.strains) for y in self.unknowns]
         return {name: np.array([one[name] for one in each]) for name in COMPONENTS}
 
     @cached_property
     def bands(self) -> dict[str, Array]:
-        """Percentiles of the moduli, MPa (2, n) by name."""
+        """Return percentiles of the moduli, MPa (2, n) by name."""
         ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
         return {name: np.quantile(own, ends, axis=0) for name, own in self.moduli.items()}
 
     @cached_property
     def of_fit(self) -> dict[str, Array]:
-        """The fit's own bands by the noise alone, MPa (2, n) by modulus."""
+        """Return the fit's own bands by the noise alone, MPa (2, n) by modulus."""
         return bands_of(self.found.posterior, self.found.best.law, self.strains)
 
     @cached_property
     def sigma(self) -> dict[str, tuple[float, float]]:
-        """1 sigma of samples and fit by modulus, relative, root mean square along its strain."""
+        """Return relative 1 sigma of samples and fit by modulus, RMS along its strain."""
         spread, first, sure = {}, {}, self.found.sure
         for name, own in self.moduli.items():
             best = self.found.best.law.modulus(name, self.strains[name])

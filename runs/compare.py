@@ -174,7 +174,7 @@ class FormFit:
 
     @property
     def rms(self) -> dict[str, float]:
-        """Error of the fit to all points, by comparison, in its unit."""
+        """Return the error of the fit to all points, by comparison, in its unit."""
         every = errors(self.fit.problem, self.fit.best.point.residual)
         return {name: rms for name, rms in every.items() if name in self.compared}
 
@@ -224,7 +224,7 @@ class LawComparison(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json, with the simplest form that is as good as the best."""
+        """Return the content of result.json, with the simplest form that is as good as the best."""
         forms, first = self.forms, self.forms[0]
         whole = [f for f in forms if math.isfinite(f.validated)]
         best = min(whole, key=lambda f: f.validated, default=None)

@@ -80,7 +80,7 @@ class Prospect:
 
     @property
     def summary(self) -> dict[str, float]:
-        """Root mean square of sigma along the strain, by modulus."""
+        """Return the root mean square of sigma along the strain, by modulus."""
         return summary(self.sigma)
 
     def value(self, rank: str) -> float:
@@ -112,13 +112,13 @@ class Plan(Presented):
 
     @property
     def criterion(self) -> str:
-        """The quantity that candidates are ranked by, in words."""
+        """Return the quantity that candidates are ranked by, in words."""
         of = "the least certain modulus" if self.rank == WORST else self.rank
         return f"1 sigma of {of}, root of the mean square along its strain"
 
     @property
     def strains(self) -> dict[str, Array]:
-        """Strains (3,) by modulus at which moduli are listed."""
+        """Return strains (3,) by modulus at which moduli are listed."""
         return {n: np.array(SHARES) * float(self.ends[c]) for n, c in COMPONENTS.items()}
 
     def at(self, test: Prospect) -> dict[str, list[float]]:
@@ -192,7 +192,7 @@ class Present:
 
     @property
     def information(self) -> Array:
-        """Fisher information of all comparisons, (n, n)."""
+        """Return the Fisher information of all comparisons, (n, n)."""
         unknowns, point = self.problem.unknowns, self.point
         assert point.jacobian is not None
         whole = np.zeros((unknowns.size, unknowns.size))

@@ -46,7 +46,7 @@ class Ratios:
 
     @property
     def spread(self) -> tuple[float, float]:
-        """Lowest and highest `to_base`, less one; NaN where no run ended."""
+        """Return the lowest and highest `to_base`, less one; NaN where no run ended."""
         known = self.to_base[np.isfinite(self.to_base)]
         return (float(known.min() - 1), float(known.max() - 1)) if len(known) else (np.nan, np.nan)
 
@@ -81,7 +81,7 @@ class Nu12Study(Presented):
 
     @property
     def response(self) -> str:
-        """Names of the kinds of responses, of all parts."""
+        """Return the names of the kinds of responses, of all parts."""
         return " or ".join(dict.fromkeys(part.response for part in self.parts.values()))
 
     @property

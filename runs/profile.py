@@ -71,7 +71,7 @@ class Profile:
 
     @property
     def ends(self) -> tuple[float | None, float | None]:
-        """Ends of the interval; None where the threshold is not passed."""
+        """Return the ends of the interval; None where the threshold is not passed."""
         return self.below.end, self.above.end
 
     @property
@@ -80,7 +80,7 @@ class Profile:
 
     @property
     def asymmetry(self) -> float | None:
-        """Distance of the upper end over that of the lower one; None where one is missing."""
+        """Return the distance of the upper end over that of the lower one, or None without both."""
         low, high = self.ends
         if low is None or high is None or not low < self.best < high:
             return None
@@ -88,7 +88,7 @@ class Profile:
 
     @property
     def curve(self) -> tuple[list[float], list[float]]:
-        """Moduli (MPa), rising, and -2 log L there."""
+        """Return moduli (MPa), rising, and -2 log L there."""
         values = [*self.below.values[:0:-1], *self.above.values]
         return values, [*self.below.ratios[:0:-1], *self.above.ratios]
 
@@ -110,12 +110,12 @@ class Profile:
 
     @property
     def open_sides(self) -> dict[str, Side]:
-        """The sides without an end."""
+        """Return the sides without an end."""
         return {k: one for k, one in (("below", self.below), ("above", self.above)) if one.why}
 
     @property
     def notes(self) -> list[Note]:
-        """Notes on sides without an end, or on a better optimum."""
+        """Return notes on sides without an end, or on a better optimum."""
         notes = []
         for word, side in self.open_sides.items():
             ratio = f"{round(side.ratios[-1], 3) + 0.0:.2g} of {THRESHOLD:.3g}"

@@ -165,7 +165,7 @@ class Refinement(Presented):
 
     @property
     def result(self) -> dict[str, Any]:
-        """The content of result.json: cost and values of each level, orders and limits."""
+        """Return the content of result.json: cost and values of each level, orders and limits."""
         return {
             "command": "study mesh", "project": str(self.project.path),
             "card": self.card,

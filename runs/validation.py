@@ -208,7 +208,7 @@ class Part:
 
     @property
     def alone(self) -> Masks:
-        """Points of the part itself."""
+        """Return the points of the part itself."""
         return {name: ~mask for name, mask in self.masks.items()}
 
 

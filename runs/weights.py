@@ -100,7 +100,7 @@ class WeightStudy(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        """Fits that failed, then the notes of the one at the project's weights."""
+        """Return fits that failed, then the notes of the one at the project's weights."""
         failed = [
             Note(FAILED, run.failure, f"weight times {run.count:.3g}")
             for run in self.runs

@@ -230,7 +230,7 @@ def _cache_in(folder: Path) -> RunCache:
 
 
 class Damaged(ValueError):
-    """Bytes that are not those that were written."""
+    """Bytes that differ from those that were written."""
 
 
 def to_bytes(history: base.History, key: str, seconds: float) -> bytes:

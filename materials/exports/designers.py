@@ -49,7 +49,7 @@ def _yarn(what: str, yarn: str, least: float | None = None) -> Any:
 
 @dataclass(frozen=True)
 class SheetOptions(ConstantsOptions):
-    """What a design program wants beside the stiffness; the card knows neither."""
+    """Numbers that a design program needs beside the stiffness; a card has neither."""
 
     prestress_warp: float | None = _yarn("kN/m, prestress", "warp", least=0)
     prestress_fill: float | None = _yarn("kN/m, prestress", "fill", least=0)

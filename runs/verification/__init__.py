@@ -237,7 +237,7 @@ class Verification:
 
     @property
     def result(self) -> dict[str, Any]:
-        """All numbers in plain values, as the command prints them with --json."""
+        """Return all numbers as plain values, as the command prints them with --json."""
         rows = [
             {"subject": s, **one.row} for s, several in self.subjects.items() for one in several
         ]

@@ -53,13 +53,13 @@ class Number:
 
     @property
     def deviation(self) -> float:
-        """Ours less theirs, relative to theirs, or in `unit` where `absolute`."""
+        """Return ours less theirs, relative to theirs, or in `unit` where `absolute`."""
         off = self.ours - self.theirs
         return off if self.absolute else off / abs(self.theirs)
 
     @property
     def met(self) -> bool:
-        """True where the deviation is allowed; NaN is not."""
+        """Return True where the deviation is allowed; NaN is not."""
         return abs(self.deviation) <= self.allowed
 
     @property
