@@ -572,7 +572,7 @@ def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
 
 REASONS = {
     ABOVE_NOISE: "the noise is given too small, or model or data are off by more than "
-    "noise, and the uncertainty reckons with what is left as if it were noise",
-    BELOW_NOISE: "the noise is given too large, and the uncertainty, which reckons with "
+    "noise, and the uncertainty counts all of the residual as noise",
+    BELOW_NOISE: "the noise is given too large, and the uncertainty, which follows from "
     "it, is larger than the data say",
 }

@@ -114,9 +114,9 @@ def convergence(sizes: Sequence[float], values: Sequence[float], noise: float = 
         previous = observed_order(h[-4:-1], changes[-3:-1])
     remark = ""
     if len(f) == 3:
-        remark = "one order only: one more level would tell whether it holds"
+        remark = "one order only: one more level would show whether it holds"
     elif previous is None:
-        remark = "one order only, a level coarser there is none: one more level would tell"
+        remark = "one order only, none from coarser levels: one more would show whether it holds"
     elif abs(previous - order) > STEADY:
         remark = f"the order still moves (from {previous:.2g}): the limit is a guess"
     return Convergence(order, limit, previous, remark)

@@ -70,7 +70,7 @@ class BiaxialEvaluation:
                     "options are meant wherever the constants are given"
                 )
                 found.append(Note(UNCERTAIN, words, self.test))
-        words = f"{self.test} pulls along the yarns only: it says nothing of the shear stiffness"
+        words = f"{self.test} pulls along the yarns only: it says nothing about the shear stiffness"
         return [*found, Note(UNMATCHED, words)]
 
     @property
