@@ -202,7 +202,7 @@ def beam_charts(
     close = Chart(f"at the {bodies.name}", *axes, side, f"the bent beam at the {bodies.name}",
                   x_range=(at - reach, at + reach), y_range=(middle - tall, middle + tall),
                   **scale)  # fmt: skip
-    return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=1)
+    return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=2)
 
 
 def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
