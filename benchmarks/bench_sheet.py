@@ -26,12 +26,13 @@ WAYS = {
     "measured surface and rim": f"{SURFACE}\n{RIM}",
     "and slack": f"{SURFACE}\n{RIM}\nslack = true",
     "modes, rim, slack": f"{MODES}\n{RIM}\nslack = true",
+    "modes, rim, metric": f"{MODES}\n{RIM}\nmetric = 6",
 }
 #: MPa at rest and at a strain of 0.06: G12 stays, E2 falls, E1 falls more.
 MODULI, STEP = np.array([12.0, 12.0, 220.0, 196.0, 300.0, 228.0]), 0.01
 
 
-def surfaces(elements=112, *ways, data=0):
+def surfaces(elements=112, *ways, data=0, seen=1.0):
     """Fit a computed uneven test on ELEMENTS quads in each of WAYS of [bubble.sheet].
 
     Six points at each node of the fit's mesh, or about as many at the nodes of another, --data.
@@ -39,7 +40,7 @@ def surfaces(elements=112, *ways, data=0):
     repeats = max(1, round(6 * elements / data)) if data else 6
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        truth = write_test(folder, Uneven(repeats=repeats), PRESSURES, data or elements)
+        truth = write_test(folder, Uneven(repeats=repeats, seen=seen), PRESSURES, data or elements)
         z = truth.mesh.points[:, 2]
         print(f"z0 from {z.min():.2f} to {z.max():.2f} mm; errors of the moduli between a fifth of "
               "the strain reached and all of it")  # fmt: skip
@@ -112,7 +113,8 @@ class Uneven:
     """What is wrong with the sheet, and with the measurement.
 
     height, rim : mm, scale of the surface, largest motion of the rim. slack : share of the
-    stress-free length. noise : mm, of every number. repeats : points at every node.
+    stress-free length. noise : mm, of every number. repeats : points at every node. seen : share of
+    the stress-free surface's heights that the picture has.
     """
 
     height: float = 4.0
@@ -120,6 +122,7 @@ class Uneven:
     rim: float = 2.0
     noise: float = 0.05
     repeats: int = 1
+    seen: float = 1.0
 
 
 def model(what, pressures, elements):
@@ -154,10 +157,11 @@ def write_test(folder, what, pressures, elements):
     def seen(values):
         return values + what.noise * random.standard_normal(values.shape)
 
-    heights = 612.0 + seen(np.repeat(nodes[:, 2:], what.repeats, axis=0))
+    heights = 612.0 + seen(np.repeat(what.seen * nodes[:, 2:], what.repeats, axis=0))
+    hidden = np.outer((1.0 - what.seen) * nodes[:, 2], [0.0, 0.0, 1.0])
     places = np.repeat(nodes[:, :2], what.repeats, axis=0)
     for k, displacement in enumerate(history.displacement):
-        moved = seen(np.repeat(displacement, what.repeats, axis=0))
+        moved = seen(np.repeat(displacement + hidden, what.repeats, axis=0))
         table = np.hstack([places, heights, moved])
         path = folder / f"t_{k:02d}.csv"
         np.savetxt(path, table, "%.7f", ",", header="x,y,z,dx,dy,dz", comments="")

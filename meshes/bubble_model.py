@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .mesh import Array, Mesh, keep_levels, places_of
+from .mesh import GAUSS_VALUES, Array, Mesh, keep_levels, places_of
 
 THICKNESS = "thickness"
 
@@ -59,8 +59,9 @@ class BubbleModel:
     mesh : mm; warp is x, fill is y, z the reference surface. pressures : MPa: the frames.
     increments : MPa, containing every pressure: steps of the law. supports : degrees of freedom
     held at zero, by node set. modes : (nodes,) each: shapes by which the surface can be raised.
-    slack : how much longer the stress-free sheet is along x and y. rim_motion : (increments, rim
-    nodes, 3) mm, or None.
+    slack : how much longer the stress-free sheet is along x and y. strain : (nodes, 3) of its yarns
+    (warp, fill, engineering shear) beside `stress_free`, None for none; strains : (nodes, 3) each,
+    ways to change it. rim_motion : (increments, rim nodes, 3) mm, or None.
     """
 
     mesh: Mesh
@@ -70,6 +71,8 @@ class BubbleModel:
     supports: Mapping[str, tuple[int, ...]] = field(default_factory=lambda: RIM_AND_SYMMETRY)
     modes: Mapping[str, Array] = field(default_factory=dict)
     slack: tuple[float, float] = (0.0, 0.0)
+    strain: Array | None = None
+    strains: Mapping[str, Array] = field(default_factory=dict)
     rim_motion: Array | None = None
     unloaded: bool = field(default=False, kw_only=True)
 
@@ -105,7 +108,7 @@ class BubbleModel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        return (PRESSURE_OFFSET, THICKNESS, *SLACK, TURN, *self.modes)
+        return (PRESSURE_OFFSET, THICKNESS, *SLACK, TURN, *self.modes, *self.strains)
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         """Return the model with `values` added to its `parameters`; itself where all are zero."""
@@ -114,6 +117,8 @@ class BubbleModel:
         points = np.array(self.mesh.points, dtype=float)
         for name, mode in self.modes.items():
             points[:, 2] += values.get(name, 0.0) * mode
+        strained = [values[name] * way for name, way in self.strains.items() if name in values]
+        strain = sum(strained, 0.0 if self.strain is None else self.strain) if strained else None
         offset = values.get(PRESSURE_OFFSET, 0.0)
         warp, fill = (
             own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
@@ -127,7 +132,8 @@ class BubbleModel:
             self, mesh=replace(self.mesh, points=points, warp=yarns),
             thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
-            increments=[p + offset for p in self.increments], slack=(warp, fill)
+            increments=[p + offset for p in self.increments], slack=(warp, fill),
+            strain=self.strain if strain is None else strain,
         )  # fmt: skip
 
     @property
@@ -136,12 +142,24 @@ class BubbleModel:
         return np.asarray(self.mesh.points * (1.0 + warp, 1.0 + fill, 1.0), dtype=float)
 
     @property
+    def stretch(self) -> Array:
+        """Return how long the yarns are at Gauss points, over `stress_free`: (quads, 4, 2, 2)."""
+        none = np.zeros((len(self.mesh.points), 3))
+        return np.eye(2) + self.strain_tensor(none if self.strain is None else self.strain)
+
+    def strain_tensor(self, strain: Array) -> Array:
+        """Return strains (nodes, 3) as symmetric tensors at Gauss points, (quads, 4, 2, 2)."""
+        warp, fill, shear = np.moveaxis(GAUSS_VALUES @ strain[self.mesh.quads], -1, 0)
+        return np.stack([warp, 0.5 * shear, 0.5 * shear, fill], axis=-1).reshape(*warp.shape, 2, 2)
+
+    @property
     def yarn(self) -> Array:
         """Return the direction of the warp in the plane, (3,)."""
         return np.eye(3)[0] if self.mesh.warp is None else np.asarray(self.mesh.warp[0])
 
-    def sheet_slope(self, name: str) -> tuple[Array, Array, Array]:
-        """Return derivatives (nodes, 3) of reference surface and `stress_free` by one."""
+    def sheet_slope(self, name: str) -> tuple[Array, Array, Array, Array]:
+        """Return derivatives by one of reference surface and `stress_free` (nodes, 3), `yarn` and
+        `stretch`."""
         surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
         yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
         if name in self.modes:
@@ -149,7 +167,7 @@ class BubbleModel:
         elif name in SLACK:
             axis = SLACK.index(name)
             sheet[:, axis] = self.mesh.points[:, axis]
-        return surface, sheet, yarn
+        return surface, sheet, yarn, self.strain_tensor(self.strains.get(name, 0.0 * sheet))
 
     def held(self, pressure: float) -> Array:
         """Return (fixed,) mm, displacements of the held degrees of freedom at a pressure (MPa)."""
@@ -191,8 +209,8 @@ class MeasuredShape(BubbleModel):
         """Return the shape of a model; its pressures are the steps of the law."""
         return cls(
             model.mesh, model.thickness, model.pressures, (), model.supports, model.modes,
-            model.slack, moved[:, model.mesh.node_sets["rim"]], moved, fields,
-            unloaded=model.unloaded,
+            model.slack, model.strain, model.strains, moved[:, model.mesh.node_sets["rim"]], moved,
+            fields, unloaded=model.unloaded,
         )  # fmt: skip
 
 

@@ -146,6 +146,21 @@ def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
     }
 
 
+#: Components of a strain of the stress-free sheet.
+METRIC = ("warp", "fill", "shear")
+
+
+def metric_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
+    """Return strains (n, 3) of warp, fill and shear alone, each times `count` monomials of x, y in
+    radii at points (n, 2) mm: metric_warp_1, metric_warp_x ..."""
+    x, y = points.T / radius
+    return {
+        f"metric_{of}_{'x' * a + 'y' * b or 1}": np.outer(x**a * y**b, np.eye(3)[k])
+        for k, of in enumerate(METRIC)
+        for a, b in monomials(count)
+    }
+
+
 def doubly_symmetric(count: int) -> bool:
     """Return whether the first `count` modes are all even in x and in y."""
     return all(a % 2 == 0 and b % 2 == 0 for a, b in monomials(count))

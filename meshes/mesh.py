@@ -143,10 +143,13 @@ MIDDLE = 0.25 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 X = np.array([1.0, 0.0, 0.0])
 
 
-def surface_strain(mesh: Mesh, displacement: Array, warp: Array | None = None) -> Array:
+def surface_strain(
+    mesh: Mesh, displacement: Array, warp: Array | None = None, stretch: Array | None = None
+) -> Array:
     """Return (quads, 3) log strain at the middles; warp : (3,) or one a quad, else the mesh's.
 
-    It is laid on each quad, x where there is none.
+    It is laid on each quad, x where there is none. stretch : (quads, 2, 2) of the yarns without
+    stress, over those of the mesh; none unless given.
     """
     yarn = mesh.warp if warp is None else warp
     yarn = np.broadcast_to(X if yarn is None else yarn, (len(mesh.quads), 3))
@@ -162,6 +165,8 @@ def surface_strain(mesh: Mesh, displacement: Array, warp: Array | None = None) -
     inverse = np.linalg.inv(np.einsum("mki,mij->mkj", yarns, tangents))
     slopes = np.einsum("nj,mjk->mnk", MIDDLE, inverse)
     gradient = np.einsum("mni,mnk->mik", rest + displacement[mesh.quads], slopes)
+    if stretch is not None:
+        gradient = gradient @ np.linalg.inv(stretch)
     return log_strain_of(gradient)
 
 
@@ -176,7 +181,7 @@ _G = 1 / np.sqrt(3)
 _AT = _G * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 _CORNER = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 #: Bilinear shape functions (point, corner) at 2 x 2 Gauss points, and their slopes.
-_VALUES = 0.25 * (1 + _AT[:, None, 0] * _CORNER[:, 0]) * (1 + _AT[:, None, 1] * _CORNER[:, 1])
+GAUSS_VALUES = 0.25 * (1 + _AT[:, None, 0] * _CORNER[:, 0]) * (1 + _AT[:, None, 1] * _CORNER[:, 1])
 _SLOPES = 0.25 * np.stack(
     [
         _CORNER[:, 0] * (1 + _AT[:, None, 1] * _CORNER[:, 1]),
@@ -201,7 +206,7 @@ def volume_and_gradient(
     """
     gradient = np.zeros(points.shape)
     points = np.ascontiguousarray(points, dtype=float)
-    return _enclosed(points, quads, _VALUES, _SLOPES, weight, origin, gradient), gradient
+    return _enclosed(points, quads, GAUSS_VALUES, _SLOPES, weight, origin, gradient), gradient
 
 
 @compiled()

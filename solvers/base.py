@@ -140,12 +140,14 @@ class History:
         mesh = self.mesh
         rest = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
         warp = getattr(self.model, "warp", mesh.warp)
+        stretch = getattr(self.model, "stretch", None)
         if at not in ("elements", "points"):
             raise InputError(None, "at", f"expected 'elements' or 'points', got {at!r}")
         sheet, moved = replace(mesh, points=rest), mesh.points + u - rest
         if at == "elements":
-            return surface_strain(sheet, moved, warp)
-        return log_strain(sheet, [moved], X if warp is None else warp)[0]
+            middle = None if stretch is None else stretch.mean(axis=1)
+            return surface_strain(sheet, moved, warp, middle)
+        return log_strain(sheet, [moved], X if warp is None else warp, stretch)[0]
 
     def _steps(self) -> tuple[Array, list[int]]:
         """Return displacements from increment to increment, and the place of each frame there."""
@@ -341,12 +343,16 @@ def pass_on(said: Announcement) -> None:
     _listener.get()(said)
 
 
-def log_strain(mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None) -> Array:
-    """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's."""
+def log_strain(
+    mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None,
+    stretch: Array | None = None,
+) -> Array:  # fmt: skip
+    """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's;
+    stretch : as of `reference_elements`."""
     points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
     warp = mesh.warp if warp is None else warp
     yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
-    slopes = reference_elements(points, quads, yarn).slopes
+    slopes = reference_elements(points, quads, yarn, stretch).slopes
     frames = []
     for displacement in displacements:
         gradient = np.einsum("mpin,mnk->mpki", slopes, (points + displacement)[quads])

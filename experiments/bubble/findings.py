@@ -7,6 +7,7 @@ import numpy as np
 
 from ...errors import Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
+from ...meshes.disk import METRIC
 from ...readers.pressure_log import ClockOffset
 from ..kinds import Array, FittedTest
 from .objective import FieldObjective
@@ -55,6 +56,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
     since = None if sheet.since is None else 1e3 * prepared.test.pressures[sheet.since]
     on = {
         "measured surface": sheet.measured, "modes": sheet.modes, "slack": sheet.slack,
+        "metric": sheet.metric,
         "measured rim": sheet.moving_rim, "constant field": sheet.constant,
         "loaded reference frame": sheet.since is not None,
     }  # fmt: skip
@@ -64,6 +66,7 @@ def sheet_numbers(prepared: PreparedBubble, fitted: FittedTest) -> dict[str, Any
         "measured_rms_mm": None if surface is None else float(surface.rms[0]),
         "modes_mm": {name: fitted.nuisance[name] for name in model.modes},
         "slack_percent": [100 * s for s in model.slack] if sheet.slack else None,
+        "metric_percent": {name: fitted.nuisance[name] for name in model.strains},
         "rim_motion_mm": None if moved is None else float(np.linalg.norm(moved, axis=2).max()),
         "constant_field_rms_mm": taken,
         "from_pressure_kPa": since,
@@ -82,6 +85,9 @@ def sheet_lines(numbers: dict[str, Any]) -> list[str]:
     if numbers["slack_percent"] is not None:
         warp, fill = numbers["slack_percent"]
         words.append(f"slack {warp:.3f} % in warp, {fill:.3f} % in fill")
+    if metric := numbers["metric_percent"]:
+        means = ", ".join(f"{metric[f'metric_{of}_1']:.3f} % in {of}" for of in METRIC)
+        words.append(f"metric of {len(metric)} unknowns: {means} at the centre")
     if numbers["rim_motion_mm"] is not None:
         words.append(f"rim as measured, up to {numbers['rim_motion_mm']:.2f} mm")
     if numbers["constant_field_rms_mm"] is not None:

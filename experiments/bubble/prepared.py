@@ -78,7 +78,7 @@ class PreparedBubble:
     @property
     def objective_is(self) -> str:
         own = OBJECTIVES[self.test.objective]
-        unknown = self.test.sheet.modes or self.test.sheet.slack
+        unknown = self.test.sheet.unknown
         return f"{own}, and what is known of the sheet" if unknown else own
 
     @property

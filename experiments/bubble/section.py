@@ -198,6 +198,8 @@ class SheetSection(sections.Section):
     prior: sections.Length | None = None
     slack: bool = False
     slack_prior: sections.Positive = 0.3
+    metric: Annotated[int, Field(ge=0, le=15)] = 0
+    metric_prior: sections.Positive = 0.3
     misfit: sections.Length | None = None
     rim: Literal["fixed", "measured"] = "fixed"
     constant_field: list[Direction] = Field(default_factory=list)
@@ -209,7 +211,8 @@ class Sheet:
     """The first shape of the sheet, and its unknowns.
     measured : the measured z is the reference surface. degree : of the polynomials through measured
     heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
-    slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against which priors
+    slack_prior : %, one standard deviation. metric : monomials of the unknown strain of warp, fill
+    and shear; metric_prior : %, one standard deviation of each. misfit : mm RMS of a good model, against which priors
     are weighed. moving_rim : the rim follows the measurement. constant : directions (0 to 2) in
     which a field that is the same at all pressures is projected out. since : number of the frame
     from which displacements are counted, None for the reference picture."""
@@ -220,10 +223,17 @@ class Sheet:
     prior: float = 3.0
     slack: bool = False
     slack_prior: float = 0.3
+    metric: int = 0
+    metric_prior: float = 0.3
     misfit: float = 0.5
     moving_rim: bool = False
     constant: tuple[int, ...] = ()
     since: int | None = None
+
+    @property
+    def unknown(self) -> bool:
+        """Return whether the fit has unknowns of the sheet."""
+        return bool(self.modes or self.slack or self.metric)
 
     @property
     def known(self) -> bool:
@@ -263,7 +273,8 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
             raise place.error("sheet.from_pressure", problem)
         since = int(np.argmax(near))
     quarter, measured = of.symmetry == "quarter", section.surface == "measured"
-    unknown, taken = section.modes or section.slack, since is not None or section.constant_field
+    unknown = section.modes or section.slack or section.metric
+    taken = since is not None or section.constant_field
     stressed = "a surface measured under pressure is not without stress: use modes instead"
     out = "takes up what from_pressure and constant_field take out; use one of them"
     twice = "takes out what from_pressure takes out already; use one of them"
@@ -271,11 +282,16 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
     few = "nothing is left of the data of one pressure"
     modes = quarter and not doubly_symmetric(section.modes)
     slack = "slack_prior" in given and not section.slack
+    metric = "metric_prior" in given and not section.metric
+    holds = "holds slack as its mean: leave slack out"
     for wrong, key, problem in (
         (quarter and measured, "sheet.surface", f"a measured surface: {FULL}"),
         (modes, "sheet.modes", f"{section.modes} modes: {FULL}"),
         ("prior" in given and not section.modes, "sheet.prior", f"belongs to modes, {no}"),
         (slack, "sheet.slack_prior", f"belongs to slack, {no}"),
+        (quarter and section.metric, "sheet.metric", f"a metric: {FULL}"),
+        (section.slack and section.metric, "sheet.metric", holds),
+        (metric, "sheet.metric_prior", f"belongs to metric, {no}"),
         ("misfit" in given and not unknown, "sheet.misfit", f"belongs to modes or slack, {no}"),
         (since is not None and measured, "sheet.from_pressure", stressed),
         (offset and taken, "nuisance.displacement_offset", out),
@@ -286,7 +302,8 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
             raise place.error(key, problem)
     return Sheet(
         measured=measured, degree=section.degree, modes=section.modes, prior=section.prior or 3.0,
-        slack=section.slack, slack_prior=section.slack_prior, misfit=section.misfit or 0.5,
+        slack=section.slack, slack_prior=section.slack_prior, metric=section.metric,
+        metric_prior=section.metric_prior, misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
     )  # fmt: skip

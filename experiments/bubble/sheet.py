@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...inference.comparison import Nuisance
 from ...meshes.bubble_model import SLACK, BubbleModel
-from ...meshes.disk import Outline, disk_modes
+from ...meshes.disk import Outline, disk_modes, metric_modes
 from ...readers.fields import DisplacementField
 from .section import Sheet
 
@@ -147,9 +147,9 @@ def with_sheet(
         motion = [np.interp(model.increments, levels, column) for column in flat.T]
         shape = (len(model.increments), len(rim), 3)
         model = replace(model, rim_motion=np.array(motion).T.reshape(shape))
-    if not sheet.modes:
-        return model
-    return replace(model, modes=disk_modes(outline.unit(places), 1.0, sheet.modes))
+    at = outline.unit(places)
+    modes, strains = disk_modes(at, 1.0, sheet.modes), metric_modes(at, 1.0, sheet.metric)
+    return replace(model, modes=modes, strains=strains)
 
 
 def prior_weight(misfit: float, scale: Array) -> float:
@@ -162,6 +162,7 @@ def sheet_nuisance(sheet: Sheet, model: BubbleModel, scale: Array) -> list[Nuisa
     weight, most = prior_weight(sheet.misfit, scale), MOST_SIGMAS
     every = [(name, "mm", 1.0, sheet.prior) for name in model.modes]
     every += [(name, "%", 1e-2, sheet.slack_prior) for name in SLACK if sheet.slack]
+    every += [(name, "%", 1e-2, sheet.metric_prior) for name in model.strains]
     return [
         Nuisance(name, -most * prior, most * prior, unit, name, size, prior, weight)
         for name, unit, size, prior in every

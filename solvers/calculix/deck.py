@@ -175,6 +175,8 @@ STEEP = 0.1
 
 def without_stress(shells: ShellMesh, model: BubbleModel) -> ShellMesh:
     """Return the shells where the sheet is without stress, from those on the reference surface."""
+    if model.strains or model.strain is not None:
+        raise SolverFailure("takes no metric of the sheet, use the membrane", "calculix")
     warp, fill = model.slack
     return replace(shells, points=shells.points * (1.0 + warp, 1.0 + fill, 1.0))
 

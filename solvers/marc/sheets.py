@@ -44,10 +44,9 @@ def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
 ) -> History:
     """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
-    if any(model.slack) or model.rim_motion is not None:
-        raise SolverFailure(
-            "takes no slack sheet and no rim that moves, use another solver", "marc"
-        )
+    if any(model.slack) or model.strains or model.strain is not None or model.rim_motion is not None:
+        problem = "takes no slack sheet, no metric and no rim that moves, use another solver"
+        raise SolverFailure(problem, "marc")
     deck, count = bubble_deck(model, law, settings), len(model.increments)
     return run(deck, count, lambda t19, iterations: bubble_history(t19, model, iterations))
 

@@ -102,7 +102,7 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
-        points, quads, reference_elements(model.stress_free, quads, model.mesh.warp),
+        points, quads, reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
         model.thickness, law, free, tangent_for(quads, points.size, free), tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
     )  # fmt: skip
@@ -112,11 +112,7 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     """Return the history of a fresh membrane, and the derivatives in the reported frames."""
     levels = np.array(model.increments)
     shape = membrane.reference.shape
-    derivatives = None
-    if asked.parameters:
-        of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
-        slopes = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
-        derivatives = Derivatives(membrane, asked.parameters, model.stress_free, slopes, model.yarn)
+    derivatives = _derivatives(membrane, model, asked) if asked.parameters else None
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
     record, keep = Record(membrane, len(levels)), model.reported
     judged, unstable = set(keep.tolist()), []
@@ -140,15 +136,20 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     return history, rates[keep]
 
 
+def _derivatives(membrane: Membrane, model: BubbleModel, asked: Asked) -> Derivatives:
+    of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
+    slopes = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
+    at = (model.stress_free, model.yarn, model.stretch)
+    return Derivatives(membrane, asked.parameters, slopes, at)
+
+
 def balance(membrane: Membrane, model: MeasuredShape, asked: Asked) -> tuple[History, Array]:
     """Return the motion from a measured shape to equilibrium, to first order, and its derivatives.
 
     It is a sum of the shape's fields in which their virtual work vanishes: Newton's step, of a
     frame at a time. SolverFailure : no valid stress, or no stiffness, in a frame.
     """
-    of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
-    by_sheet = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
-    derivatives = Derivatives(membrane, asked.parameters, model.stress_free, by_sheet)
+    derivatives = _derivatives(membrane, model, asked)
     still = np.zeros((membrane.reference.size, len(asked.parameters)))
     record, inner = Record(membrane, len(model.moved)), model.fields[membrane.free]
     steps = np.zeros((*model.moved.shape, 1 + len(asked.parameters)))

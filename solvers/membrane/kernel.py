@@ -199,12 +199,12 @@ class ReferenceElements:
 
 
 def reference_elements(
-    points: Array, quads: NDArray[np.intp], warp: Array | None = None
+    points: Array, quads: NDArray[np.intp], warp: Array | None = None, stretch: Array | None = None
 ) -> ReferenceElements:
     """Evaluate the bilinear shape functions on a flat or faceted surface (n, 2) or (n, 3) mm.
 
-    warp : (m, 3) direction of the yarn in each facet; x unless given. InputError : a quad inside
-    out.
+    warp : (m, 3) direction of the yarn in each facet; x unless given. stretch : (m, 4, 2, 2) of the
+    yarns beside that surface; none unless given. InputError : a quad inside out.
     """
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -225,6 +225,10 @@ def reference_elements(
     frame = np.stack([along, np.cross(unit, along)], axis=2)  # (m, p, 2, 3)
     jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
     slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), NATURAL)
+    if stretch is not None:
+        slopes, area = np.linalg.solve(stretch, slopes), area * np.linalg.det(stretch)
+        if not (area > 0).all():
+            raise InputError(None, "strain", "turns the stress-free sheet inside out")
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
 
 
@@ -447,12 +451,13 @@ def by_sheet(  # type: ignore[no-untyped-def]
 
 
 def element_slopes(
-    points: Array, quads: NDArray[np.intp], ways: Array, yarn: Array, yarn_by: Array
-) -> tuple[Array, Array]:
+    points: Array, quads: NDArray[np.intp], ways: Array, yarn: Array, yarn_by: Array,
+    stretch: Array, stretch_by: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Return derivatives of `reference_elements`, (elements, 4, 2, 4, k) and (elements, 4, k).
 
     ways (k, n, 3) : directions of the points. yarn (3,), the warp of all facets, and yarn_by (k, 3)
-    its own derivatives.
+    its own derivatives; so stretch (elements, 4, 2, 2).
     """
     yarn_by = yarn_by[:, None, None]
     base = NATURAL @ points[quads][:, None]
@@ -460,7 +465,7 @@ def element_slopes(
     normal = np.cross(base[:, :, 0], base[:, :, 1])
     normal_by = np.cross(base_by[..., 0, :], base[:, :, 1])
     normal_by += np.cross(base[:, :, 0], base_by[..., 1, :])
-    unit, unit_by, _, area_by = _normalised(normal, normal_by)
+    unit, unit_by, area, area_by = _normalised(normal, normal_by)
     # Along the yarn: its direction less the part along the normal.
     across, across_by = unit @ yarn[:, None], unit_by @ yarn[:, None]
     across_by += (unit * yarn_by).sum(axis=-1, keepdims=True)
@@ -470,6 +475,10 @@ def element_slopes(
     frame_by = np.stack([along_by, np.cross(unit_by, along) + np.cross(unit, along_by)], axis=-1)
     inverse = np.linalg.inv(base @ frame)
     slopes_by = -inverse @ (base_by @ frame + base @ frame_by) @ (inverse @ NATURAL)
+    # The yarns' own stretch S takes slopes to S^-1 slopes and areas to det(S) area.
+    back, whole = np.linalg.inv(stretch), np.linalg.det(stretch)
+    slopes_by = back @ (slopes_by - stretch_by @ back @ inverse @ NATURAL)
+    area_by = whole * (area_by + area * np.trace(back @ stretch_by, axis1=-2, axis2=-1))
     slopes_by, area_by = np.moveaxis(slopes_by, 0, -1), np.moveaxis(area_by, 0, -1)
     return np.ascontiguousarray(slopes_by), np.ascontiguousarray(area_by)
 

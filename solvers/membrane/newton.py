@@ -43,10 +43,8 @@ GAIN, SMALL = 0.1, 1e-2
 #: Part of the way to the end known to be too far: at least, where only that is known, at most.
 NEAREST, BLIND, FARTHEST = 0.1, 0.3, 0.9
 #: By name of a parameter, derivatives (n, 3) of the reference places and of the stress-free ones,
-#: and (3,) of the direction of the warp.
-SheetSlopes = Mapping[str, tuple[Array, Array, Array]]
-#: The warp of a sheet that does not say it.
-WARP = np.array([1.0, 0.0, 0.0])
+#: (3,) of the direction of the warp, and (elements, 4, 2, 2) of the stretch of the yarns.
+SheetSlopes = Mapping[str, tuple[Array, Array, Array, Array]]
 
 
 @dataclass(eq=False)
@@ -410,13 +408,13 @@ class Derivatives:
     """Derivatives of displacement, strain and stress, carried along the strain path.
 
     parameters : "beta_i", "nu12", "pressure_offset", "thickness", and those of `sheet`: slopes of
-    the sheet's own parameters, which need stress_free (n, 3) mm, places of the nodes without
-    stress, and yarn (3,), the warp.
+    the sheet's own parameters, at: stress_free (n, 3) mm, places of the nodes without stress, yarn
+    (3,), the warp, and stretch (elements, 4, 2, 2).
     """
 
     def __init__(
-        self, membrane: Membrane, parameters: Sequence[str], stress_free: Array | None = None,
-        sheet: SheetSlopes | None = None, yarn: Array = WARP,
+        self, membrane: Membrane, parameters: Sequence[str], sheet: SheetSlopes | None = None,
+        at: tuple[Array, Array, Array] | None = None,
     ) -> None:  # fmt: skip
         self.membrane = membrane
         law, names = membrane.law, list(parameters)
@@ -429,11 +427,14 @@ class Derivatives:
         self.point = np.empty((len(membrane.quads), 4, POINT + more))
         self.rate = np.empty((membrane.reference.size, len(names)))
         self.columns: list[int] = []
-        if sheet and stress_free is not None:
+        if sheet and at is not None:
             self.columns = [names.index(name) for name in sheet]
-            surface, ways, turns = (np.stack(own) for own in zip(*sheet.values(), strict=True))
+            surface, ways, turns, by = (np.stack(own) for own in zip(*sheet.values(), strict=True))
+            stress_free, yarn, stretch = at
             self.surface = np.ascontiguousarray(np.moveaxis(surface, 0, -1))
-            self.slopes, self.area = element_slopes(stress_free, membrane.quads, ways, yarn, turns)
+            self.slopes, self.area = element_slopes(
+                stress_free, membrane.quads, ways, yarn, turns, stretch, by
+            )
             self.green = np.empty((*shape[:3], len(sheet)))
             self.sheet_rate = np.empty((membrane.reference.size, len(sheet)))
 
