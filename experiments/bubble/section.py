@@ -211,11 +211,11 @@ class Sheet:
     """The first shape of the sheet, and its unknowns.
     measured : the measured z is the reference surface. degree : of the polynomials through measured
     heights and rims. modes : number of unknown shapes; prior : mm, one standard deviation of each.
-    slack_prior : %, one standard deviation. metric : monomials of the unknown strain of warp, fill
-    and shear; metric_prior : %, one standard deviation of each. misfit : mm RMS of a good model, against which priors
+    slack_prior : %, one standard deviation. misfit : mm RMS of a good model, against which priors
     are weighed. moving_rim : the rim follows the measurement. constant : directions (0 to 2) in
     which a field that is the same at all pressures is projected out. since : number of the frame
-    from which displacements are counted, None for the reference picture."""
+    from which displacements are counted, None for the reference picture. metric : monomials of x
+    and y in the unknown strain of warp, fill and shear; metric_prior : %, as slack_prior."""
 
     measured: bool = False
     degree: int = 8
@@ -223,12 +223,12 @@ class Sheet:
     prior: float = 3.0
     slack: bool = False
     slack_prior: float = 0.3
-    metric: int = 0
-    metric_prior: float = 0.3
     misfit: float = 0.5
     moving_rim: bool = False
     constant: tuple[int, ...] = ()
     since: int | None = None
+    metric: int = 0
+    metric_prior: float = 0.3
 
     @property
     def unknown(self) -> bool:
@@ -302,10 +302,10 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
             raise place.error(key, problem)
     return Sheet(
         measured=measured, degree=section.degree, modes=section.modes, prior=section.prior or 3.0,
-        slack=section.slack, slack_prior=section.slack_prior, metric=section.metric,
-        metric_prior=section.metric_prior, misfit=section.misfit or 0.5,
+        slack=section.slack, slack_prior=section.slack_prior, misfit=section.misfit or 0.5,
         moving_rim=section.rim == "measured",
         constant=tuple(sorted({DIRECTIONS.index(d) for d in section.constant_field})), since=since,
+        metric=section.metric, metric_prior=section.metric_prior,
     )  # fmt: skip
 
 

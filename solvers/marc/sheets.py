@@ -44,7 +44,12 @@ def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
 ) -> History:
     """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
-    if any(model.slack) or model.strains or model.strain is not None or model.rim_motion is not None:
+    if (
+        any(model.slack)
+        or model.strains
+        or model.strain is not None
+        or model.rim_motion is not None
+    ):
         problem = "takes no slack sheet, no metric and no rim that moves, use another solver"
         raise SolverFailure(problem, "marc")
     deck, count = bubble_deck(model, law, settings), len(model.increments)

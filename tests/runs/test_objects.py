@@ -307,6 +307,7 @@ COMPANIONS = {
     "bubble.sheet.prior": {"sheet": {"modes": 3}},
     "bubble.sheet.misfit": {"sheet": {"modes": 3}},
     "bubble.sheet.slack_prior": {"sheet": {"slack": True}},
+    "bubble.sheet.metric_prior": {"sheet": {"metric": 3}},
     "bubble.sheet.from_pressure": {"sheet": {"from_pressure": 20.0}},
     "bubble.data.known_solution": KNOWN,
     "bubble.data.known_solution.increments": {

@@ -202,6 +202,9 @@ def test_what_a_section_says_of_the_sheet():
     assert sheet(from_pressure=200.0).since == 1 and sheet(METRES, from_pressure=0.2).since == 0
     assert sheet(from_pressure=20.0 * (1 + 9e-7)).since == 0
     assert sheet(modes=1, symmetry="quarter").modes == 1
+    assert sheet(metric=3, metric_prior=0.2, misfit=0.1) == Sheet(
+        misfit=pytest.approx(0.1), metric=3, metric_prior=0.2
+    )
 
 
 @pytest.mark.parametrize(
@@ -211,7 +214,9 @@ def test_what_a_section_says_of_the_sheet():
         ({"rim": "measured", "of_files": False}, "sheet.rim"), ({"prior": 1.0}, "sheet.prior"),
         ({"surface": "measured", "symmetry": "quarter"}, "sheet.surface: a measured surface"),
         ({"modes": 3, "symmetry": "quarter"}, "sheet.modes"), ({"misfit": 1.0}, "sheet.misfit"),
-        ({"slack_prior": 1.0}, "sheet.slack_prior"),
+        ({"slack_prior": 1.0}, "sheet.slack_prior"), ({"metric_prior": 1.0}, "sheet.metric_prior"),
+        ({"metric": 1, "symmetry": "quarter"}, "sheet.metric: a metric"),
+        ({"metric": 1, "slack": True}, "sheet.metric: holds slack"),
         ({"from_pressure": 20.1}, "sheet.from_pressure: expected one"),
         ({"from_pressure": 20.0, "pressures": (0.02,)}, "sheet.from_pressure: expected one"),
         ({"from_pressure": 20.0, "surface": "measured"}, "sheet.from_pressure: a surface"),
@@ -260,7 +265,7 @@ def test_heights_of_a_reference_picture(field, words):
 
 
 def test_priors_of_a_sheet_weigh_as_twenty_points():
-    model: Any = SimpleNamespace(modes={"z0_1": None, "z0_x": None})
+    model: Any = SimpleNamespace(modes={"z0_1": None, "z0_x": None}, strains={})
     scale = np.array([1.0, 4.0, 100.0])
     found = sheet_nuisance(Sheet(modes=2, prior=2.0, slack=True, misfit=0.1), model, scale)
     weight = pytest.approx(0.1 * np.sqrt(20) / 4)
@@ -271,6 +276,13 @@ def test_priors_of_a_sheet_weigh_as_twenty_points():
         ("slack_warp", pytest.approx(-1.8), pytest.approx(1.8), "%", 0.01, 0.3, weight),
         ("slack_fill", pytest.approx(-1.8), pytest.approx(1.8), "%", 0.01, 0.3, weight),
     ]
+    model.strains = {"metric_warp_1": None}
+    found += sheet_nuisance(Sheet(metric=1, metric_prior=0.2, misfit=0.1), model, scale)[-1:]
+    assert (found[-1].upper, found[-1].scale, found[-1].weight) == (
+        pytest.approx(1.2),
+        0.01,
+        weight,
+    )
     assert [n.model_parameter for n in found] == [n.name for n in found]
 
 

@@ -25,7 +25,7 @@ from bubblefit.experiments.bubble.sheet import measured_sheet, with_sheet
 from bubblefit.experiments.kinds import FittedTest, Output
 from bubblefit.inference.comparison import Comparison, Nuisance
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
-from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
+from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh, metric_modes
 from bubblefit.project.project import read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.runs.fit import fit
@@ -238,9 +238,10 @@ MESH = disk_mesh(100.0, 16)
 #: mm, the surface in the reference picture; that of the two modes is 1 and x in radii.
 Z0 = 0.02 * MESH.points[:, 0] - 0.5
 MODES = {"z0_1": np.ones(len(Z0)), "z0_x": MESH.points[:, 0] / 100}
+METRIC = {"metric_warp_1": 0.1, "metric_fill_1": 0.2, "metric_shear_1": 0.3}
 SURFACE = SimpleNamespace(rms=np.array([0.0456]))
 ALL = Sheet(
-    measured=True, modes=2, slack=True, moving_rim=True, constant=(0, 2), since=0
+    measured=True, modes=2, slack=True, moving_rim=True, constant=(0, 2), since=0, metric=1
 )  # of a project never all at once
 
 
@@ -258,6 +259,10 @@ def fitted(sheet: Sheet) -> tuple[Any, Any]:
         names = ("slack_warp", "slack_fill")
         nuisance += [Nuisance(name, -1.0, 1.0, "%", name, 0.01) for name in names]
         values |= {"slack_warp": 0.05, "slack_fill": -0.1}
+    if sheet.metric:
+        strains = metric_modes(MESH.points[:, :2], 100.0, 1)
+        nuisance += [Nuisance(name, -1.0, 1.0, "%", name, 0.01) for name in strains]
+        model, values = replace(model, strains=strains), values | METRIC
     if sheet.moving_rim:
         motion = np.zeros((2, len(MESH.node_sets["rim"]), 3))
         motion[1, 3] = 0.3, 0.4, 1.2
@@ -279,18 +284,20 @@ def test_every_number():
     heights = Z0 + 2.0 + 0.03 * MESH.points[:, 0]
     assert found == {
         "used": [
-            "measured surface", "modes", "slack", "measured rim", "constant field",
+            "measured surface", "modes", "slack", "metric", "measured rim", "constant field",
             "loaded reference frame",
         ],
         "surface_mm": pytest.approx({"least": heights.min(), "largest": heights.max()}),
         "measured_rms_mm": 0.0456, "modes_mm": {"z0_1": 2.0, "z0_x": 3.0},
+        "metric_percent": METRIC,
         "slack_percent": pytest.approx([0.05, -0.1]), "rim_motion_mm": pytest.approx(1.3),
         "constant_field_rms_mm": pytest.approx({"dx": 0.3, "dz": 0.4}),
         "from_pressure_kPa": pytest.approx(20.0),
     }  # fmt: skip
     (line,) = sheet_report.sheet_lines(found)
     for words in ("0.046 mm", "2 modes", "-3.50 to 6.50 mm", "0.050 % in warp, -0.100 % in fill",
-                  "1.30 mm", "dx 0.30 mm RMS, dz 0.40 mm RMS", "20 kPa"):  # fmt: skip
+                  "3 unknowns: 0.100 % in warp, 0.200 % in fill, 0.300 % in shear", "1.30 mm",
+                  "dx 0.30 mm RMS, dz 0.40 mm RMS", "20 kPa"):  # fmt: skip
         assert words in line
     nothing = sheet_report.sheet_numbers(*fitted(Sheet()))
     assert nothing.pop("surface_mm") == {"least": 0.0, "largest": 0.0}

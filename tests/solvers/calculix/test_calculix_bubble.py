@@ -120,6 +120,8 @@ def test_steep_shells_are_named():
     """Slopes of up to 0.1 of a paraboloid 5 mm high and 100 mm in radius; of 10 mm 0.2."""
     model = uneven(432, (0.022,))
     shells = without_stress(shell_mesh(model.mesh, "S8R"), model)
+    strained = replace(model, strain=np.zeros_like(model.mesh.points))
+    raised(SolverFailure, "takes no metric", without_stress, shells, strained)
     assert not tilt_remarks(shells) and not tilt_remarks(shell_mesh(bubble(64).mesh, "S4"))
     (words,) = tilt_remarks(replace(shells, points=shells.points * [1, 1, 2]))
     assert re.search(r"slopes of up to 0\.(18|19) lower .* up to (6|7)\.\d %", words), words

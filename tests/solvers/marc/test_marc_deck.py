@@ -241,13 +241,13 @@ def test_whole_decks_of_the_site(tmp_path):
         strip_deck(model, LAW, MarcSettings(templates=str(tmp_path)), np.array([1.0]))
 
 
-@pytest.mark.parametrize("key", ["slack", "rim_motion"])
+@pytest.mark.parametrize("key", ["slack", "rim_motion", "strains"])
 def test_a_slack_sheet_and_a_rim_that_moves_are_refused(key):
     mesh = disk_mesh(100.0, 16)
     rim = len(mesh.node_sets["rim"])
-    what = {"slack": (0.001, 0.0), "rim_motion": np.zeros((1, rim, 3))}[key]
+    what = {"slack": (0.001, 0.0), "rim_motion": np.zeros((1, rim, 3)), "strains": {"a": None}}[key]
     model = BubbleModel(mesh, 0.81, (0.1,), **{key: what})
-    with pytest.raises(SolverFailure, match="no slack sheet and no rim that moves"):
+    with pytest.raises(SolverFailure, match="no slack sheet, no metric and no rim that moves"):
         analyse_bubble(model, HypoelasticLaw.linear(500.0, 250.0, 12.0), MarcSettings(), None)
 
 

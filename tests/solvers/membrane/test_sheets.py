@@ -29,6 +29,7 @@ from bubblefit.runs.verification.closed_forms import (
     apex_coefficient,
     stress_series,
 )
+from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial import cKDTree
 
@@ -85,6 +86,31 @@ def test_a_slack_sheet_is_a_larger_disk_pushed_together():
     np.testing.assert_allclose(MESH.points + slackened, there, atol=1e-6)
     apex = MESH.node_sets["apex"][0]
     assert slackened[0, apex, 2] > run(FLAT)[0, apex, 2] + 0.5
+    # The same as an even strain of the yarns.
+    even = replace(FLAT, strain=np.broadcast_to(slack, MESH.points.shape))
+    np.testing.assert_allclose(run(even), slackened, atol=1e-6)
+    told = [replace(History(np.array(PRESSURES), slackened, *np.zeros((2, 3))), model=one)
+            for one in (even, replace(FLAT, slack=(0.004, 0.001)))]  # fmt: skip
+    for at in ("elements", "points"):
+        np.testing.assert_allclose(told[0].strain(at), told[1].strain(at), atol=1e-9)
+
+
+def test_a_bowl_with_a_ridge_is_a_metric_of_a_flat_sheet():
+    """C = I + grad z grad z of a surface z, whose square root stretches the flat disk."""
+    mesh = disk_mesh(100.0, 432)
+    x, y = mesh.points[:, :2].T / 100
+    dome, ridge = 1 - x**2 - y**2, 4.0 + 0.8 * np.sin(3 * x)
+    by = [0.024 * np.cos(3 * x) * dome - 0.02 * x * ridge, -0.02 * y * ridge]
+    slope = np.stack(by, axis=1)
+    size = (slope**2).sum(axis=1)
+    share = (np.sqrt(1 + size) - 1) / size
+    strain = share[:, None] * np.stack([by[0] ** 2, by[1] ** 2, 2 * by[0] * by[1]], axis=1)
+    flat = BubbleModel(mesh, 0.81, PRESSURES, STEPS)
+    points = mesh.points + np.outer(dome * ridge, [0, 0, 1.0])
+    raised_sheet = replace(flat, mesh=replace(mesh, points=points))
+    there, taut = points + run(raised_sheet), mesh.points + run(flat)
+    off = np.abs(mesh.points + run(replace(flat, strain=strain)) - there).max(axis=(1, 2))
+    assert (off < 0.02 * np.abs(taut - there).max(axis=(1, 2))).all()
 
 
 def test_parameters_and_modes_of_the_sheet():
