@@ -140,15 +140,14 @@ def _write_own(folder: Path, said: dict[str, Any]) -> None:
             raise InputError(None, error.field, error.problem) from None
     write_text(path, text)
     write_text(folder / SHIPPED.name, SHIPPED.read_text(encoding="utf-8"))
-    click.echo(f"wrote {path}")
+    click.echo(f"wrote {path}: read it")
     if tests["bubble"]:
         words = '[bubble.sheet] surface = "measured" takes the heights z of the files'
         words = f"note: a bubble's sheet is seldom flat: {words}, modes where there are none"
         click.echo(wrapped(words))
     fitted = tests["bubble"] or tests["strips"] or tests["biaxial"]
     then = f"check {path}, then bubblefit fit {path}" if fitted else f"bend {path} --card CARD"
-    first = "next: read it and put the measured files where it says, then"
-    click.echo(wrapped(f"{first} bubblefit {then}"))
+    click.echo(wrapped(f"next: put the measured files where it says, then bubblefit {then}"))
 
 
 def _project_text(tests: Mapping[str, int], said: Mapping[str, Any]) -> str:

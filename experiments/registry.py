@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 from typing import Any, cast
 
 from ..errors import InputError, PlugInFailure
-from ..files import Group, names_with, plug_in_named, plug_ins
+from ..files import Group, names_with, plug_in_named
 from .kinds import Kind
 from .own import KIND as OWN
 
@@ -29,16 +29,15 @@ def kind_names() -> tuple[str, ...]:
 def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:
     """Return kinds by name, all or some: ours, those that are fitted first, then plug-ins'.
     Plug-ins that do not work are logged and left out."""
-    chosen = kind_names() if names is None else names
-    ours = [kind_named(name) for name in _folders() if name in chosen]
-    known = {kind.name: kind for kind in sorted(ours, key=lambda k: (not k.fitted, k.name))}
-    for plug_in in plug_ins(GROUP):
+    found = list[Kind]()
+    for name in kind_names() if names is None else names:
         try:
-            if plug_in.name in chosen and plug_in.name not in known:
-                known[plug_in.name] = kind_named(plug_in.name)
+            found.append(kind_named(name))
         except PlugInFailure as error:
             warn_once("%s", str(error))
-    return known
+    ours = _folders()  # False comes before True
+    found.sort(key=lambda k: (k.name not in ours, k.name in ours and not k.fitted, k.name))
+    return {kind.name: kind for kind in found}
 
 
 def kind_named(name: str) -> Kind:

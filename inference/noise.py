@@ -573,6 +573,5 @@ def notes_of_noise(tests: Mapping[str, NoiseTest]) -> list[Note]:
 REASONS = {
     ABOVE_NOISE: "the noise is given too small, or model or data are off by more than "
     "noise, and the uncertainty counts all of the residual as noise",
-    BELOW_NOISE: "the noise is given too large, and the uncertainty, which follows from "
-    "it, is larger than the data say",
+    BELOW_NOISE: "the noise is given too large, and so is the uncertainty that follows from it",
 }

@@ -5,8 +5,6 @@ covariance of the free coefficients, and `[certainty.band]`, the ends of the fit
 without `format` is of format 1: cubics, and tri-linear laws by their breaks.
 """
 
-from __future__ import annotations
-
 import functools
 import json
 import math
@@ -78,7 +76,7 @@ class CardCertainty:
         return law.with_beta(beta)
 
     def laws(
-        self, law: HypoelasticLaw, count: int, random: np.random.Generator
+        self, law: HypoelasticLaw, count: int, random: "np.random.Generator"
     ) -> list[HypoelasticLaw]:
         """Return `count` random laws of positive moduli; ValueError if hardly any draw is one."""
         drawn: list[HypoelasticLaw] = []

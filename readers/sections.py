@@ -48,9 +48,7 @@ ONE_OF = re.compile(r"constrained-\w+$|literal\[")
 
 class Section(BaseModel):
     """A table of a project file: no unknown keys, no text for numbers, no NaN.
-
-    A default is `model_construct()`: making one in the usual way builds a validator at import.
-    """
+    A default is `model_construct()`: making one in the usual way builds a validator at import."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 

@@ -131,8 +131,7 @@ def misfit_table(fit: Fit) -> Table:
     header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
     note = (
         "Noise: as the project gives it (noise of the test), else the scatter of the specimens, "
-        "else what such an instrument is good for. The uncertainty uses the larger of "
-        "noise and residual."
+        "else usual for the instrument. The uncertainty uses the larger of noise and residual."
     )
     return Table("Residual beside the noise", header, rows, note, text=(3, 4))
 

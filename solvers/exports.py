@@ -1,4 +1,4 @@
-"""Formats of other programs in which a card can be exported, by name."""
+"""Formats in which a card can be exported, by name; that for CalculiX is its solver's own."""
 
 from collections.abc import Mapping
 
@@ -6,7 +6,6 @@ from ..materials.exports import curves, designers, subroutines
 from ..materials.exports.base import CSV, Format
 from .calculix.library import FORMAT
 
-#: Here, not in `materials/`, because the one for CalculiX is its solver's own.
 FORMATS: Mapping[str, Format] = {
     each.name: each
     for each in (
