@@ -114,7 +114,7 @@ def real_project(data, law, *tests):
     folder = bench_valmex.measured(data)
     pressures = pd.read_csv(folder / "grid_pressures.csv")["p_bar"]
     said = {"frames": list(bench_valmex.FEW), "elements": 112, "modes": 10, "unknowns": "",
-            "pressures": [float(pressures[k]) for k in bench_valmex.FEW]}  # fmt: skip
+            "metric": "", "pressures": [float(pressures[k]) for k in bench_valmex.FEW]}  # fmt: skip
     text = bench_valmex.PROJECT.format(law=law, starts=1)
     for test in tests:
         bubble = bench_valmex.BUBBLE.format(name=f"test {test}", test=test, **said)

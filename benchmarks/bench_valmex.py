@@ -43,7 +43,7 @@ radius = 100.0
 pressures = {pressures}
 elements = {elements}
 objective = "mm"
-sheet = {{ modes = {modes} }}
+sheet = {{ modes = {modes}{metric} }}
 {unknowns}
 [bubble.data.points]
 pattern = "grid/test{test}_{{index:02d}}.csv"
@@ -67,12 +67,13 @@ knots = { warp = [0.0, 0.03, 0.06, 0.12, 0.18], fill = [0.0, 0.03, 0.06, 0.12, 0
 
 
 def project(
-    law, tests, data, frames, elements, modes, starts, strip_increments, unknowns=""
+    law, tests, data, frames, elements, modes, starts, strip_increments, unknowns="", metric=0
 ):  # fmt: skip
     """Return a project of measured tests by name and, unless 0, of the published strips."""
     table = pd.read_csv(data / "grid_pressures.csv")
     said = {"pressures": [float(table["p_bar"][k]) for k in frames], "frames": list(frames)}
-    said |= {"elements": elements, "modes": modes, "unknowns": unknowns}
+    said |= {"elements": elements, "modes": modes, "unknowns": unknowns,
+             "metric": f", metric = {metric}" * bool(metric)}  # fmt: skip
     text = PROJECT.format(law=law, starts=starts)
     text += "".join(BUBBLE.format(name=name, test=test, **said) for name, test in tests.items())
     if strip_increments:
@@ -151,7 +152,7 @@ def mirrored(frame, axis):
 
 
 def sheets(
-    *tests, data=DATA, elements=112, modes=10, starts=3,
+    *tests, data=DATA, elements=112, modes=10, metric=0, starts=3,
     without_strips=False, with_strips=False,
 ):  # fmt: skip
     """Fit each test with a surface z0 of few modes, without the strips and with them."""
@@ -160,7 +161,7 @@ def sheets(
         print("with strips" if strips else "without strips", flush=True)
         for test in map(int, tests or PUBLISHED):
             own = project(JOINT if strips else ALONE, {"bubble": test}, folder, FEW, elements,
-                          modes, starts, 100 * strips)  # fmt: skip
+                          modes, starts, 100 * strips, metric=metric)  # fmt: skip
             found = fit(own)
             left = found.findings["bubble"].numbers["mean_abs_mm"]
             first = pd.read_csv(folder / f"points_test{test}.csv", comment="#").iloc[0]

@@ -117,8 +117,10 @@ class BubbleModel:
         points = np.array(self.mesh.points, dtype=float)
         for name, mode in self.modes.items():
             points[:, 2] += values.get(name, 0.0) * mode
-        strained = [values[name] * way for name, way in self.strains.items() if name in values]
-        strain = sum(strained, 0.0 if self.strain is None else self.strain) if strained else None
+        strain = self.strain
+        for name in self.strains.keys() & values.keys():
+            before = np.zeros_like(points) if strain is None else strain
+            strain = before + values[name] * self.strains[name]
         offset = values.get(PRESSURE_OFFSET, 0.0)
         warp, fill = (
             own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
@@ -133,7 +135,7 @@ class BubbleModel:
             thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
             increments=[p + offset for p in self.increments], slack=(warp, fill),
-            strain=self.strain if strain is None else strain,
+            strain=strain,
         )  # fmt: skip
 
     @property
