@@ -68,25 +68,27 @@ def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
 
 
 @contextmanager
-def _by_scipy(path: Path) -> Iterator[None]:
-    """Turn the errors of scipy.io, which are of any class, into an InputError."""
+def library_errors(path: Path, what: str) -> Iterator[None]:
+    """Turn the errors of a library that reads `what`, of any class, into an InputError."""
     try:
         yield
     except InputError:
         raise
+    except FileNotFoundError:
+        raise InputError(path, "", "no such file") from None
     except Exception as error:
-        why = " ".join(str(error).split())[:100]
-        problem = f"cannot be read as a MAT-file; is it damaged? ({why})"
+        why = " ".join(str(error).split())[:150]
+        problem = f"cannot be read as {what}; is it damaged? ({why})"
         raise InputError(path, "", problem) from None
 
 
 def _names_5(path: Path) -> list[str]:
-    with _by_scipy(path):
+    with library_errors(path, "a MAT-file"):
         return [str(name) for name, _, _ in scipy.io.whosmat(path, appendmat=False)]
 
 
 def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    with _by_scipy(path):
+    with library_errors(path, "a MAT-file"):
         most = min(LARGEST, max(SMALL, RATIO * path.stat().st_size))
         for name, shape, _ in scipy.io.whosmat(path, appendmat=False):
             if name in wanted and 8 * math.prod(shape) > most:
@@ -168,7 +170,7 @@ def _text(numbers: np.ndarray) -> str:
 
 
 def check_readable(path: Path, read: Callable[[], object]) -> None:
-    """Try a reading, picklable, in another process: libraries crash on some damaged files."""
+    """Check a reading, picklable, in another process: libraries crash on some damaged files."""
     if not ends(read, SECONDS):
         problem = "cannot be read: the library for such files fails on it; is it damaged?"
         raise InputError(path, "", problem)
@@ -179,17 +181,14 @@ def open_hdf5(path: Path) -> Iterator[Any]:
     """Open a file, as an `h5py.File`."""
     if not path.is_file():
         raise InputError(path, "", "no such file")
-    try:
-        with h5py.File(path, "r") as file:
+    with library_errors(path, "HDF5"):
+        try:
+            opened = h5py.File(path, "r")
+        except ImportError:
+            install = "install it with: pip install 'bubblefit[hdf5]'"
+            raise InputError(path, "", f"is an HDF5 file, which needs h5py; {install}") from None
+        with opened as file:
             yield file
-    except ImportError:
-        install = "install it with: pip install 'bubblefit[hdf5]'"
-        raise InputError(path, "", f"is an HDF5 file, which needs h5py; {install}") from None
-    except InputError:
-        raise
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError, MemoryError) as error:
-        why = " ".join(str(error).split())[:150]
-        raise InputError(path, "", f"cannot be read as HDF5; is it damaged? ({why})") from None
 
 
 def member(path: Path, group: Any, name: str) -> Any:

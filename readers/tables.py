@@ -122,10 +122,9 @@ def check_row(
         raise InputError(path, f"line {line}", problem)
 
 
-def read_table(path: Path | str, comment: str = "#") -> TextTable:
-    """Read a table with a header line, without blank lines and those that start with `comment`."""
-    path = Path(path)
-    numbered = read_lines(path, comment)
+def read_table(path: Path) -> TextTable:
+    """Read a table with a header line, without blank lines and those that start with "#"."""
+    numbered = read_lines(path)
     if len(numbered) < 2:
         found = "only a header line" if numbered else "nothing"
         raise InputError(path, "", f"expected a header line and rows of numbers, found {found}")

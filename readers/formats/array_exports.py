@@ -32,7 +32,6 @@ names alone unless points3D is among them.
 
 import math
 import zipfile
-import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -224,18 +223,10 @@ def array_names(path: Path) -> list[str]:
 
 def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
     """Read the arrays of these names, those that there are; no Python objects."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            there = {one.filename: one for one in archive.infolist()}
-            members = {name: there[f"{name}.npy"] for name in wanted if f"{name}.npy" in there}
-            return {name: _array(path, archive, one, name) for name, one in members.items()}
-    except FileNotFoundError:
-        raise InputError(path, "", "no such file") from None
-    except (OSError, zipfile.BadZipFile, zlib.error, EOFError) as error:
-        raise InputError(path, "", f"is not a whole .npz archive ({str(error)[:100]})") from None
-    except (ValueError, NotImplementedError, RuntimeError, TypeError, MemoryError) as error:
-        why = " ".join(str(error).split())[:100]
-        raise InputError(path, "", f"cannot be read; is it damaged? ({why})") from None
+    with mat_files.library_errors(path, "an .npz archive"), zipfile.ZipFile(path) as archive:
+        there = {one.filename: one for one in archive.infolist()}
+        members = {name: there[f"{name}.npy"] for name in wanted if f"{name}.npy" in there}
+        return {name: _array(path, archive, one, name) for name, one in members.items()}
 
 
 def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str) -> np.ndarray:
