@@ -90,7 +90,7 @@ class Bootstrap(Presented):
 
     @property
     def unfinished(self) -> int:
-        """Number of samples that used up their analyses before they converged."""
+        """Return the number of samples that used up their analyses before they converged."""
         return sum(sample.status == ANALYSES_USED_UP for sample in self.samples)
 
     @property

@@ -180,7 +180,7 @@ class FormFit:
 
     @property
     def fitted(self) -> float:
-        """Share of those comparisons in the objective of the fit to all points."""
+        """Return the share of those comparisons in the objective of the fit to all points."""
         norms = self.fit.problem.norms(self.fit.best.point.residual)
         return float(np.concatenate([own for n, own in norms.items() if n in self.compared]).sum())
 
@@ -192,12 +192,12 @@ class FormFit:
 
     @property
     def validated(self) -> float:
-        """Mean of the folds' errors, NaN where any of them failed."""
+        """Return the mean of the folds' errors, NaN where any of them failed."""
         return float(np.mean(self.left_out()))
 
     @property
     def noise(self) -> dict[str, float]:
-        """Share of the data's noise in the objective, by comparison."""
+        """Return the share of the data's noise in the objective, by comparison."""
         every = noise_of(self.fit.problem)
         return {name: every[name] for name in self.compared}
 

@@ -52,7 +52,7 @@ class Ratios:
 
 
 def ratios(nu12: Sequence[float], values: ArrayLike, base: float) -> Ratios:
-    """Normalise a response (n,); NaN where a run failed, left out of the mean."""
+    """Return a response (n,) and its ratios; NaN where a run failed, left out of the mean."""
     v = np.asarray(values, dtype=float)
     mean = float(np.mean(v[np.isfinite(v)])) if np.isfinite(v).any() else np.nan
     return Ratios(np.asarray(nu12, dtype=float), v, v / base, v / mean)

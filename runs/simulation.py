@@ -195,7 +195,7 @@ class Part:
 
     @property
     def increments(self) -> int:
-        """Number of load increments of the whole analysis."""
+        """Return the number of load increments of the whole analysis."""
         return len(self.studied.steps(self.model))
 
 

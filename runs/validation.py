@@ -142,7 +142,7 @@ class Validation(Presented):
 
     @property
     def means(self) -> dict[str, float]:
-        """Mean of the errors predicted, by law; NaN where one is not known."""
+        """Return the mean of the errors predicted, by law; NaN where one is not known."""
         errors: dict[str, list[float]] = {}
         for one in self.judged:
             errors.setdefault(one.law, []).append(_relative(one.predicted))

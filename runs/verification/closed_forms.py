@@ -354,14 +354,14 @@ def loaded_tubes() -> Iterator[Number]:
         yield Number(what, ours_load, theirs_load, "N", ALLOWED_BREUKELS, SOURCE_BREUKELS)
 
 
-def collapse_load(pressure: float, radius: float, length: float = 1e3) -> float:
-    """Return the tip load (N) at which the wall of a cantilever (mm) is wrinkled almost around."""
+def collapse_load(pressure: float, radius: float) -> float:
+    """Return the tip load (N) at which a cantilever of 1 m is wrinkled almost around."""
     section = TubeSection(radius, pressure, PlainWall(200.0, 200.0, 30.0))
     bend, strain = 20 * 0.5 * pressure / 200.0, np.zeros(1)
     for _ in range(50):
         normal, moment, slope = section.resultants(strain, np.array([bend]))
         strain = strain - normal / slope[:, 0, 0]
-    return float(moment[0]) / length
+    return float(moment[0]) / 1e3
 
 
 def breukels_load(bar: float, metre: float) -> float:
