@@ -295,11 +295,15 @@ MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
 #: Strains at which curves are drawn.
 SMOOTH = 121
 SAVE_CARD = "Save the material card (material.toml)"
+#: Files of every folder.
+ALWAYS = NOTES_FILE, RESULT_FILE = (
+    (NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"),
+)  # fmt: skip
 FILES = (
-    (RESULT, "all numbers of this page, for programs"), (CARD, "the material card"),
+    RESULT_FILE, (CARD, "the material card"),
     (MODULI, "tangent moduli along their strains, with their bands"),
     (COEFFICIENTS, "every unknown with its standard deviation and its correlations"),
-    (RESIDUALS, "every matched value beside the model's"), (NOTES, NOTES_ARE),
+    (RESIDUALS, "every matched value beside the model's"), NOTES_FILE,
     ("history.csv", "one row an analysis"), (MODULI_PICTURE, "picture of the moduli"),
     (OPTIMA, "picture of the optima"), (PINNED, "picture of what each test pins down"),
 )  # fmt: skip

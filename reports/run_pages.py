@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ..errors import NOTES, NOTES_ARE, InputError, as_note, marks
+from ..errors import InputError, as_note, marks
 from ..experiments.biaxial.evaluation import BiaxialEvaluation
 from ..experiments.kinds import Output
 from ..experiments.registry import report_of
@@ -35,7 +35,7 @@ from .content import (
     Words,
     read_page_data,
 )
-from .fit_page import about_of, citation, record_tables
+from .fit_page import ALWAYS, about_of, citation, record_tables
 from .html import percent, write_report
 from .vega import save
 
@@ -97,8 +97,7 @@ def _page(predictions: Predictions, exhibits: Mapping[str, Exhibit]) -> Report:
             Section("How to cite", citation()),
         ],
         files=[
-            (RUNS_TABLE, "the table of runs with all its columns"), (NOTES, NOTES_ARE),
-            (RESULT, "all numbers of this page, for programs"),
+            (RUNS_TABLE, "the table of runs with all its columns"), *ALWAYS,
             *(file for exhibit in exhibits.values() for file in exhibit.files),
             *predictions.record.files,
         ],
@@ -235,8 +234,7 @@ def write_constants(
         Section("The record", record_tables(record)),
         Section("How to cite", citation()),
     ]
-    files = [*(file for e in exhibits.values() for file in e.files), (NOTES, NOTES_ARE),
-             (RESULT, "all numbers of this page, for programs"), *record.files]  # fmt: skip
+    files = [*(file for e in exhibits.values() for file in e.files), *ALWAYS, *record.files]
     report = Report(
         title=f"{project.title}: constants of biaxial tests", summary=" ".join(summary),
         about=about_of(project, record),

@@ -12,7 +12,6 @@ from typing import Any
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from ..errors import NOTES, NOTES_ARE
 from ..experiments.kinds import CardRun, Output, PreparedTest, Shown
 from ..experiments.registry import report_of
 from ..files import write_notes
@@ -28,12 +27,10 @@ from ..runs.validation import Validation
 from . import studies
 from .charts import Charts
 from .content import Listing, Picture, Report, Section, Table, Words
-from .fit_page import about_of, citation, correlation_table
+from .fit_page import ALWAYS, about_of, citation, correlation_table
 from .html import write_report
 from .vega import save
 
-#: Files of every study, after its own.
-FILES = ((NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"))
 BANDS = (
     f"Moduli of the fit, percentiles of the samples ({100 * LEVEL:.0f} %) and the fit's own "
     "band by the noise alone"
@@ -67,7 +64,7 @@ def write_study(study: Any, folder: Path) -> Path:
     for name, charts in figures.items():
         save(folder / name, charts)
     write_notes(folder, study.notes)
-    warnings, files = [note.line for note in study.notes], [*page.files, *FILES]
+    warnings, files = [note.line for note in study.notes], [*page.files, *ALWAYS]
     about = about_of(study.project, None)
     written = write_report(folder, replace(page, about=about, warnings=warnings, files=files))
     Store(folder).finish(study.result)
