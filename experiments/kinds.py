@@ -14,24 +14,25 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, Field
 
 from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
 from ..files import is_file, replacing
 from ..files import pandas as pd
 from ..materials.card import MaterialCard, State, positive, thickness_difference
+from ..meshes.beam_model import axial_table
+from ..meshes.cylinder_model import ForceTable
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
-from ..readers.sections import ModulusUnit, Number, Section, beside
+from ..readers.sections import ModulusUnit, Number, Positive, Section, beside
 from ..solvers.base import History, instability
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from ..inference.assessment import Certainty
     from ..inference.comparison import Comparison
     from ..materials.law import HypoelasticLaw, ThicknessChange
@@ -826,6 +827,25 @@ def laws_around(
     if len(known) < len(found):
         raise ValueError("a modulus is not positive next to the card's own law")
     return Around("directions", [step for step, _ in known]), [law for _, law in known]
+
+
+class MemberSection(Section):
+    """Force of a cord by its strain, or its stiffness EA (N); N and plain strains."""
+
+    stiffness: Positive | None = None
+    strain: Annotated[list[Number], Field(min_length=2)] | None = None
+    force: Annotated[list[Number], Field(min_length=2)] | None = None
+    tension_only: bool = True
+    prestrain: Number = 0.0
+
+    def table(self, place: Place, at: str) -> ForceTable:
+        """Return force by strain; InputError names the section's key, or `at`, its own."""
+        if self.strain and self.force and self.stiffness is None:
+            with place.naming(at):
+                return ForceTable(np.array(self.strain), np.array(self.force))
+        if self.stiffness is None or self.strain or self.force:
+            raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
+        return axial_table(self.stiffness)
 
 
 class ChannelSection(Section):

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .cylinder_model import ForceTable, alike
 from .mesh import GAUSS_VALUES, Array, Mesh, keep_levels, places_of
 
 THICKNESS = "thickness"
@@ -53,6 +54,42 @@ PRESSURE_OFFSET = "pressure_offset"
 
 
 @dataclass(frozen=True, eq=False)
+class SheetCord:
+    """A cord bonded to a sheet, straight from end to end: `ends` (2, 2) mm of the flat sheet.
+
+    It is bonded to `stress_free`, with `prestrain`; a metric beside that does not change it.
+    """
+
+    ends: Array
+    table: ForceTable
+    prestrain: float = 0.0
+    tension_only: bool = True
+    bonded: ClassVar[bool] = True
+    initial_force: ClassVar[None] = None
+
+    def __post_init__(self) -> None:
+        ends = np.array(self.ends, dtype=float)
+        if ends.shape != (2, 2) or not 0 < np.ptp(ends, axis=0).max() < np.inf:
+            problem = f"expected two places [x, y] apart, got {ends.tolist()}"
+            raise InputError(None, "ends", problem)
+        object.__setattr__(self, "ends", ends)
+
+    def lies_in(self, axis: int) -> bool:
+        """Return whether it lies in the plane of symmetry across x (0) or y (1)."""
+        return bool(np.abs(self.ends[:, axis]).max() <= NEAR * np.abs(self.ends).max())
+
+    def mirrors(self, other: "SheetCord", axis: int) -> bool:
+        """Return whether it is another's mirror image, along x (0) or y (1)."""
+        image = other.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
+        near = NEAR * np.abs(image).max()
+        turned = (np.abs(self.ends - ends).max() <= near for ends in (image, image[::-1]))
+        return any(turned) and alike(self, other)
+
+
+NEAR = 1e-6  # of a length
+
+
+@dataclass(frozen=True, eq=False)
 class BubbleModel:
     """A membrane that starts flat, or as its mesh lies, and is inflated by follower pressure.
 
@@ -61,7 +98,8 @@ class BubbleModel:
     held at zero, by node set. modes : (nodes,) each: shapes by which the surface can be raised.
     slack : how much longer the stress-free sheet is along x and y. strain : (nodes, 3) of its yarns
     (warp, fill, engineering shear) beside `stress_free`, None for none; strains : (nodes, 3) each,
-    ways to change it. rim_motion : (increments, rim nodes, 3) mm, or None.
+    ways to change it. rim_motion : (increments, rim nodes, 3) mm, or None. cords : of the whole
+    sheet; a quarter takes its own part of them.
     """
 
     mesh: Mesh
@@ -75,6 +113,7 @@ class BubbleModel:
     strains: Mapping[str, Array] = field(default_factory=dict)
     rim_motion: Array | None = None
     unloaded: bool = field(default=False, kw_only=True)
+    cords: Sequence[SheetCord] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         steps = self.increments if len(self.increments) else self.pressures
@@ -87,6 +126,16 @@ class BubbleModel:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
         if not min(self.slack) > -1:
             raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
+        for i, cord in enumerate(self.cords):
+            for axis in self.halved:
+                if not any(cord.mirrors(other, axis) for other in self.cords):
+                    problem = f"a quarter needs the mirror image in {'xy'[axis]} = 0, too; "
+                    raise InputError(None, f"cord[{i}].ends", problem + 'or symmetry = "full"')
+
+    @property
+    def halved(self) -> tuple[int, ...]:
+        """Return the axes across which planes of symmetry lie: x (0), y (1)."""
+        return tuple(k for k in (0, 1) if f"symmetry_{'xy'[k]}" in self.mesh.node_sets)
 
     def _places(self, steps: Array, wanted: Array) -> NDArray[np.intp]:
         """Return the step of each wanted level: the nearest, or of a history the last in turn."""
@@ -212,7 +261,7 @@ class MeasuredShape(BubbleModel):
         return cls(
             model.mesh, model.thickness, model.pressures, (), model.supports, model.modes,
             model.slack, model.strain, model.strains, moved[:, model.mesh.node_sets["rim"]], moved,
-            fields, unloaded=model.unloaded,
+            fields, unloaded=model.unloaded, cords=model.cords,
         )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -163,6 +163,14 @@ class Cord:
             raise InputError(None, "initial_force", problem)
         if self.initial_force is not None and self.prestrain:
             raise InputError(None, "prestrain", "give either this or initial_force")
+
+
+def alike(one: Any, other: Any) -> bool:
+    """Return whether two cords have the same force by the same strain, wherever they lie."""
+    names = ("initial_force", "prestrain", "tension_only", "bonded")
+    same = all(getattr(one, name) == getattr(other, name) for name in names)
+    mine, theirs = ([own.table.strain, own.table.force] for own in (one, other))
+    return same and np.array_equal(mine, theirs)
 
 
 #: Unless given, in diameters of the cylinder: where loads are listed, and the deflection over which

@@ -214,17 +214,19 @@ def bodies(
     return support, collar_body(model.collar, inflated, ABOVE)
 
 
-def without_cords(model: CylinderModel, program: str) -> None:
-    """Raise InputError for a cylinder with cords, or loads and supports of the membrane alone."""
+def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
+    """Raise InputError for cords, or loads and supports of a cylinder for the membrane alone."""
+    if model.cords:
+        problem = f"cords are for the solver membrane: {program}'s deck has no tension-only members"
+        raise InputError(None, "cord", problem)
+    if isinstance(model, BubbleModel):
+        return
     pumped = model.gas.constant == "pressure"
     own = {"saddle": model.supports.saddle, "collar.spacing": model.collar.spacing,
            "mass_per_area": model.weight, "gas.constant": pumped}  # fmt: skip
     for key, said in own.items():
         if said:
             raise InputError(None, key, f"is for the solver membrane, {program}'s deck has none")
-    if model.cords:
-        problem = f"cords are for the solver membrane: {program}'s deck has no tension-only members"
-        raise InputError(None, "cord", problem)
 
 
 def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -9,11 +9,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, StringConstraints
 
+from ...meshes.bubble_model import SheetCord
 from ...meshes.disk import MAX_ELEMENTS, MIN_ELEMENTS, MOST_SLENDER, Outline, doubly_symmetric
 from ...meshes.mesh import Facet
 from ...readers import sections
 from ...readers.sections import Name as Name_of_sections
-from ..kinds import ChannelSection, Place, Scales
+from ..kinds import ChannelSection, MemberSection, Place, Scales
 from .registration import PlaneOf, RegistrationOptions
 
 Words = Annotated[
@@ -309,6 +310,32 @@ def sheet_of(of: BubbleSection, place: Place, pressures: Sequence[float]) -> She
     )  # fmt: skip
 
 
+XY = Annotated[
+    list[Annotated[sections.Number, sections.Unit("length")]], Field(min_length=2, max_length=2)
+]
+
+
+class SheetCordSection(MemberSection):
+    """A cord bonded to the sheet: force by strain, or stiffness EA (N); N and plain strains."""
+
+    ends: Annotated[list[XY], Field(min_length=2, max_length=2)]
+
+
+def cords_of(section: BubbleSection, place: Place, outline: Outline) -> tuple[SheetCord, ...]:
+    """Return the cords of a section in mm; InputError names their keys."""
+    found = []
+    for i, own in enumerate(section.cord):
+        at = f"cord[{i}]"
+        table = own.table(place, at)
+        with place.naming(at):
+            cord = SheetCord(np.array(own.ends), table, own.prestrain, own.tension_only)
+        for end in cord.ends[outline.share(cord.ends) > 1 + 1e-6]:
+            problem = f"expected places on the disk, got {end.tolist()} mm beyond its edge"
+            raise place.error(f"{at}.ends", problem)
+        found.append(cord)
+    return tuple(found)
+
+
 Elements = Annotated[int, Field(ge=MIN_ELEMENTS, le=MAX_ELEMENTS)]
 Symmetry = Literal["full", "quarter"]
 
@@ -402,4 +429,5 @@ class BubbleSection(sections.Section):
     match: MatchSection = MatchSection.model_construct()
     nuisance: NuisanceSection = NuisanceSection.model_construct()
     sheet: SheetSection = SheetSection.model_construct()
+    cord: list[SheetCordSection] = Field(default_factory=list)
     data: DataSection

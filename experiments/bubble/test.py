@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...materials.card import State
-from ...meshes.bubble_model import BubbleModel, default_increments
+from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
@@ -23,6 +23,7 @@ from .section import (
     BubbleSection,
     Sheet,
     Symmetry,
+    cords_of,
     facet_of,
     fitted_registration,
     outline_of,
@@ -104,6 +105,7 @@ class BubbleTest(SectionTest):
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
     registration: Mapping[str, float] = field(default_factory=dict)
     inflation: Which = 1
+    cords: tuple[SheetCord, ...] = ()
     kind: str = "bubble"
     reach: ClassVar[Reach] = Reach()  # known only when its law is
 
@@ -140,7 +142,9 @@ class BubbleTest(SectionTest):
             self.outline, elements or self.elements, symmetry or self.symmetry, self.generator
         )
         steps, unloaded = increments or self.increments, self.rising < len(self.pressures)
-        return BubbleModel(mesh, self.thick(thickness), self.pressures, steps, unloaded=unloaded)
+        return BubbleModel(
+            mesh, self.thick(thickness), self.pressures, steps, unloaded=unloaded, cords=self.cords
+        )
 
     def models(
         self, thickness: float | None = None, what: Refined = "elements", factor: float = 1.0
@@ -165,6 +169,8 @@ class BubbleTest(SectionTest):
         said["outline"] = asdict(self.outline)
         if self.inflation != 1:
             said["inflation"] = self.inflation
+        if self.cords:
+            said["cords"] = repr(self.cords)
         if self.facet is not None:
             said["filter"] = asdict(self.facet)
         if self.registration:
@@ -215,15 +221,19 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
     outline = outline_of(section, place, clamp)
     source = measured or known_solution(section, place, pressures, increments)
     same = ("weight", "elements", "symmetry", "generator", "objective", "noise", "inflation")
-    return BubbleTest(
+    test = BubbleTest(
         name=name, place=place, outline=outline, pressures=pressures, increments=increments,
         data=source, match_by=section.match.by, match_degree=section.match.degree,
         displacement_offset=section.nuisance.displacement_offset,
         pressure_offset=section.nuisance.pressure_offset,
         facet=facet_of(section, place), sheet=sheet_of(section, place, pressures),
         of_clamp=section.radius == "clamp", registration=fitted_registration(section, place),
-        **{key: getattr(section, key) for key in same},
+        cords=cords_of(section, place, outline), **{key: getattr(section, key) for key in same},
     )  # fmt: skip
+    if test.cords:
+        with place.naming():  # a quarter without a mirror image
+            test.model()
+    return test
 
 
 def measured_fields(

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from ...materials.card import MaterialCard
 from ...materials.law import HypoelasticLaw
-from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection, axial_table
+from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection
 from ...meshes.cylinder_model import (
     DEFLECTION,
     FRAMES,
@@ -23,7 +23,6 @@ from ...meshes.cylinder_model import (
     Cord,
     CurveReading,
     CylinderModel,
-    ForceTable,
     Gas,
     RigidSupports,
     curve_reading,
@@ -43,7 +42,16 @@ from ...readers.sections import (
     whole_in_base_units,
 )
 from .. import kinds
-from ..kinds import ChannelSection, DataFile, Place, Reach, Refined, SectionTest, divided
+from ..kinds import (
+    ChannelSection,
+    DataFile,
+    MemberSection,
+    Place,
+    Reach,
+    Refined,
+    SectionTest,
+    divided,
+)
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
 FileNames = Annotated[list[str], Field(min_length=1)]
@@ -79,17 +87,12 @@ NoUnit = Annotated[float, Field(ge=0, le=1e18)]
 ByPressure = Positive | Annotated[list[Positive], Field(min_length=1)]
 
 
-class CordSection(Section):
+class CordSection(MemberSection):
     """A cord along the cylinder: force by strain, or stiffness EA (N); N and plain strains."""
 
     angle: NoUnit
-    stiffness: Positive | None = None
-    strain: Annotated[list[Number], Field(min_length=2)] | None = None
-    force: Annotated[list[Number], Field(min_length=2)] | None = None
     bonded: bool = True
-    tension_only: bool = True
     initial_force: NoUnit | None = None
-    prestrain: Number = 0.0
 
 
 class WallSection(Section):
@@ -324,13 +327,8 @@ def read(section: BentSection, place: Place, name: str) -> CylinderTest:
 
 def _cord(section: CordSection, place: Place, at: str) -> Cord:
     """Return a cord of a section; InputError names its key."""
-    listed = section.strain, section.force
-    if (section.stiffness is None) == (None in listed) or (None in listed and any(listed)):
-        raise place.error(at, "give stiffness (EA, N), or strain and force, both lists")
+    table = section.table(place, at)
     with place.naming(at):
-        table = axial_table(section.stiffness or 1.0)
-        if section.strain and section.force:
-            table = ForceTable(np.array(section.strain), np.array(section.force))
         return Cord(table=table, **section.model_dump(exclude={"stiffness", "strain", "force"}))
 
 

@@ -20,7 +20,14 @@ from ...meshes.strip_models import (
     elongations,
 )
 from ..base import History
-from ..prescribed import gauge_opened, grip_pulls, held_dofs, inflated_history, strip_history
+from ..prescribed import (
+    gauge_opened,
+    grip_pulls,
+    held_dofs,
+    inflated_history,
+    strip_history,
+    without_cords,
+)
 from .deck import (
     FIRST_OF_STEP,
     Run,
@@ -76,7 +83,8 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
 
 
 def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
-    """Inflate a bubble; SolverFailure where the run does not end well."""
+    """Inflate a bubble; SolverFailure where the run does not end well, InputError for cords."""
+    without_cords(model, "CalculiX")
     shells = setup.shells(model.mesh)
     files = bubble_decks(model, law, shells, setup.element, setup.templates)
     sheet = without_stress(shells, model)

@@ -11,7 +11,7 @@ from ...meshes.bubble_model import BubbleModel
 from ...meshes.mesh import Array, Mesh
 from ...meshes.strip_models import UniaxialModel
 from ..base import History
-from ..prescribed import gauge_opened, grip_pulls, inflated_history, strip_history
+from ..prescribed import gauge_opened, grip_pulls, inflated_history, strip_history, without_cords
 from .deck import (
     MEMBRANE,
     Run,
@@ -44,6 +44,7 @@ def analyse_bubble(
     model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings, run: Run
 ) -> History:
     """Inflate a bubble; SolverFailure: no good end, slack, a moving rim; InputError."""
+    without_cords(model, "Marc")
     if (
         any(model.slack)
         or model.strains

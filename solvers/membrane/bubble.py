@@ -13,6 +13,7 @@ from ...meshes.bubble_model import PRESSURE_OFFSET, THICKNESS, BubbleModel, Meas
 from ...meshes.disk import rim_form, rim_share
 from ...meshes.mesh import Array
 from ..base import BandEnd, History
+from .cords import cords_on_sheet
 from .factorisation import tangent_for
 from .kernel import reference_elements
 from .newton import (
@@ -104,7 +105,7 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     return Membrane(
         points, quads, reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
         model.thickness, law, free, tangent_for(quads, points.size, free), tolerance,
-        step_limit=0.1 * float(np.ptp(points, axis=0).max()),
+        step_limit=0.1 * float(np.ptp(points, axis=0).max()), cords=cords_on_sheet(model),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.cylinder_model import ClosedGas, InflatedModel, RigidCylinder
 from ...meshes.mesh import Array, Numbers, volume_and_gradient
 from .bubble import STIFF, Wall
-from .cords import Cords, cords_on
+from .cords import cords_on
 from .factorisation import BorderedTangent, Tangent, tangent_for
 from .kernel import reference_elements
 from .newton import Membrane, forgets, initial_stiffness, searched_equilibrium
@@ -303,7 +303,6 @@ class ClosedMembrane(Membrane):
     wall: Wall = field(default_factory=Wall)
     flexure: Flexure | None = None
     line_slot: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 144), dtype=np.int64))
-    cords: Cords | None = None
     full: float = 1.0
     gas: ClosedGas | None = None
     bodies: Sequence[RigidCylinder] = ()
@@ -374,22 +373,15 @@ class ClosedMembrane(Membrane):
                 self.tangent.data += added
         if self.cords is not None:
             self.cords.level = self.pressure / self.full
-            pull, stiff = self.cords.forces(self.reference + u)
-            np.add.at(self.residual.reshape(-1, 3), self.cords.nodes, pull)
-            if with_tangent:
-                self._add(self.tangent.slot[self.cords.quads], stiff.reshape(-1, 144))
-                tangent = self.tangent
-                for opens, steep in self.cords.sliding:
-                    tangent = tangent.inner  # type: ignore[attr-defined]
-                    tangent.border, tangent.stiffness = opens[self.free], steep
+        super().further_forces(u, with_tangent)
         if with_tangent and self.slack > 0:
-            self._add(self.axis_slot, self.slack * self.isotropic[..., None])
+            self.add(self.axis_slot, self.slack * self.isotropic[..., None])
             self.slack *= FADE
         if self.viscosity > 0:
             drag = self.viscosity * self.node_area[:, None]
             self.residual += (drag * (u - self.anchor)).reshape(-1)
             if with_tangent:
-                self._add(self.node_slot, drag[:, None] * np.eye(3))
+                self.add(self.node_slot, drag[:, None] * np.eye(3))
         if self.dead is not None:
             self.residual += self.dead
         self.contact = []
@@ -400,7 +392,7 @@ class ClosedMembrane(Membrane):
             self.residual -= push.reshape(-1)
             self.contact.append(push)
             if with_tangent:
-                self._add(self.node_slot[touched], stiffness)
+                self.add(self.node_slot[touched], stiffness)
 
     def node_weight(self, weight: float) -> Array:
         """Return (n,) N of the nodes; weight : N/mm^2 of the thinnest part of the wall."""
@@ -431,11 +423,6 @@ class ClosedMembrane(Membrane):
         change = self.strain_new - self.wrinkle - (self.strain_old - wrinkle)
         weight = self.elements.area * self.section[:, None]
         return float(np.einsum("mp,mpi,mpi", weight, stress, change))
-
-    def _add(self, slot: NDArray[np.int64], entries: Array) -> None:
-        slot, entries = np.broadcast_arrays(slot, entries)
-        inside = slot >= 0
-        np.add.at(self.tangent.data, slot[inside], entries[inside])
 
     def equilibrium_from_slack(self, start: Array, level: float) -> Array | None:
         """Return the equilibrium from a slack start, by an artificial stress that fades."""

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...meshes.cylinder_model import Cord
+from ...meshes.bubble_model import BubbleModel, SheetCord
+from ...meshes.cylinder_model import Cord, alike
 from ...meshes.mesh import Array, Mesh, Numbers
 
 #: Of a tube's radius and of an angle in radians: what is rounding.
@@ -29,15 +30,17 @@ class Cords:
     """
 
     def __init__(
-        self, cords: Sequence[Cord], quads: Numbers, shares: Array, cord: Numbers, part: Array,
-        nodes: Numbers, points: Array,
+        self, cords: Sequence[Cord] | Sequence[SheetCord], quads: Numbers, shares: Array,
+        cord: Numbers, part: Array, nodes: Numbers, points: Array,
     ) -> None:  # fmt: skip
         self.cords, self.quads, self.shares = list(cords), quads, shares
         self.cord, self.part, self.nodes = cord, part, nodes
         self.level, self.force = 1.0, np.zeros(len(quads))
         self.given = np.array([c.initial_force is not None for c in cords])[cord]
         self.start = np.array([c.prestrain for c in cords])[cord]
-        self.rest = np.linalg.norm(self._vectors(points), axis=1)
+        way = self._vectors(points)
+        self.rest = np.linalg.norm(way, axis=1)
+        self.rest_way = way / self.rest[:, None]
         self.bent = False
         self.sliding: list[tuple[Array, float]] = []
 
@@ -74,13 +77,28 @@ class Cords:
                 self.sliding.append((opens.reshape(-1), float(slope[own][0]) / rest))
                 slope[own] = 0.0
         self.force = force
-        pull, steep = self.part * force, self.part * slope / self.rest
+        pull, self.steep = self.part * force, self.part * slope / self.rest
         tt = np.einsum("mi,mj->mij", t, t)
         across = (pull / length)[:, None, None] * (np.eye(3) - tt)
-        block = steep[:, None, None] * tt + across
+        block = self.steep[:, None, None] * tt + across
         b = self.shares
         tangent = np.einsum("mn,mp,mij->mnipj", b, b, block).reshape(-1, 12, 12)
         return np.einsum("mn,m,mk->mnk", b, pull, t), tangent
+
+    def slopes(self, position: Array, surface: Array, free: Array) -> Array:
+        """Return derivatives (3 n, k) of the forces where the sheet without load moves.
+
+        surface, free : (n, 3, k) of its places at the start, and of those without stress.
+        """
+        tangent, d = self.forces(position)[1], self._vectors(position)
+        moved = surface[self.nodes].reshape(len(d), 12, -1)
+        longer = np.einsum("mi,mn,mnik->mk", self.rest_way, self.shares, free[self.nodes])
+        pull = -(self.steep / self.rest)[:, None] * longer
+        each = tangent @ moved
+        each += np.einsum("mn,mi,mk->mnik", self.shares, d, pull).reshape(each.shape)
+        found = np.zeros(surface.shape)
+        np.add.at(found, self.nodes, each.reshape(len(d), 4, 3, -1))
+        return found.reshape(-1, surface.shape[-1])
 
 
 def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Cords | None:
@@ -89,62 +107,84 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
     planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
     Raises InputError : on half of a tube, a cord without its mirror image.
     """
-    if not cords:
-        return None
     half = bool(planes[:, 0].any())
-    quads, shares, number, part = [], [], [], []
-    p = mesh.points
+    p, found = mesh.points, []
     radius = np.hypot(p[:, 0], p[:, 1])
-    tube = np.flatnonzero((np.abs(radius[mesh.quads] - radius.max()) < NEAR * radius.max()).all(1))
+    tube = (np.abs(radius[mesh.quads] - radius.max()) < NEAR * radius.max()).all(1)
     for i, cord in enumerate(cords):
         if half and not any(_mirrored(cord, other) for other in cords):
             problem = f"{cord.angle:g} degrees needs its mirror image at {360 - cord.angle:g}; "
             raise InputError(None, "cord.angle", problem + 'or take symmetry = "full"')
         if half and cord.angle > 180:
             continue
-        own, b = _crossed(p, mesh.quads, tube, np.radians(cord.angle))
-        quads.append(own)
-        shares.append(b)
-        number.append(np.full(len(own), i))
-        lies_in_plane = half and cord.angle % 180 == 0
-        part.append(np.full(len(own), 0.5 if lies_in_plane else 1.0))
-    which = np.concatenate(quads)
-    return Cords(
-        cords, which, np.concatenate(shares), np.concatenate(number), np.concatenate(part),
-        mesh.quads[which], p,
-    )  # fmt: skip
+        up = np.array([np.sin(np.radians(cord.angle)), np.cos(np.radians(cord.angle))])
+        near = np.flatnonzero(tube & ((p[:, :2] @ up)[mesh.quads].min(axis=1) > 0))
+        aside = p[:, 0] * up[1] - p[:, 1] * up[0]
+        own, b = _crossed(aside[mesh.quads[near]], p[mesh.quads[near], 2], (-np.inf, np.inf))
+        found.append((i, near[own], b, 0.5 if half and cord.angle % 180 == 0 else 1.0))
+    return _members(mesh, cords, found, p)
+
+
+def cords_on_sheet(model: BubbleModel) -> Cords | None:
+    """Return the members of cords along a sheet, None without any on the part that is meshed.
+
+    Raises InputError : a cord that meets no quad of a whole sheet.
+    """
+    q, p, found = model.mesh.quads, model.mesh.points, []
+    for i, cord in enumerate(model.cords):
+        x, y = (p[:, :2] - cord.ends[0]).T
+        length = float(np.linalg.norm(cord.ends[1] - cord.ends[0]))
+        c, s = (cord.ends[1] - cord.ends[0]) / length
+        own, b = _crossed((c * y - s * x)[q], (c * x + s * y)[q], (0.0, length))
+        if not len(own) and not model.halved:
+            raise InputError(None, f"cord[{i}].ends", "expected a line on the sheet, not beside it")
+        in_plane = any(cord.lies_in(axis) for axis in model.halved)
+        found.append((i, own, b, 0.5 if in_plane else 1.0))
+    return _members(model.mesh, model.cords, found, model.stress_free)
+
+
+def _members(
+    mesh: Mesh, cords: Sequence[Cord] | Sequence[SheetCord],
+    found: Sequence[tuple[int, Numbers, Array, float]], points: Array,
+) -> Cords | None:  # fmt: skip
+    """Return members by number of a cord, quads, b_n and part; points (n, 3) without stress."""
+    if not sum(len(quads) for _, quads, _, _ in found):
+        return None
+    which, shares = (np.concatenate([one[k] for one in found]) for k in (1, 2))
+    counts = [len(quads) for _, quads, _, _ in found]
+    number, part = (np.repeat([one[k] for one in found], counts) for k in (0, 3))
+    return Cords(cords, which, shares, number, part, mesh.quads[which], points)
 
 
 def _mirrored(cord: Cord, other: Cord) -> bool:
-    names = ("initial_force", "prestrain", "tension_only", "bonded")
-    same = all(getattr(cord, name) == getattr(other, name) for name in names)
-    turned = abs((cord.angle + other.angle) % 360) < NEAR
-    one, two = ([own.table.strain, own.table.force] for own in (cord, other))
-    return turned and same and np.array_equal(one, two)
+    return abs((cord.angle + other.angle) % 360) < NEAR and alike(cord, other)
 
 
-def _crossed(p: Array, quads: Numbers, tube: Numbers, angle: float) -> tuple[Numbers, Array]:
-    """Return the quads of the tube that a line along z crosses, and b_n (m, 4) of each."""
-    direction = np.array([np.sin(angle), np.cos(angle)])
-    corners = p[quads[tube]]
-    along = corners[..., :2] @ direction
-    aside = corners[..., 0] * direction[1] - corners[..., 1] * direction[0]
+def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Numbers, Array]:
+    """Return which quads a line crosses between its ends, and b_n (m, 4) of each.
+
+    aside, along : (q, 4) mm of their nodes from the line, and along it.
+    """
     size = NEAR * np.abs(aside).max()
-    low, high = aside.min(axis=1), aside.max(axis=1)
     # A line along an edge crosses the quads on one of its sides, or the only ones there are.
-    inside = (along.min(axis=1) > 0) & (low < -size) & (high > -size)
-    if not inside.any():
-        inside = (along.min(axis=1) > 0) & (low < size) & (high > size)
-    crossed, aside = tube[inside], aside[inside]
-    z = p[quads[crossed]][..., 2]
-    ahead = z > z.mean(axis=1)[:, None]
-    shares = np.empty(z.shape)
-    for end, sign in ((ahead, 1.0), (~ahead, -1.0)):
-        # Two nodes to an end, at asides a and b: the line is at a share a / (a - b) from the first.
-        first = np.argmax(end, axis=1)
-        second = 3 - np.argmax(end[:, ::-1], axis=1)
-        rows = np.arange(len(aside))
+    for side in (1.0, -1.0):
+        beyond = side * aside > -size
+        cut = beyond != np.roll(beyond, -1, axis=1)
+        crossed = np.flatnonzero(cut.any(axis=1))
+        if len(crossed):
+            break
+    aside, along, cut = aside[crossed], along[crossed], cut[crossed]
+    # From edge to edge: between nodes at asides a and b the line is at a share a / (a - b).
+    rows, places = np.arange(len(crossed)), []
+    for first in (np.argmax(cut, axis=1), 3 - np.argmax(cut[:, ::-1], axis=1)):
+        second = (first + 1) % 4
         a, b = aside[rows, first], aside[rows, second]
         to = a / (a - b)
-        shares[rows, first], shares[rows, second] = sign * (1.0 - to), sign * to
-    return crossed, shares
+        place = np.zeros(aside.shape)
+        place[rows, first], place[rows, second] = 1.0 - to, to
+        places.append(place)
+    start, end = np.sort([(place * along).sum(axis=1) for place in places], axis=0)
+    held = np.minimum(end, ends[1]) - np.maximum(start, ends[0])
+    kept = held > size
+    shares = (places[1] - places[0])[kept] * (held / np.where(kept, end - start, 1.0))[kept, None]
+    return crossed[kept], shares

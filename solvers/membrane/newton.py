@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...errors import SolverFailure
 from ...materials.law import HypoelasticLaw, law_slopes
 from ..base import Progress
+from .cords import Cords
 from .factorisation import SingularTangent, Tangent
 from .kernel import (
     POINT,
@@ -55,7 +56,7 @@ class Membrane:
     law.state); stress_*, wrinkle (elements, 4, 3), the last the strain of the fabric less that of
     the surface; step_limit mm: the largest nodal correction of one iteration; keep_tangent: end
     every increment with its tangent assembled; wrinkle_stiffness: share left to wrinkles; None: the
-    membrane carries compression.
+    membrane carries compression. cords : beside it, None without.
     """
 
     reference: Array
@@ -70,6 +71,7 @@ class Membrane:
     keep_tangent: bool = False
     iterations: int = 0
     wrinkle_stiffness: float | None = None
+    cords: Cords | None = None
     wrinkle: Array = field(init=False)
     section: Array = field(init=False)
     strain_old: Array = field(init=False)
@@ -106,7 +108,23 @@ class Membrane:
         return ratio if np.isfinite(ratio) else np.inf
 
     def further_forces(self, u: Array, with_tangent: bool) -> None:
-        """Add forces beside stress and pressure to `residual` (and the tangent): none here."""
+        """Add forces beside stress and pressure to `residual` (and the tangent): of cords."""
+        if self.cords is None:
+            return
+        pull, stiff = self.cords.forces(self.reference + u)
+        np.add.at(self.residual.reshape(-1, 3), self.cords.nodes, pull)
+        if with_tangent:
+            self.add(self.tangent.slot[self.cords.quads], stiff.reshape(-1, 144))
+            tangent = self.tangent
+            for opens, steep in self.cords.sliding:
+                tangent = tangent.inner  # type: ignore[attr-defined]
+                tangent.border, tangent.stiffness = opens[self.free], steep
+
+    def add(self, slot: NDArray[np.int64], entries: Array) -> None:
+        """Add entries to the tangent at their places; those below zero are held."""
+        slot, entries = np.broadcast_arrays(slot, entries)
+        inside = slot >= 0
+        np.add.at(self.tangent.data, slot[inside], entries[inside])
 
     def accept(self) -> None:
         self.strain_old[:] = self.strain_new
@@ -431,7 +449,9 @@ class Derivatives:
             self.columns = [names.index(name) for name in sheet]
             surface, ways, turns, by = (np.stack(own) for own in zip(*sheet.values(), strict=True))
             stress_free, yarn, stretch = at
-            self.surface = np.ascontiguousarray(np.moveaxis(surface, 0, -1))
+            self.surface, self.ways = (
+                np.ascontiguousarray(np.moveaxis(own, 0, -1)) for own in (surface, ways)
+            )
             self.slopes, self.area = element_slopes(
                 stress_free, membrane.quads, ways, yarn, turns, stretch, by
             )
@@ -453,6 +473,10 @@ class Derivatives:
                 self.slopes, self.area, self.green, self.sheet_rate,
             )  # fmt: skip
             self.rate[:, self.columns] += self.sheet_rate
+            if m.cords is not None:
+                self.rate[:, self.columns] += m.cords.slopes(
+                    m.reference + u, self.surface, self.ways
+                )
         return self.rate
 
     def advance(self, du: Array) -> None:
