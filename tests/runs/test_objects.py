@@ -298,6 +298,11 @@ COMPANIONS = {
     "cycles.files.bias": {"gauge_length": 0.02},
     "biaxial.data.files": {"data": {"files": {"1:1": ["d"]}}},
     "bubble.ellipse": {"radius": None, "ellipse": {"major": 0.1, "minor": 0.08}},
+    "bubble.cord": {"cord": [
+        {"ends": [[-0.1, 0.0], [0.1, 0.0]], "stiffness": 1e5, "tension_only": False},
+        {"ends": [[0.02, 0.01], [0.05, -0.03]], "strain": [0.0, 0.02], "force": [0.0, 9e3],
+         "prestrain": 1e-3},
+    ]},
     "bubble.pressures": {"data": {"points": {"files": ["a"]}}},
     "bubble.inflation": {
         "pressures": [10.0, 30.0, 50.0] * 2, "data": {"points": {"files": [*"abcdef"]}}

@@ -1,8 +1,9 @@
-"""Cords along a tube: the tangent against differences, and tubes with cords in closed form."""
+"""Cords along tubes and sheets: the tangent against differences, and closed forms."""
 
 import numpy as np
 import pytest
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel, SheetCord
 from bubblefit.meshes.cylinder_model import (
     Collar,
     Cord,
@@ -11,9 +12,13 @@ from bubblefit.meshes.cylinder_model import (
     RigidSupports,
     inflated_cylinder,
 )
+from bubblefit.meshes.disk import disk_mesh
+from bubblefit.meshes.mesh import Mesh, grid_quads
 from bubblefit.meshes.tube import cylinder_mesh
+from bubblefit.solvers.membrane import bubble
 from bubblefit.solvers.membrane.bending import closed_membrane_of
 from bubblefit.solvers.membrane.closed import prepare
+from bubblefit.solvers.membrane.cords import cords_on_sheet
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import refused
@@ -166,3 +171,92 @@ def test_a_table_is_straight_between_and_beyond_its_points():
     assert KINKED.pull([-1e-4], tension_only=False)[0] == pytest.approx([-10.0])
     assert KINKED.strain_at(10.0) == pytest.approx(1e-4)
     assert refused(ForceTable, np.array([0.0, 0.0]), np.array([0.0, 1.0])).field == "strain"
+
+
+def bubble_with(*lines, symmetry="full", table=LINEAR, **more):
+    cords = [SheetCord(ends, table, **more) for ends in lines]
+    return BubbleModel(disk_mesh(100.0, 200, symmetry), 0.8, (0.01, 0.04), cords=cords)
+
+
+ALONG_X, CROSS = [[-100, 0], [100, 0]], ([[-70, -70], [70, 70]], [[70, -70], [-70, 70]])
+ABOVE, BELOW = [[-90, 30], [90, 30]], [[90, -30], [-90, -30]]
+
+
+def test_the_tangent_of_a_sheet_with_a_cord():
+    membrane = bubble.prepare(bubble_with([[-50, -13], [31, 47]]), WALL, 1e-9, None)
+    rng = np.random.default_rng(1)
+    u, way = rng.standard_normal((2, *membrane.reference.shape))
+    u = 0.1 * u + 1e-2 * membrane.reference
+    membrane.unbalance(u, PRESSURE, with_tangent=True)
+    membrane.tangent.factor()
+    way.reshape(-1)[np.setdiff1d(np.arange(way.size), membrane.free)] = 0.0
+    plus, minus = (residual(membrane, u + sign * 1e-6 * way) for sign in (1, -1))
+    back = membrane.tangent.solve((plus - minus)[membrane.free] / 2e-6)
+    assert np.abs(back - way.reshape(-1)[membrane.free]).max() < 1e-4
+    cords = membrane.cords
+    assert cords.force.max() > 100.0 and cords.rest.sum() == pytest.approx(np.hypot(81.0, 60.0))
+
+
+@pytest.mark.parametrize("lines", [[ALONG_X], [ABOVE, BELOW], CROSS])
+def test_a_quarter_of_a_sheet_with_cords_is_a_quarter_of_the_whole(lines):
+    ends = []
+    for symmetry, share in (("full", 1), ("quarter", 4)):
+        model = bubble_with(*lines, symmetry=symmetry)
+        apex, cords = model.mesh.node_sets["apex"][0], cords_on_sheet(model)
+        length = sum(np.linalg.norm(np.subtract(*line)) for line in lines)
+        assert share * cords.part @ cords.rest == pytest.approx(length)
+        ends.append(MembraneSolver(1e-9).run(model, WALL).displacement[:, apex, 2])
+    assert ends[1] == pytest.approx(ends[0], rel=1e-8)
+    # One that stays slack changes nothing; others hold the sheet down.
+    slack = MembraneSolver(1e-9).run(bubble_with(*lines, prestrain=-0.1), WALL).displacement
+    plain = MembraneSolver(1e-9).run(bubble_with(), WALL).displacement
+    assert (slack == plain).all()
+    assert (ends[0] < 0.95 * plain[:, apex, 2]).all()
+
+
+@pytest.mark.parametrize("prestrain", [0.0, 0.01])
+def test_two_cords_that_carry_a_soft_strip_are_arcs_of_circles(prestrain):
+    """Of half angle a: EA (a / sin a - 1 + prestrain) and the strip hold p w L / (2 sin a)."""
+    length, width, stiffness, pressure = 200.0, 20.0, 2e4, 0.01
+    soft = HypoelasticLaw.linear(1.0, 1.0, 0.4, 0.0)
+
+    def pulls(a):
+        longer = a / np.sin(a)
+        return stiffness * (longer - 1 + prestrain), 0.5 * width * np.log(longer)
+
+    low, high = 1e-3, 1.5
+    for _ in range(60):
+        a = 0.5 * (low + high)
+        cord, strip = pulls(a)
+        enough = 2 * cord + strip > pressure * width * length / (2 * np.sin(a))
+        low, high = (low, a) if enough else (a, high)
+    height, off = 0.5 * length * np.tan(0.5 * a), []
+    for count in (10, 20):
+        x, sides = np.linspace(-0.5 * length, 0.5 * length, count + 1), (-10.0, 10.0)
+        points = np.array([[at, y, 0.0] for at in x for y in sides])
+        nodes = np.arange(len(points)).reshape(-1, 2)
+        sets = {"rim": nodes[[0, -1]].ravel(), "sides": nodes.ravel()}
+        table = ForceTable([0.0, 1.0], [0.0, stiffness])
+        cords = [SheetCord([[-100.0, y], [100.0, y]], table, prestrain) for y in sides]
+        model = BubbleModel(
+            Mesh(points, grid_quads(nodes), sets), 0.5, (pressure,),
+            supports={"rim": (0, 1, 2), "sides": (1,)}, cords=cords,
+        )  # fmt: skip
+        guess = np.zeros((1, *points.shape))
+        guess[0, :, 2] = height * (1 - (2 * points[:, 0] / length) ** 2)
+        solver = MembraneSolver(1e-10)
+        found = solver.run(model, soft, guess=guess).displacement[-1, :, 2].max()
+        force = solver._prepared[1].cords.force
+        off.append([found / height - 1, force.mean() / pulls(a)[0] - 1])
+        assert np.ptp(force) < 1e-9 * force.mean()
+    assert np.abs(off[1]).max() < 1e-3
+    assert np.divide(*off) == pytest.approx(4.0, rel=0.02)  # second order
+
+
+def test_cords_of_a_sheet_are_refused_in_one_line():
+    for lines, words in (([ABOVE], "in y = 0"), ([[[0, 30], [60, 0]]], "in x = 0")):
+        raised = refused(bubble_with, *lines, symmetry="quarter")
+        assert raised.field == "cord[0].ends" and words in raised.problem
+    beside = bubble_with([[200, 0], [200, 50]])
+    assert refused(cords_on_sheet, beside).field == "cord[0].ends"
+    assert refused(SheetCord, [[1, 2], [1, 2]], LINEAR).field == "ends"

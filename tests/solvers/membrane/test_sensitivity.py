@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.bubble_model import SLACK, BubbleModel, default_increments
+from bubblefit.meshes.beam_model import axial_table
+from bubblefit.meshes.bubble_model import SLACK, BubbleModel, SheetCord, default_increments
+from bubblefit.meshes.cylinder_model import ForceTable
 from bubblefit.meshes.disk import disk_mesh, disk_modes, metric_modes
 from bubblefit.meshes.strip_models import straight_strip
 from bubblefit.solvers.base import DifferentiatingSolver, instability, parameters_of
@@ -82,8 +84,16 @@ def test_each_parameter(law, names, move):
             assert first < 2e-5 * np.abs(expected[0]).max(), name
 
 
-@pytest.mark.parametrize("thickness_change", ["constant", "incompressible"])
-def test_the_parameters_of_the_sheet_together(thickness_change):
+CORDS = [
+    SheetCord([[-80.0, 10.0], [60.0, 55.0]], ForceTable([0.0, 0.01, 1.0], [0.0, 200.0, 9e4])),
+    SheetCord([[0.0, -100.0], [0.0, 100.0]], axial_table(2e4), prestrain=1e-3, tension_only=False),
+]
+
+
+@pytest.mark.parametrize(
+    ("thickness_change", "cords"), [("constant", ()), ("incompressible", ()), ("constant", CORDS)]
+)
+def test_the_parameters_of_the_sheet_together(thickness_change, cords):
     """A whole disk that is neither flat nor taut, with a rim that moves."""
     law, mesh = replace(LAW, thickness_change=thickness_change), disk_mesh(100.0, 64)
     modes = disk_modes(mesh.points, 100.0, 10)
@@ -98,6 +108,7 @@ def test_the_parameters_of_the_sheet_together(thickness_change):
         replace(mesh, points=points), 0.81, pressures, steps, modes=modes, slack=(0.002, -0.001),
         strains=strains, strain=2e-3 * strains["metric_fill_x"] + 4e-3 * strains["metric_shear_1"],
         rim_motion=np.array([p / 0.186 * (0.01 * rim + (0.3, 0.0, 1.0)) for p in steps]),
+        cords=cords,
     )  # fmt: skip
     names = [*SLACK, *modes, *strains, OFFSET, "beta_11"]
     slopes = MembraneSolver(TIGHT).run_with_sensitivity(model, law, names)[1]
