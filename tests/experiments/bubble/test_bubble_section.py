@@ -21,20 +21,24 @@ from bubblefit.experiments.bubble.section import (
 from bubblefit.experiments.bubble.sheet import _on_disk, measured_sheet, sheet_nuisance
 from bubblefit.experiments.bubble.test import BubbleTest, merge_increments
 from bubblefit.experiments.kinds import Fabric, Place, Scales
+from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.disk import Outline, disk_mesh
 from bubblefit.project.project import Project, read_project
 from bubblefit.readers.fields import DisplacementField
 from bubblefit.readers.sections import whole_in_base_units
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
+from bubblefit.solvers.calculix import sheets as calculix_sheets
+from bubblefit.solvers.marc import sheets as marc_sheets
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
-from ...complaints import complaint, complaint_with
+from ...complaints import complaint, complaint_with, refused
 from ...places import EXAMPLES, KNOWN, SHARED
 from ...projects import edited, small
 
 VALMEX = EXAMPLES / "bubble-valmex7318"
 GRID = SHARED / "bubble"
+CORD = "[[bubble.cord]]\nstiffness = 1e4\nends = %s\n[fit]"
 R, ELLIPSE = "radius = 100.0", "ellipse = { major = %s }"
 
 
@@ -118,6 +122,11 @@ def test_missing_data_says_what_to_do(tmp_path):
     [
         ("[bubble.match]", '[bubble.sheet]\nrim = "measured"\n[bubble.match]', ["sheet.rim"]),
         ("[bubble.match]", "[bubble.sheet]\nmodes = 46\n[bubble.match]", ["sheet.modes"]),
+        ("[fit]", CORD % "[[90, 0], [90, 60]]", ["bubble[0].cord[0].ends", "on the disk", "60"]),
+        ("[fit]", CORD % "[[9, 8], [9, 8]]", ["bubble[0].cord[0].ends", "apart"]),
+        ("[fit]", CORD % "[[9, 8]]", ["bubble[0].cord[0].ends", "at least 2"]),
+        ("[fit]", CORD % "[[0, 50], [50, 50]]", ["bubble[0].cord[0].ends", "mirror image"]),
+        ("[fit]", CORD % "[[0, 0], [9, 8]]\nforce = [0, 1]", ["bubble[0].cord[0]:", "EA"]),
         ("radius =", "raduis =", ["bubble[0].raduis", "did you mean 'radius'"]),
         ("displacement_offset", "offset", ["bubble[0].nuisance.offset", "displacement_offset"]),
         (R, ELLIPSE % "120, minor = 80, angle = 120", ["bubble[0].ellipse.angle", "90"]),
@@ -347,6 +356,24 @@ def test_times_of_frames(tmp_path):
 )  # fmt: skip
 def test_times_that_cannot_be_had(tmp_path, said, words):
     assert complaint(times, tmp_path, **said).removeprefix(f"{tmp_path}/").startswith(words)
+
+
+def test_a_cord_along_the_sheet_is_in_the_model_and_other_programs_refuse_it(tmp_path):
+    """In metres; a quarter takes one along a symmetry line."""
+    cord = "[[bubble.cord]]\nstrain = [0, 0.01]\nforce = [0, 300]\n"
+    cord += "ends = [[-0.1, 0.0], [0.1, 0.0]]\n[fit]"
+    path = small(tmp_path, ("radius = 100.0", "radius = 0.1"), ("[fit]", cord), ('length = "mm"', 'length = "m"'),
+                 ("thickness = 0.81", "thickness = 0.81e-3"))  # fmt: skip
+    project = read_project(path)
+    model = bubble(project).model()
+    assert model.cords[0].ends.tolist() == [[-100.0, 0.0], [100.0, 0.0]]
+    (prepared,) = prepare_fit(project, list(project.tests.values())).tests
+    with_cord = prepared.fields[-1].displacement[:, 2].max()
+    plain = MembraneSolver().run(replace(model, cords=()), prepared.known).displacement[-1, :, 2]
+    assert with_cord < 0.9 * plain.max()
+    law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
+    for analyse in (calculix_sheets.analyse_bubble, marc_sheets.analyse_bubble):
+        assert refused(analyse, model, law, None, None).field == "cord"
 
 
 class Other(MembraneSolver):
