@@ -362,8 +362,8 @@ def test_a_cord_along_the_sheet_is_in_the_model_and_other_programs_refuse_it(tmp
     """In metres; a quarter takes one along a symmetry line."""
     cord = "[[bubble.cord]]\nstrain = [0, 0.01]\nforce = [0, 300]\n"
     cord += "ends = [[-0.1, 0.0], [0.1, 0.0]]\n[fit]"
-    path = small(tmp_path, ("radius = 100.0", "radius = 0.1"), ("[fit]", cord), ('length = "mm"', 'length = "m"'),
-                 ("thickness = 0.81", "thickness = 0.81e-3"))  # fmt: skip
+    path = small(tmp_path, ("radius = 100.0", "radius = 0.1"), ("[fit]", cord),
+                 ("thickness = 0.81", "thickness = 0.81e-3"), ('"mm"', '"m"'))  # fmt: skip
     project = read_project(path)
     model = bubble(project).model()
     assert model.cords[0].ends.tolist() == [[-100.0, 0.0], [100.0, 0.0]]
