@@ -33,7 +33,8 @@ class Cords:
         self, cords: Sequence[Cord] | Sequence[SheetCord], quads: Numbers, shares: Array,
         cord: Numbers, part: Array, nodes: Numbers, points: Array,
     ) -> None:  # fmt: skip
-        self.cords, self.quads, self.shares = list(cords), quads, shares
+        self.cords: list[Cord | SheetCord] = list(cords)
+        self.quads, self.shares = quads, shares
         self.cord, self.part, self.nodes = cord, part, nodes
         self.level, self.force = 1.0, np.zeros(len(quads))
         self.given = np.array([c.initial_force is not None for c in cords])[cord]
