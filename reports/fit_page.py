@@ -295,10 +295,10 @@ MODULI_PICTURE, OPTIMA, PINNED = "moduli.png", "optima.png", "pinned.png"
 #: Strains at which curves are drawn.
 SMOOTH = 121
 SAVE_CARD = "Save the material card (material.toml)"
-#: Files of every folder.
-ALWAYS = NOTES_FILE, RESULT_FILE = (
-    (NOTES, NOTES_ARE), (RESULT, "all numbers of this page, for programs"),
-)  # fmt: skip
+#: Files of every folder, with their descriptions.
+NOTES_FILE = (NOTES, NOTES_ARE)
+RESULT_FILE = (RESULT, "all numbers of this page, for programs")
+ALWAYS = NOTES_FILE, RESULT_FILE
 FILES = (
     RESULT_FILE, (CARD, "the material card"),
     (MODULI, "tangent moduli along their strains, with their bands"),
