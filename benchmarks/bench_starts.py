@@ -127,7 +127,7 @@ def coarse(starts=50, *project):
     STARTS of the example, or of PROJECT (and the folder of its measured data).
     """
     own = read_project(project[0], *map(Path, project[1:])) if project else known_project()
-    setup = known_setup(own.with_fit(starts=starts))
+    setup = known_setup(own.with_fit(starts=starts, coarse_to_fine=False))
     fine = replace(setup, project=setup.project.with_fit(coarse_to_fine=True))
     problem, tolerance = setup.problem(), setup.project.fit.tolerance
     for one in filter(None, (problem, coarse_problem(setup))):

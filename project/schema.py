@@ -145,7 +145,7 @@ class FitSection(Section):
     solver: Name = "membrane"
     max_analyses: Annotated[int, Field(ge=1)] | None = None
     tolerance: Positive = 1e-7
-    coarse_to_fine: bool = False
+    coarse_to_fine: bool | None = None
     jobs: Annotated[int, Field(ge=1, le=10000)] | None = None
     trust: list[Name] = Field(default=[])
     unknowns: UnknownsSection = UnknownsSection.model_construct()

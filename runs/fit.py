@@ -101,6 +101,9 @@ def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
     return max(moduli_error(one, other, ends, POINTS).values())
 
 
+#: So many starts run coarse to fine unless the project says otherwise: most of their time is saved,
+#: and of fewer each is to be evidence of its own.
+MANY_STARTS = 10
 #: Times as many starts are wanted where the best optimum was found once.
 MORE = 5
 #: Relative difference of objectives that are as good as each other.
@@ -108,7 +111,8 @@ AS_GOOD = 1e-4
 
 
 def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Project) -> str:
-    """Describe in how many optima starts end, and whether more are wanted; "" for one start."""
+    """Describe in how many optima starts end, and whether more are wanted; "" for one start.
+    Starts that took the fit of another are said to be compared on the coarse mesh only."""
     ended = [record for record in ranking(records) if record.objective is not None]
     if len(ended) < 2:
         return ""
@@ -120,13 +124,15 @@ def agreement(problem: FitProblem, records: Sequence[StartRecord], project: Proj
     best = sum(one in alike or (one.objective or 0.0) <= least for one in ended)
     first = " (the first begins at the estimate)"
     said = f"starts{first if project.fit.starts_from == 'estimate' else ''} end in"
+    shared = sum(one.same_as is not None for one in ended)
+    only = f"; {shared} of all {len(ended)} are compared on the coarse mesh only" if shared else ""
     if best == len(ended):
-        return f"all {best} {said} the same optimum"
+        return f"all {best} {said} the same optimum{only}"
     optima = f"{len(groups)} distinct optima"
     if unfinished := sum(one.status == ANALYSES_USED_UP for one in ended):
         optima += f", {unfinished} starts not converged"
     if best > 1:
-        return f"{best} of {len(ended)} {said} the best of {optima}"
+        return f"{best} of {len(ended)} {said} the best of {optima}{only}"
     return (
         f"only one of {len(ended)} {said} the best of {optima} (objective "
         f"{ended[0].objective:.4g}, the next {ended[1].objective:.4g}): there may be a better one, "
@@ -141,7 +147,8 @@ def every_start(
     """Return how every start of a fit ended, by number.
     Coarse to fine, all starts run on quads of twice the edge, as most analyses only come near an
     optimum; one start of each distinct optimum is continued on the full mesh, the others take its
-    fit. done : starts that ended before. ran : receives every record as it ends, None now and then.
+    fit. Unless the project says which, `MANY_STARTS` do so, or what a folder began goes on.
+    done : starts that ended before. ran : receives every record as it ends, None now and then.
     told : receives a stage as it begins, and its earlier records."""
     fit, executor = setup.project.fit, executor_of(setup.project)
     full, coarse = ({r.number: r for r in done if r.mesh == mesh and r.number < fit.starts}
@@ -157,7 +164,9 @@ def every_start(
         made = executor.run_starts(build, setup.options, fit.seed, missing, mesh)
         return known | _ended(made, ran)
 
-    if not fit.coarse_to_fine or coarse_problem(setup) is None:
+    if (wanted := fit.coarse_to_fine) is None:
+        wanted = any(r.mesh == "coarse" for r in done) if done else fit.starts >= MANY_STARTS
+    if not wanted or coarse_problem(setup) is None:
         full = every("starts", full, setup.problem, "full")
         return [full[n] for n in sorted(full)]
     build = functools.partial(coarse_problem, setup)

@@ -191,15 +191,15 @@ class Fit(Reported):
 
     @property
     def stages(self) -> str:
-        """Return `coarse_to_fine` as a line; empty unless asked for."""
+        """Return `coarse_to_fine` as a line; empty unless starts ran so, or were to."""
         if (ran := self.coarse_to_fine) is None:
             asked = self.project.fit.coarse_to_fine
             return "no test has a coarser mesh: every start ran on the full one" if asked else ""
         meshes = [f"{n} {own['coarse']} of {own['full']} quads" for n, own in ran["quads"].items()]
         return (
             f"{ran['starts']} starts on the coarse mesh ({', '.join(meshes)}; "
-            f"{ran['coarse_analyses']} analyses), {ran['distinct']} distinct of their optima on "
-            f"the full one ({ran['full_analyses']})"
+            f"{ran['coarse_analyses']} analyses); {ran['distinct']} of them, one of each distinct "
+            f"optimum, continued on the full one ({ran['full_analyses']}), the others take its fit"
         )
 
     def moduli(self) -> pd.DataFrame:

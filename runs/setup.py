@@ -496,7 +496,7 @@ def coarse_to_fine(setup: FitSetup, records: Sequence[StartRecord]) -> dict[str,
     """Return the starts and analyses on each mesh; None if all starts ran on the full one.
     quads : of the coarse and the full mesh by comparison, if meshed. starts : on the coarse mesh.
     distinct : optima fitted on the full mesh."""
-    coarse = coarse_problem(setup) if setup.project.fit.coarse_to_fine else None
+    coarse = coarse_problem(setup) if any(r.coarse_analyses for r in records) else None
     if coarse is None:
         return None
     pairs = zip(coarse.comparisons, setup.problem().comparisons, strict=True)

@@ -467,3 +467,7 @@ def test_starts_that_differ_are_said_to_want_more(known):
     # Moduli that nothing determines may differ.
     assert "all 2" in agreement(problem, [record(0, 0.1, one), record(1, 0.1, other)], project)
     assert agreement(problem, records[:1], project) == ""
+    shared = [*records, replace(records[1], number=3, same_as=1)]
+    shared[0] = record(0, 0.3, one)
+    said = "3 of 4 starts end in the best of 2 distinct optima; 1 of all 4 are compared"
+    assert agreement(problem, shared, project).startswith(said)

@@ -155,6 +155,10 @@ def test_one_start_of_an_optimum_goes_on_to_the_full_mesh(fitted):
     assert all(r.analyses == r.coarse_analyses for r in others)
     assert [r.status for r in others] == ["as start 0"] * (STARTS - 1)
     assert len(fitted.laws) == 1
+    assert fitted.agreement == (
+        "all 3 starts end in the same optimum; 2 of all 3 are compared on the coarse mesh only"
+    )
+    assert "quads; " in fitted.stages and "; 1 of them, one of each distinct" in fitted.stages
     assert max(fitted.result["moduli_error"].values()) < 1e-3
 
 
@@ -267,6 +271,44 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
         else:
             assert [r.same_as for r in own] == [None] * len(tried) + [tried[-1]] * (3 - len(tried))
             assert own[-1].objective == 0.0 and own[-1].coarse_objective == 0.2
+
+
+@pytest.mark.parametrize(
+    "wanted, starts, begun, meshes",
+    [
+        (None, 9, None, ["full"]),
+        (None, 10, None, ["coarse", "optima"]),
+        (False, 10, None, ["full"]),
+        (True, 2, None, ["coarse", "optima"]),
+        # A folder goes on as it began.
+        (None, 10, "full", ["full"]),
+        (None, 3, "coarse", ["coarse", "optima"]),
+    ],
+)
+def test_many_starts_run_coarse_to_fine_unless_told(
+    fitted, monkeypatch, wanted, starts, begun, meshes
+):
+    ran = []
+
+    class Runs:
+        def run_starts(self, build, options, seed, missing, mesh):
+            ran.append(mesh)
+            return [replace(ended(fitted, n, 0.2), mesh=mesh) for n in missing]
+
+        def run_tasks(self, prepare, numbers, what, lost):
+            ran.append(what)
+            return [replace(ended(fitted, n, 0.1), mesh="full") for n in numbers]
+
+    monkeypatch.setattr(stages, "executor_of", lambda project: Runs())
+    settings = fitted.project.fit.model_copy(update={"coarse_to_fine": wanted, "starts": starts})
+    setup = replace(fitted.setup, project=replace(fitted.project, fit=settings))
+    done = [replace(ended(fitted, 0, 0.2), mesh=begun)] if begun else []
+    records = stages.every_start(setup, done, lambda _: None, lambda _: None)
+    assert ran == meshes
+    assert [r.number for r in records] == list(range(starts))
+    full = meshes == ["full"]
+    assert [r.same_as for r in records] == [None, *[None if full else 0] * (starts - 1)]
+    assert {r.objective for r in records} == {0.2 if full else 0.1}
 
 
 #: Quads of the fit's disk; of a mesh so fine beside it that it is the limit.
