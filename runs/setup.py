@@ -481,15 +481,21 @@ def coarse_problem(setup: FitSetup) -> FitProblem | None:
     make, coarse = setup.make_leading, []
 
     def comparisons(test: PreparedTest, weighting: Weighting) -> Sequence[Comparison]:
+        full = test.comparisons(make, weighting)
         if isinstance(test, Refinable):
             with suppress(InputError):  # the mesh is as coarse as it can be
-                if own := test.finer(make, weighting, COARSER):
+                own = test.finer(make, weighting, COARSER)
+                if any(_quads(few) < _quads(many) for few, many in zip(own, full, strict=True)):
                     coarse.append(test)
                     return own
-        return test.comparisons(make, weighting)
+        return full
 
     every = setup.each(comparisons)
     return setup.problem_of(every) if coarse else None
+
+
+def _quads(comparison: Comparison) -> int:
+    return len(comparison.model.mesh.quads) if hasattr(comparison.model, "mesh") else 0
 
 
 def coarse_to_fine(setup: FitSetup, records: Sequence[StartRecord]) -> dict[str, Any] | None:
