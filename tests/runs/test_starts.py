@@ -23,7 +23,7 @@ from bubblefit.runs import starts as room
 from bubblefit.runs.best import MESH, TAKEN_OUT, UNKNOWN, notes_of_mesh, with_certainty
 from bubblefit.runs.fit import distinct, moduli_apart, one_fit
 from bubblefit.runs.result import answers
-from bubblefit.runs.setup import coarse_problem
+from bubblefit.runs.setup import coarse_problem, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
 
 from ..places import KNOWN
@@ -215,6 +215,9 @@ def test_the_same_data_on_larger_quads(fitted):
     point = coarse.evaluate(full.unknowns.at(fitted.law.beta[list(full.unknowns.free)]), True)
     assert point is not None and point.jacobian.shape == (len(full.scale), 3)
     assert 1e-3 < np.abs(point.residual * full.scale).max() < 2.0  # mm, of an apex of 20 mm
+    # One quad is as coarse as it can be.
+    biaxial = bf.read_project(KNOWN.parents[1] / "biaxial-computed" / "project.toml")
+    assert coarse_problem(prepare_fit(biaxial, biaxial.chosen(None, fitted=True))) is None
 
 
 def ended(fit, number, value, moduli=(80.0, 400.0, 800.0)):
