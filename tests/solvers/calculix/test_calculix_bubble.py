@@ -82,6 +82,21 @@ def test_agrees_with_the_membrane(ccx, element, elements, law, pressures):
     np.testing.assert_allclose(found.strain_max, expected.strain_max, rtol=0.03)
 
 
+def test_the_pressure_of_shells_acts_on_their_inner_face(ccx):
+    """It is smaller than the middle surface by t/R, R of the cap: p is, as the membrane has it."""
+    fine = bubble(1728, "quarter", SOME)
+
+    def height(model, solver):
+        return solver.run(model, LINEAR).displacement[:, model.mesh.node_sets["apex"][0], 2]
+
+    shells = height(bubble(192, "quarter", SOME), CalculixSolver(element="S8R"))
+    middle = height(fine, MembraneSolver())
+    inner = np.array(SOME) * (1.0 - 0.81 * 2.0 * middle / (middle**2 + 100.0**2))
+    lower = height(bubble(1728, "quarter", tuple(inner.tolist())), MembraneSolver())
+    assert (np.abs(shells / lower - 1) < 0.4 * np.abs(shells / middle - 1))[1:].all()
+    assert shells[-1] / middle[-1] - 1 < -0.0007
+
+
 def uneven(elements, pressures):
     flat = bubble(elements, "full", pressures)
     points = flat.mesh.points + np.outer(
