@@ -43,9 +43,8 @@ if TYPE_CHECKING:
     from .runs.refinement import refine
     from .runs.result import Fit
     from .runs.simulation import simulate
-    from .runs.validation import validate
+    from .runs.validation import validate, weights
     from .runs.verification import verify
-    from .runs.weights import weights
 
 __all__ = ["Biaxial", "Bubble", "Cylinder", "Fabric", "Fit", "Form", "Law", "MaterialCard",
            "OwnTest", "Project", "Registration", "Sheet", "Strips", "bootstrap", "check",
@@ -74,9 +73,8 @@ _NAMES = {
     "runs.refinement": "refine",
     "runs.result": "Fit",
     "runs.simulation": "simulate",
-    "runs.validation": "validate",
+    "runs.validation": "validate weights",
     "runs.verification": "verify",
-    "runs.weights": "weights",
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

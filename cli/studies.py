@@ -14,12 +14,11 @@ import click
 from ..errors import InputError
 from ..project.project import Project
 from ..runs import compare as laws
-from ..runs import validation, weights
+from ..runs import validation
 from ..runs.bootstrap import bootstrap
 from ..runs.plan import plan
-from ..runs.poisson import NU12, vary_nu12
 from ..runs.profile import profile
-from ..runs.refinement import Refined, refine
+from ..runs.refinement import NU12, Refined, refine, vary_nu12
 from . import options as given
 from .fits import fit_options, settings_given
 from .terminal import Decorator, command, group, resumable, show, written_to
@@ -249,7 +248,8 @@ def validate_command(leave: str | None, counted: str | None, **options: Any) -> 
     _one_of(path, {"--card": cards, "--leave": leave, "--weights": counted})
     if counted is not None:
         _one_of(path, {"--form": forms, "--weights": counted})
-        run_fits(weights.weights, "weights", options, weights.STARTS, counted=counted)
+        starts = validation.WEIGHT_STARTS
+        run_fits(validation.weights, "weights", options, starts, counted=counted)
         return
     own = {"forms": forms, "cards": cards, "leave": leave or validation.TESTS}
     run_fits(validation.validate, "validated", options, validation.STARTS, **own)

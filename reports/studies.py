@@ -12,11 +12,9 @@ from ..materials.forms.base import COMPONENTS
 from ..runs.bootstrap import Bootstrap
 from ..runs.compare import FormFit
 from ..runs.plan import Plan
-from ..runs.poisson import Nu12Study
 from ..runs.profile import Profile
-from ..runs.refinement import Level, Refinement, ended, largest_load, rms_changes
-from ..runs.validation import Validation
-from ..runs.weights import PLACES, WeightStudy
+from ..runs.refinement import Level, Nu12Study, Refinement, ended, largest_load, rms_changes
+from ..runs.validation import PLACES, Validation, WeightStudy
 from .charts import PANELS, TITLES, Chart, Charts, Series, axis_top, dots, line, spans_a_decade
 
 #: What a perfect fit (zero) is drawn as on a logarithmic axis.

@@ -17,13 +17,12 @@ from ..experiments.registry import report_of
 from ..files import write_notes
 from ..inference.likelihood import THRESHOLD
 from ..inference.posterior import LEVEL
-from ..runs import bootstrap, plan, profile, weights
+from ..runs import bootstrap, plan, profile
 from ..runs.compare import LawComparison
 from ..runs.folder import RESULT, Store, write_table
-from ..runs.poisson import Nu12Study
-from ..runs.refinement import Refinement
+from ..runs.refinement import Nu12Study, Refinement
 from ..runs.simulation import attempt
-from ..runs.validation import Validation
+from ..runs.validation import Validation, WeightStudy
 from . import studies
 from .charts import Charts
 from .content import Listing, Picture, Report, Section, Table, Words
@@ -134,7 +133,7 @@ def _validation(study: Validation) -> Content:
     return plain(study, title, "validation", [studies.held_out_charts(study, HELD_OUT)], digits=9)
 
 
-def _weights(study: weights.WeightStudy) -> Content:
+def _weights(study: WeightStudy) -> Content:
     parts = studies.weights_charts(study)
     figure = Charts("weights", [chart for part in parts for chart in part.charts], "", columns=2)
     title = f"{study.project.title}: the weight of {study.counted}"

@@ -29,8 +29,7 @@ from bubblefit.readers.frames import Frame, frame_files
 from bubblefit.readers.histories import Pace
 from bubblefit.runs.compare import FoldError, FormFit, LawComparison
 from bubblefit.runs.estimate import estimate_of
-from bubblefit.runs.poisson import vary_nu12
-from bubblefit.runs.refinement import refine
+from bubblefit.runs.refinement import refine, vary_nu12
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers import registry

@@ -43,10 +43,9 @@ from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, UNKNOWN
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.compare import FOLD
 from bubblefit.runs.estimate import GAP, NOT_ESTIMATED
-from bubblefit.runs.poisson import vary_nu12
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED
-from bubblefit.runs.refinement import refine
+from bubblefit.runs.refinement import refine, vary_nu12
 from bubblefit.runs.result import ALONE, NOT_CONVERGED, STARTS
 from bubblefit.runs.simulation import FAILED, simulate_cards
 from bubblefit.solvers import registry

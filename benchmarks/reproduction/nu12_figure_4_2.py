@@ -11,7 +11,7 @@ import bubblefit as bf
 import numpy as np
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.runs.poisson import vary_nu12
+from bubblefit.runs.refinement import vary_nu12
 from bubblefit.runs.verification import FIGURE
 
 KNOWN = Path(bf.__file__).parent / "examples" / "bubble-known-solution" / "project.toml"

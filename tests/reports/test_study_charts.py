@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.reports import studies
 from bubblefit.reports.charts import axis_ends, moduli_charts, pinned_charts
-from bubblefit.runs.poisson import ratios
+from bubblefit.runs.refinement import ratios
 
 from ..drawings import check_charts, data, legend, lines, named
 

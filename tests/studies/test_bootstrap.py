@@ -25,11 +25,11 @@ from bubblefit.runs import weights as study_of
 from bubblefit.runs.best import NOT_THE_CARD
 from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
 from bubblefit.runs.plan import plan
-from bubblefit.runs.poisson import ratios, vary_nu12
 from bubblefit.runs.profile import NOT_CLOSED, Profile, profile
+from bubblefit.runs.refinement import ratios, vary_nu12
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
-from bubblefit.runs.weights import COUNTS, weights
+from bubblefit.runs.validation import COUNTS, weights
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.optimize import minimize_scalar
 
