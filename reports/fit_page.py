@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import NOTES, NOTES_ARE, InputError, check_one_of
 from ..experiments.kinds import Findings, FittedTest, Output, by_strain
@@ -25,10 +25,9 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
 from ..runs.result import USABLE, Fit, answers, next_step, reaches
-from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts
+from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
-from .studies import optima_chart
 from .vega import save
 
 Array = NDArray[np.float64]
@@ -572,3 +571,22 @@ def record_tables(record: Record) -> list[Table]:
 def _columns(columns: Mapping[str, str], units: Mapping[str, str]) -> str:
     of = {quantity: f" in {unit}" for quantity, unit in units.items()}
     return ", ".join(f"{key}: {name}{of.get(key, '')}" for key, name in columns.items())
+
+
+#: What a perfect fit (zero) is drawn as on a logarithmic axis.
+PERFECT = 1e-16
+
+
+def optima_chart(objectives: ArrayLike, caption: str) -> Charts:
+    """Return the optima (starts,), worst to best; starts without one (NaN) are counted."""
+    values = np.atleast_1d(np.asarray(objectives, dtype=float))
+    ended = np.maximum(np.sort(values[np.isfinite(values)])[::-1], PERFECT)
+    failed = len(values) - len(ended)
+    said = f"{len(values)} start{'s' if len(values) > 1 else ''}"
+    said += f", {failed} without a result" if failed else ""
+    if len(ended):
+        said += f": best {ended[-1]:.3g}, median {np.median(ended):.3g}, worst {ended[0]:.3g}"
+    series, log = [dots("", 1 + np.arange(len(ended)), ended)], spans_a_decade(ended)
+    axes = "start, from worst to best", "objective"
+    chart = Chart("", *axes, series, said, log_y=log, from_zero=not log)
+    return Charts("optima", [chart], f"{caption}. {said[:1].upper()}{said[1:]}.")

@@ -37,8 +37,7 @@ from bubblefit.solvers.base import History
 from bubblefit.solvers.calculix import cylinder as cylinder_analysis
 from bubblefit.solvers.calculix.cylinder import BentCylinder, solid_mesh, volumes
 from bubblefit.solvers.calculix.deck import shell_mesh, tilt_remarks
-from bubblefit.solvers.marc.cylinder import touching
-from bubblefit.solvers.marc.sheets import bubble_history
+from bubblefit.solvers.marc.analyses import bubble_history, touching
 from bubblefit.solvers.marc.solver import MarcSolver
 from bubblefit.solvers.membrane import bending
 from bubblefit.solvers.membrane.closed import ClosedMembrane

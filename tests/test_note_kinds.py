@@ -52,8 +52,7 @@ from bubblefit.solvers import registry
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
 from bubblefit.solvers.calculix.deck import TILT
-from bubblefit.solvers.marc.cylinder import UNBALANCED, UNCONFIRMED
-from bubblefit.solvers.marc.sheets import NO_REACTIONS
+from bubblefit.solvers.marc.analyses import NO_REACTIONS, UNBALANCED, UNCONFIRMED
 from bubblefit.solvers.marc.solver import REPEATED
 from bubblefit.solvers.membrane.bending import PENETRATION, WRINKLES
 

@@ -1,14 +1,23 @@
-"""MSC Marc behind the solver protocol: a deck, a run of run_marc, its results."""
+"""MSC Marc behind the solver protocol: a deck, a run of run_marc in a fresh folder, its results.
 
+Outline: the solver, then one run: the command, the folder, how it ended.
+"""
+
+import logging
 import os
-from collections.abc import Callable
-from dataclasses import replace
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from ...errors import BubblefitError, Note, NoteKind, SolverFailure
+from ...errors import BubblefitError, LicenceDenied, Note, NoteKind, SolverFailure
 from ...materials.exports.subroutines import hypela2_source
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
@@ -17,10 +26,21 @@ from ...meshes.strip_models import UniaxialModel
 from ..bars import BARS, bar_law, bar_model, checked_stresses, difference, stress_of
 from ..base import EARLY, Diagnosis, History, Progress, SolverCheck, analysis_of
 from ..decks import file_mark, in_words, templates_mark
+from ..process import (
+    WORDS,
+    Increment,
+    Outcome,
+    Watch,
+    disk_full,
+    log_tail,
+    number_rows,
+    program_at,
+    run_process,
+)
+from ..scratch import run_folder, write_deck
 from ..settings import KEYS
-from . import cylinder, sheets
-from .deck import Reader, Run
-from .job import find_marc, run_job
+from . import analyses
+from .deck import JOB, Reader, Run
 from .settings import VARIABLE, MarcSettings, marc_settings
 
 REPEATED = NoteKind("repeated increments")
@@ -33,8 +53,8 @@ MATTERING = (
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
-    BubbleModel: sheets.analyse_bubble, UniaxialModel: sheets.analyse_strip,
-    CylinderModel: cylinder.analyse,
+    BubbleModel: analyses.analyse_bubble, UniaxialModel: analyses.analyse_strip,
+    CylinderModel: analyses.analyse_cylinder,
 }  # fmt: skip
 
 
@@ -156,3 +176,257 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
         advice = str(error).splitlines()[0]
     return [Diagnosis("marc", version, path, origin, expected, None, stresses is not None,
                       stresses, off, advice)]  # fmt: skip
+
+
+# One run of Marc
+
+ADVICE = (
+    f"name run_marc in [solver.marc] executable, by --marc, or in {VARIABLE}; "
+    "see `bubblefit docs marc`"
+)
+SECONDS = 60.0
+log = logging.getLogger(__name__)
+
+NAME, SCREEN, SUBROUTINE = "marc", "screen.txt", "hypela2.f"
+#: What Marc writes and is read, and what is added to the name of a file that is too old to be.
+WRITTEN, EARLIER = ("sts", "out", "log", "t19"), ".earlier"
+Tell = Callable[[Progress], None]
+
+
+def run_command(settings: MarcSettings, job: str, subroutine: str | None) -> list[str]:
+    """Return the command of Marc on `job`.dat, in the foreground; subroutine : user code's file."""
+    older = settings.options == "older"
+    words = [settings.executable, "-jid" if older else "-j", job, "-v", "no", "-b", "no"]
+    if older:
+        words += ["-nprocd", str(settings.processors)]
+        if settings.threads > 1:
+            words += ["-nthread", str(settings.threads)]
+    else:
+        words += ["-nte", str(settings.threads), "-nts", str(settings.threads)]
+        if settings.processors > 1:
+            words += ["-nps", str(settings.processors)]
+    if subroutine is not None:
+        words += ["-u", subroutine]
+    return with_modules(settings.modules, [*words, *settings.arguments])
+
+
+def with_modules(modules: Sequence[str], words: Sequence[str]) -> list[str]:
+    """Return the command in a login shell that has loaded `modules`; as it is without any."""
+    if not modules:
+        return list(words)
+    load = " && ".join(f"module load {shlex.quote(name)}" for name in modules)
+    # The command's own words never become text of the shell.
+    return ["/bin/bash", "-lc", f'{load} && exec "$@"', "bash", *words]
+
+
+def find_marc(settings: MarcSettings) -> Path | None:
+    """Return run_marc, None: only modules know it; InputError: not there; SolverFailure: none."""
+    if os.sep in settings.executable:
+        return program_at(Path(os.path.expanduser(settings.executable)), "marc", "run_marc")
+    if settings.modules:
+        return _in_modules(settings)
+    found = shutil.which(settings.executable)
+    if found is None:
+        raise SolverFailure(f"there is no {settings.executable} on the PATH; {ADVICE}", "marc")
+    return Path(found)
+
+
+def _in_modules(settings: MarcSettings) -> Path | None:
+    """Return run_marc as the shell sees it after `module load`."""
+    ask = with_modules(settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh",
+                                          settings.executable])  # fmt: skip
+    said = None
+    with suppress(OSError, subprocess.SubprocessError):
+        said = subprocess.run(ask, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL)
+    if said is None or said.returncode != 0:
+        lines = said.stderr.decode(errors="replace").strip().splitlines() if said else []
+        why = f" ({lines[-1]})" if lines else ""
+        names = ", ".join(settings.modules)
+        problem = f"modules {names} give no {settings.executable}{why}; {ADVICE}"
+        raise SolverFailure(problem, "marc")
+    path = said.stdout.decode(errors="replace").strip().splitlines()
+    return Path(path[-1]) if path else None
+
+
+_EXIT = re.compile(r"exit\s++number\s*+:?\s*+(\d{1,9})(?!\d)", re.IGNORECASE)
+COLUMNS = 13
+
+
+def increments(sts: Path) -> list[Increment]:
+    """Read increments of a .sts file, repeated ones too; lines not of 13 numbers are none."""
+    rows = [row for row in number_rows(sts) if len(row) == COLUMNS]
+    return [Increment(int(row[0]), int(row[1]), int(row[2]), row[10]) for row in rows]
+
+
+def exit_number(*files: Path) -> int | None:
+    """Return the last exit number (Marc's have four digits) in the first file with one, or None."""
+    for file in files:
+        numbers = _EXIT.findall(_text(file))
+        if numbers:
+            return int(numbers[-1])
+    return None
+
+
+def repeated(done: list[Increment]) -> int:
+    """Return how many increments were tried again after they did not converge."""
+    numbers = [one.increment for one in done]
+    return len(numbers) - len(set(numbers))
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="latin-1").replace("\r\n", "\n")
+    except OSError:
+        return ""
+
+
+NORMAL, NO_SMALLER, TURNED = 3004, 3015, 1005
+#: Exit numbers that public sources explain; others are reported as they are.
+MEANINGS = {
+    NO_SMALLER: "the time step could not get smaller: no convergence",
+    TURNED: "an element was turned inside out",
+    3: "run_marc could not compile or link the user subroutine",
+}
+#: Total time that may be missing at the end: the .sts has few digits.
+NEAR = 1e-3
+MOST_LINES = 12
+_ERROR = re.compile(r"\*\*\*\s*error", re.IGNORECASE)
+_INSIDE_OUT = re.compile(r"inside[ -]out(?:\s+at\s+element\s+(\d+))?", re.IGNORECASE)
+_LICENCE = re.compile(r"licen[cs]e", re.IGNORECASE)
+_REFUSED = re.compile(
+    r"error|fail|denied|unable|could not|cannot|(not |un)available|exhausted|no such feature",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a job: `problem` None when well; licence: denied; iterations, repeated: of all."""
+
+    problem: str | None
+    number: int | None
+    said: str
+    licence: bool
+    iterations: int
+    repeated: int
+
+    @property
+    def collapse(self) -> bool:
+        """Return whether Marc itself gave up: what it wrote until then is a result."""
+        said = self.problem is not None and self.problem.startswith(MEANINGS[NO_SMALLER])
+        return self.number == NO_SMALLER and said
+
+
+def ending(
+    folder: Path, job: str, screen: str, outcome: Outcome, timeout: float, time: float
+) -> Ending:
+    """Judge a job from its files: well is number 3004, the whole time, and no element inside out.
+
+    screen : file with what run_marc printed. time : total, at a good end. Return codes are not
+    asked: scripts around Marc give any.
+    """
+    done = increments(folder / f"{job}.sts")
+    number = exit_number(
+        *(folder / f"{job}.{end}" for end in ("sts", "log", "out")), folder / screen
+    )
+    texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
+    errors, licence_lines, turned, complaints = _lines(texts)
+    full = disk_full(folder, complaints, outcome)
+    reached = f"after increment {done[-1].increment}" if done else "before the first increment"
+    licence = bool(licence_lines) and not done
+    problem = None
+    if outcome.timed_out:
+        problem, licence = f"did not end within {timeout:g} s: killed {reached}", False
+    elif licence and number != NORMAL:
+        problem = f"no licence: {licence_lines[0]}"
+    elif full and number != NORMAL:
+        problem = f"disk full {reached}: {full}"
+    elif outcome.exit_code < 0 or (outcome.signal_name and number is None):
+        problem = f"killed by {outcome.signal_name} {reached}"
+    elif number is None:
+        what = "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
+        problem = f"{what}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
+    elif turned is not None:
+        problem = f"an element was turned inside out{turned}, {reached}"
+    elif number != NORMAL:
+        meaning = MEANINGS.get(number, "did not end well")
+        problem = f"{meaning}, {reached}"
+    elif not done or done[-1].time < time - NEAR * max(1.0, time):
+        at = done[-1].time if done else 0.0
+        problem = f"ended at time {at:g} of {time:g}, {reached}"
+    said = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
+    return Ending(problem, number, said, licence and problem is not None,
+                  sum(one.iterations for one in done), repeated(done))  # fmt: skip
+
+
+def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
+    """Return `*** error` lines, refusals of a licence, which element was inside out ("" unknown),
+    and complaints of a full disk."""
+    errors, refusals, full = list[str](), list[str](), list[str]()
+    turned: str | None = None
+    for file in files:
+        with suppress(OSError), file.open(encoding="latin-1") as text:
+            for line in text:  # the .out of a long job is large
+                found = _INSIDE_OUT.search(line)
+                if found is not None and turned is None:
+                    turned = f" (element {found[1]})" if found[1] else ""
+                said = " ".join(line.split())
+                for lines, meant in (
+                    (full, any(words.lower() in line.lower() for words in WORDS)),
+                    (errors, _ERROR.search(line)),
+                    (refusals, _LICENCE.search(line) and _REFUSED.search(line)),
+                ):
+                    if meant and said not in lines and len(lines) < MOST_LINES:
+                        lines.append(said)
+    return errors, refusals, turned, full
+
+
+def run_job(
+    deck: str, time: int, source: str | None, settings: MarcSettings, read: Reader[T],
+    rescue: Reader[T] | None = None, parent: Path | None = None, timeout: float | None = None,
+    tell: Tell | None = None,
+) -> tuple[T, Ending]:  # fmt: skip
+    """Run a deck in a fresh scratch folder below `parent`; return what `read` makes of its results.
+
+    time : total, at the end. source : of a user subroutine, or None. rescue : reads the results of
+    a run that stopped early. SolverFailure: no good end; names the kept folder. LicenceDenied: it
+    never began. InputError: a Marc that is not there.
+    """
+    find_marc(settings)
+    seconds = timeout or settings.timeout
+    subroutine = None if source is None else SUBROUTINE
+    with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
+        write_deck(folder, {f"{JOB}.dat": deck, SUBROUTINE: source})
+        sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
+        watch = None if tell is None else Watch(lambda: increments(sts), tell)
+        command, screen = run_command(settings, JOB, subroutine), folder / SCREEN
+        outcome = run_process(command, folder, screen, seconds, settings.environment, watch)
+        set_earlier_aside(folder)
+        end = ending(folder, JOB, SCREEN, outcome, seconds, float(time))
+        if end.problem is None:
+            try:
+                return read(results, end.iterations), end
+            except SolverFailure as failure:
+                number = end.number if failure.exit_number is None else failure.exit_number
+                raise SolverFailure(failure.reason, NAME, number, failure.log_tail) from None
+        log.info("stopped early: %s", end.problem)
+        try:
+            if rescue is not None and end.collapse:
+                return rescue(results, end.iterations), end
+        except SolverFailure as failure:
+            # Why it stopped says more than what its results then lack.
+            log.info("%s", failure.reason)
+        kind = LicenceDenied if end.licence else SolverFailure
+        raise kind(end.problem, NAME, end.number, end.said)
+
+
+def set_earlier_aside(folder: Path) -> None:
+    """Rename what is older than the deck: a site's script may copy old files into the folder."""
+    begun = (folder / f"{JOB}.dat").stat().st_mtime_ns
+    for name in WRITTEN:
+        path = folder / f"{JOB}.{name}"
+        if path.is_file() and path.stat().st_mtime_ns < begun:
+            log.warning(
+                "%s is older than the deck, and is left aside as %s", path, path.name + EARLIER
+            )
+            path.rename(path.with_name(path.name + EARLIER))

@@ -27,8 +27,8 @@ from bubblefit.readers.tables import PRESSURE_UNITS
 from bubblefit.runs.setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.exports import FORMATS
-from bubblefit.solvers.marc.job import exit_number, increments, repeated
 from bubblefit.solvers.marc.settings import site_settings
+from bubblefit.solvers.marc.solver import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 from openpyxl import Workbook
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bubblefit.reports import studies
+from bubblefit.reports import fit_page, study_pages
 from bubblefit.reports.charts import axis_ends, moduli_charts, pinned_charts
 from bubblefit.runs.refinement import ratios
 
@@ -19,7 +19,7 @@ from ..drawings import check_charts, data, legend, lines, named
 )  # fmt: skip
 def test_optima(values, said):
     ended = sorted((v for v in values if np.isfinite(v)), reverse=True)
-    charts = studies.optima_chart(values, "Words")
+    charts = fit_page.optima_chart(values, "Words")
     check_charts(charts)
     (chart,) = charts.charts
     (optima,) = data(chart)
@@ -43,7 +43,7 @@ def test_laws():
         law("cubic", 12, 48.0, 60.0, [50.0, np.nan]),
         law("trilinear", 9, float("nan")),
     ]
-    charts = studies.law_charts(rows, 45.0, "RMS error, N", "c")
+    charts = study_pages.law_charts(rows, 45.0, "RMS error, N", "c")
     check_charts(charts)
     (chart,) = charts.charts
     assert list(chart.x_names) == [
@@ -54,7 +54,7 @@ def test_laws():
     assert own["cross-validated error"].y == [260.0, 60.0, None]
     assert [s.y for s in chart.series if s.name == "single folds"] == [[200, 300], [50, None]]
     assert chart.level == 45.0 and not chart.log_y and chart.from_zero
-    assert studies.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
+    assert study_pages.law_charts([law("a", 3, 1.0, 20.0)], None, "N", "").charts[0].log_y
 
 
 def test_profiles():
@@ -62,7 +62,7 @@ def test_profiles():
         name="E1 at 1 %", curve=([90.0, 100.0, 120.0], [5.0, 0.0, 2.0]), best=100.0, sigma=5.0,
         ends=(92.5, None),
     )  # fmt: skip
-    chart = studies.profile_chart(panel, 3.84)
+    chart = study_pages.profile_chart(panel, 3.84)
     own = named(chart)
     assert (own["profile"].x, own["profile"].y) == ([90.0, 100.0, 120.0], [5.0, 0.0, 2.0])
     assert (own["ends"].x, own["ends"].y) == ([92.5, 92.5], [0.0, 3.84])
@@ -80,7 +80,7 @@ def test_nu12():
     few = {"one": ratios([0.1, 0.2], [np.nan, 1.0], 1.0)}
     parts = {"a": SimpleNamespace(responses=lines), "b": SimpleNamespace(responses=few)}
     study = SimpleNamespace(parts=parts, base=0.24, response="apex")
-    chart, few = studies.nu12_charts(study, "c").charts
+    chart, few = study_pages.nu12_charts(study, "c").charts
     assert [series.rank for series in chart.series[:-1]] == pytest.approx(np.linspace(0, 1, 8))
     assert chart.series[3].y == pytest.approx([1.3, 1.0]) and chart.level == 1.0
     assert "1 to 1.7" in chart.alt
@@ -98,7 +98,7 @@ def test_nu12():
         counted="strip", ended=runs, strain=lambda name, place: place,
         sigma=lambda name: [0.1, 0.05, 0.0] if name == "E1" else None,
     )  # fmt: skip
-    errors, others = studies.weights_charts(study)
+    errors, others = study_pages.weights_charts(study)
     assert errors.charts[0].series[0].y == pytest.approx([1.0, 2.0, 3.0])
     first, _, shear = others.charts
     assert [s.y for s in first.series] == [[90, 100, 110], [100], [50, 60, 70], [60], [9, 9, 9]]

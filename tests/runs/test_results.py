@@ -22,12 +22,12 @@ from bubblefit.reports import fit_page
 from bubblefit.runs.estimate import GAP, estimate_of, with_start
 from bubblefit.runs.fit import agreement, check
 from bubblefit.runs.starts import StartRecord
-from bubblefit.runs.verification import known_law
-from bubblefit.runs.verification.closed_forms import (
+from bubblefit.runs.verification import (
     ISOTROPIC,
     RADIUS_THIN_WALLS,
     THICKNESS_THIN_WALLS,
     capped_strain,
+    known_law,
     sphere_model,
     tube_model,
 )

@@ -29,7 +29,7 @@ from bubblefit.readers.sections import whole_in_base_units
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 from bubblefit.solvers.calculix import sheets as calculix_sheets
-from bubblefit.solvers.marc import sheets as marc_sheets
+from bubblefit.solvers.marc import analyses as marc_analyses
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ...complaints import complaint, complaint_with, refused
@@ -372,7 +372,7 @@ def test_a_cord_along_the_sheet_is_in_the_model_and_other_programs_refuse_it(tmp
     plain = MembraneSolver().run(replace(model, cords=()), prepared.known).displacement[-1, :, 2]
     assert with_cord < 0.9 * plain.max()
     law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
-    for analyse in (calculix_sheets.analyse_bubble, marc_sheets.analyse_bubble):
+    for analyse in (calculix_sheets.analyse_bubble, marc_analyses.analyse_bubble):
         assert refused(analyse, model, law, None, None).field == "cord"
 
 

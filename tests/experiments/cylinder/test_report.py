@@ -15,9 +15,9 @@ from bubblefit.experiments.cylinder.predicted import (
     CylinderOutcome,
     measured_table,
 )
+from bubblefit.experiments.cylinder.report import bending_charts
 from bubblefit.experiments.kinds import Output
 from bubblefit.readers.bending import BendingCurve, BendingError
-from bubblefit.reports.cylinders import bending_charts
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
 

@@ -13,7 +13,7 @@ from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.validation import validate
 from bubblefit.solvers.calculix import cylinder as calculix_cylinder
-from bubblefit.solvers.marc import cylinder as marc_cylinder
+from bubblefit.solvers.marc import analyses as marc_analyses
 
 from ...complaints import complaint_with, refused
 from ...cylinder_cases import write_project
@@ -256,7 +256,7 @@ def test_loads_and_supports_of_the_membrane_alone(tmp_path, key, said):
     for name, value, own, usual in values:
         assert value == (own if name == key else usual)
     law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
-    for analyse in (calculix_cylinder.analyse, marc_cylinder.analyse):
+    for analyse in (calculix_cylinder.analyse, marc_analyses.analyse_cylinder):
         assert refused(analyse, model, law, None, None).field == key
 
 
@@ -269,5 +269,5 @@ def test_a_membrane_takes_cords_and_other_programs_refuse_them(tmp_path):
     (test,) = cylinders(path)
     assert [c.angle for c in test.model().cords] == [60.0, 300.0]
     law = HypoelasticLaw.linear(400.0, 400.0, 40.0)
-    for analyse in (calculix_cylinder.analyse, marc_cylinder.analyse):
+    for analyse in (calculix_cylinder.analyse, marc_analyses.analyse_cylinder):
         assert refused(analyse, test.model(), law, None, None).field == "cord"

@@ -16,16 +16,18 @@ from bubblefit.meshes.mesh import enclosed_volume
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.meshes.tube import Refinement, cylinder_mesh
 from bubblefit.solvers.exports import FORMATS
-from bubblefit.solvers.marc.cylinder import (
+from bubblefit.solvers.marc.analyses import (
     ABOVE,
     BELOW,
+    analyse_bubble,
+    bubble_deck,
     contact_bodies,
     cylinder_deck,
+    strip_deck,
     touching,
 )
 from bubblefit.solvers.marc.deck import fabric_context, fabric_frames, named_set, set_lines
 from bubblefit.solvers.marc.settings import BLOCKS, MarcSettings
-from bubblefit.solvers.marc.sheets import analyse_bubble, bubble_deck, strip_deck
 from bubblefit.solvers.marc.solver import MarcSolver
 from hypothesis import given
 from hypothesis import strategies as st

@@ -10,10 +10,9 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.solvers.marc.cylinder import cylinder_deck
-from bubblefit.solvers.marc.job import exit_number, increments, repeated
+from bubblefit.solvers.marc.analyses import bubble_deck, cylinder_deck
 from bubblefit.solvers.marc.settings import MarcSettings
-from bubblefit.solvers.marc.sheets import bubble_deck
+from bubblefit.solvers.marc.solver import exit_number, increments, repeated
 from bubblefit.solvers.marc.t19 import T19File
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

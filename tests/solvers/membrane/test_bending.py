@@ -21,7 +21,7 @@ from bubblefit.meshes.cylinder_model import (
 )
 from bubblefit.meshes.mesh import Mesh
 from bubblefit.meshes.tube import half_tube, tube_warp
-from bubblefit.runs.verification.closed_forms import FIRST, PlaneEnds, published_moment
+from bubblefit.runs.verification import FIRST, PlaneEnds, published_moment
 from bubblefit.solvers.base import BandedSolver
 from bubblefit.solvers.membrane import bending
 from bubblefit.solvers.membrane import bending as cylinder

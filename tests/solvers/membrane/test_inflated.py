@@ -17,11 +17,11 @@ from bubblefit.meshes.cylinder_model import (
     inflated_cylinder,
 )
 from bubblefit.meshes.mesh import log_strain_of
-from bubblefit.runs.verification.closed_forms import ISOTROPIC, NU, E, capped_strain, in_the_middle
-from bubblefit.runs.verification.closed_forms import RADIUS_THIN_WALLS as RADIUS
-from bubblefit.runs.verification.closed_forms import THICKNESS_THIN_WALLS as THICKNESS
-from bubblefit.runs.verification.closed_forms import sphere_model as sphere
-from bubblefit.runs.verification.closed_forms import tube_model as tube
+from bubblefit.runs.verification import ISOTROPIC, NU, E, capped_strain, in_the_middle
+from bubblefit.runs.verification import RADIUS_THIN_WALLS as RADIUS
+from bubblefit.runs.verification import THICKNESS_THIN_WALLS as THICKNESS
+from bubblefit.runs.verification import sphere_model as sphere
+from bubblefit.runs.verification import tube_model as tube
 from bubblefit.solvers.membrane.bending import settled
 from bubblefit.solvers.membrane.closed import ClosedMembrane, closed_cavity
 from bubblefit.solvers.membrane.factorisation import tangent_for

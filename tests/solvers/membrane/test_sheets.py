@@ -19,14 +19,15 @@ from bubblefit.meshes.disk import (
 )
 from bubblefit.meshes.mesh import sampling_matrix
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
-from bubblefit.runs.verification import cases, shapes
-from bubblefit.runs.verification.closed_forms import (
+from bubblefit.runs.verification import (
     FICHTER,
     MODULUS,
     RADIUS,
     TERMS,
     THICKNESS,
     apex_coefficient,
+    cases,
+    shapes,
     stress_series,
 )
 from bubblefit.solvers.base import History
