@@ -197,12 +197,10 @@ class Project:
     def __post_init__(self) -> None:
         name = self.fit.method
         check_one_of(name, method_names(), "fit.method", self.path)
-        if self.fit.constraints == "boolean":
-            if not method_named(name).boolean:
-                others = [other for other in method_names() if method_named(other).boolean]
-                problem = f"boolean flags have no slope: use 'margin' with method {name!r}, or "
-                problem += " or ".join(map(repr, others))
-                raise InputError(self.path, "fit.constraints", problem)
+        if self.fit.constraints == "boolean" and not method_named(name).boolean:
+            others = [repr(other) for other in method_names() if method_named(other).boolean]
+            problem = f"boolean flags have no slope: use 'margin' with method {name!r}, or "
+            raise InputError(self.path, "fit.constraints", problem + " or ".join(others))
 
     @classmethod
     def of(

@@ -1,7 +1,6 @@
 """Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison.
 
-The model is that of [[cylinder]] in `experiments/cylinder`: the card that is fitted predicts the
-measured loads best.
+The model is that of [[cylinder]], in `experiments/cylinder`.
 """
 
 from collections.abc import Mapping, Sequence

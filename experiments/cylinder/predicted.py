@@ -364,10 +364,11 @@ class CylinderOutcome:
         sigma = self.sigma(number, {"": at})[""] or 0.0
         off = BAND * sigma / (over if name == "stiffness" else 1.0)
         ends = [size - off, size + off]
-        if (other := self.other_end(number)) is not None:
-            if (beside := getattr(self.measures[other], name)) is not None:
-                end = beside if name == "stiffness" else beside[1]
-                ends += [end - off, end + off]
+        other = self.other_end(number)
+        beside = None if other is None else getattr(self.measures[other], name)
+        if beside is not None:
+            end = beside if name == "stiffness" else beside[1]
+            ends += [end - off, end + off]
         return size, min(ends), max(ends)
 
     @property

@@ -151,8 +151,8 @@ def band_table(card: MaterialCard) -> str:
     rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
     for name, strain in strains_of(law).items():
         values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
-        for row in zip(*values, strict=True):
-            rows.append(f"{name}," + ",".join(f"{value:.9g}" for value in row))
+        every = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
+        rows += [f"{name},{numbers}" for numbers in every]
     return "\n".join(rows) + "\n"
 
 

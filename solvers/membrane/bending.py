@@ -61,18 +61,16 @@ SHARE = 1e-5
 class Neighbours:
     """Membranes of laws next to that of another one, a parameter and a step each, on its way.
 
-    A neighbour's state is its own. Its equilibrium at a level is found from that of the membrane by
-    two steps with the membrane's tangent, which holds gas, contact, cords and wrinkles: one step
-    leaves an error of second order, which contact makes 1e-3 of a slope. steps (k,).
+    A neighbour has a state of its own. Its equilibrium follows from the membrane's in two steps by
+    the tangent of that one (gas, contact, cords, wrinkles): one would leave 1e-3 of a slope.
     """
 
     def __init__(self, membrane: ClosedMembrane, parameters: Sequence[str]) -> None:
-        law, self.each, self.steps = membrane.law, [], np.ones(len(parameters))
+        law, self.each = membrane.law, []
         acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}  # others of a form stay zero
-        for k, name in enumerate(parameters):
-            if name in acting:
-                self.steps[k] = usual_step(law, name, 1.0, SHARE)
-            beside = law_beside(law, name, self.steps[k]) if name in acting else law
+        self.steps = np.array([usual_step(law, name, 1.0, SHARE) for name in parameters])
+        for name, step in zip(parameters, self.steps.tolist(), strict=True):
+            beside = law_beside(law, name, step) if name in acting else law
             self.each.append(_copied(membrane, beside))
         self.moved = [np.zeros_like(membrane.reference) for _ in self.each]
 
@@ -171,10 +169,10 @@ class Bodies:
 
     def move(self, moved: float) -> None:
         """Move the collars by a way (mm) from where they touched."""
-        at = [np.asarray(body.centre) + moved * self.way for body in self.collars]
-        moves = zip(self.collars, at, strict=True)
-        collars = [replace(body, centre=tuple(to.tolist())) for body, to in moves]
-        self.membrane.bodies = (*self.posts, *collars)
+        self.membrane.bodies = list(self.posts)
+        for body in self.collars:
+            to = np.asarray(body.centre) + moved * self.way
+            self.membrane.bodies.append(replace(body, centre=tuple(to.tolist())))
 
     def pushes(self) -> Array:
         """Return forces (bodies, 3) N on the meshed part, zero of collars that are not there."""
