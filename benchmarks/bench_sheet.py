@@ -57,9 +57,8 @@ def surfaces(elements=112, *ways, data=0, seen=1.0):
             print(f"{name:26s} E1 {100 * off['E1']:6.1f} %  E2 {100 * off['E2']:6.1f} %  residual "
                   f"{numbers['mean_abs_mm']:.3f} mm, z0 {sheet['least']:.2f} to "
                   f"{sheet['largest']:.2f} mm{words}; G12 at rest "
-                  f"{float(np.asarray(result.law.modulus('G12', 0.0))):.1f} MPa, "
-                  f"{result.result['analyses']} analyses, {time.perf_counter() - begun:.0f} s",
-                  flush=True)  # fmt: skip
+                  f"{float(result.law.modulus('G12', 0.0)):.1f} MPa, {result.result['analyses']} analyses, "
+                  f"{time.perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
 
 
 def law(moduli=MODULI):
@@ -110,11 +109,10 @@ RADIUS = 100.0
 
 @dataclass(frozen=True)
 class Uneven:
-    """What is wrong with the sheet, and with the measurement.
+    """Faults of the sheet and of the measurement.
 
-    height, rim : mm, scale of the surface, largest motion of the rim. slack : share of the
-    stress-free length. noise : mm, of every number. repeats : points at every node. seen : share of
-    the stress-free surface's heights that the picture has.
+    height, rim : mm, scale of the surface, largest motion of the rim. slack : share of the length.
+    noise : mm, of every number. repeats : points at a node. seen : of the heights, in the picture.
     """
 
     height: float = 4.0
