@@ -57,8 +57,8 @@ def surfaces(elements=112, *ways, data=0, seen=1.0):
             print(f"{name:26s} E1 {100 * off['E1']:6.1f} %  E2 {100 * off['E2']:6.1f} %  residual "
                   f"{numbers['mean_abs_mm']:.3f} mm, z0 {sheet['least']:.2f} to "
                   f"{sheet['largest']:.2f} mm{words}; G12 at rest "
-                  f"{float(result.law.modulus('G12', 0.0)):.1f} MPa, {result.result['analyses']} analyses, "
-                  f"{time.perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
+                  f"{float(result.law.modulus('G12', 0.0)):.1f} MPa, {result.result['analyses']} "
+                  f"analyses, {time.perf_counter() - begun:.0f} s", flush=True)  # fmt: skip
 
 
 def law(moduli=MODULI):
