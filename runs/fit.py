@@ -101,8 +101,7 @@ def moduli_apart(problem: FitProblem, a: StartRecord, b: StartRecord) -> float:
     return max(moduli_error(one, other, ends, POINTS).values())
 
 
-#: So many starts run coarse to fine unless the project says otherwise: most of their time is saved,
-#: and of fewer each is to be evidence of its own.
+#: So many starts run coarse to fine by default; of fewer each is evidence of its own.
 MANY_STARTS = 10
 #: Times as many starts are wanted where the best optimum was found once.
 MORE = 5

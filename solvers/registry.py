@@ -18,7 +18,7 @@ from .base import Diagnosis, Solver, SolverCheck
 from .calculix.executable import OFFER as CALCULIX
 from .licences import licensed
 from .marc.settings import OFFER as MARC
-from .membrane import OFFER as MEMBRANE
+from .membrane.settings import OFFER as MEMBRANE
 from .run_cache import RunCache, with_cache
 from .scratch import sweep_left
 from .settings import (

@@ -186,8 +186,7 @@ PLAIN, BRAID = ("axial", "hoop", "shear"), (
 )  # fmt: skip
 #: m/s^2 of self weight.
 GRAVITY = 9.80665
-#: kg/m^2 beyond which one layer of a fabric is given in g/m^2.
-HEAVIEST = 50.0
+HEAVIEST = 50.0  # kg/m^2 of one layer: beyond, it is given in g/m^2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
