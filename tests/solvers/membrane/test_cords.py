@@ -216,7 +216,7 @@ def test_a_quarter_of_a_sheet_with_cords_is_a_quarter_of_the_whole(lines):
 
 @pytest.mark.parametrize("prestrain", [0.0, 0.01])
 def test_two_cords_that_carry_a_soft_strip_are_arcs_of_circles(prestrain):
-    """Of half angle a: EA (a / sin a - 1 + prestrain) and the strip hold p w L / (2 sin a)."""
+    """Compare with arcs of half angle a: cord and strip hold p w L / (2 sin a) together."""
     length, width, stiffness, pressure = 200.0, 20.0, 2e4, 0.01
     soft = HypoelasticLaw.linear(1.0, 1.0, 0.4, 0.0)
 
