@@ -242,7 +242,8 @@ def mixed(tmp_path, monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Both)
     read = read_project(write_project(tmp_path))
     known = {**kinds_of_test.kinds(), "strut": kind}
-    monkeypatch.setattr(project_module, "kinds", lambda: known)
+    monkeypatch.setattr(project_module, "kinds", lambda names=None: known)
+    monkeypatch.setattr(project_module, "kind_names", lambda: (*known,))
     return replace(read, tests={"pulled": StrutTest("pulled"), **read.tests})
 
 

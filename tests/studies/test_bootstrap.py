@@ -21,7 +21,7 @@ from bubblefit.project.project import read_project
 from bubblefit.reports.html import percent
 from bubblefit.runs import bootstrap as module
 from bubblefit.runs import plan as plan_module
-from bubblefit.runs import weights as study_of
+from bubblefit.runs import validation as study_of
 from bubblefit.runs.best import NOT_THE_CARD
 from bubblefit.runs.bootstrap import FEW_UNITS, MOST, bootstrap
 from bubblefit.runs.plan import plan

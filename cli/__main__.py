@@ -1,0 +1,5 @@
+"""`python -m bubblefit.cli` is the `bubblefit` command."""
+
+from .main import main
+
+main(prog_name="bubblefit")
