@@ -1,7 +1,4 @@
-"""Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison.
-
-The model is that of [[cylinder]], in `experiments/cylinder`.
-"""
+"""Measured bending of inflated cylinders in a fit: section [[bending]], data, comparison."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -259,13 +259,11 @@ def with_calculix() -> Iterator[Number]:
         yield Number(what, found["apex"][i], theirs, "mm", ALLOWED_CALCULIX, SOURCE_ABAQUS)
 
 
-# Closed forms
-#
+# Closed forms.
 # Hencky's inflated circular membrane (1915): with S = N_r (E t p^2 R^2)^(-1/3) and r in units of R
 # the equilibrium and compatibility of a flat, linear elastic membrane under vertical pressure are
 # S'' + 3 S'/r + 1/(8 S^2) = 0, regular at r = 0, with u = 0 at the rim: N_theta = nu N_r,
-# (1 - nu) S + S' = 0 at r = 1. The slope of the dome is -r/(2 S) (p R/(E t))^(1/3), whose integral
-# is the height of the apex.
+# (1 - nu) S + S' = 0 at r = 1. Integrating the slope -r/(2 S) (p R/(E t))^(1/3) gives the height.
 #
 # A tube under pressure p bent beyond its first wrinkle (Comer and Levy 1963), its ends plane and
 # turned against each other: no stress at angles below t from the compressed side, where cos t =
