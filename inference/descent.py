@@ -5,6 +5,8 @@ is feasible, and a stable equilibrium: a soft membrane can fold, as no test unde
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import quadprog
@@ -35,9 +37,76 @@ def descend(
     end = CONVERGED if norms else LEVEL
     growth, idle = 2.0, 0
     scale: Array | None = None
+    here, second, counts = _Near.of(problem, point, norms, only), 0.0 * np.eye(len(point.unknowns)), False
     while True:
         if point.value < tolerance:
             return point, CONVERGED
+        diagonal = np.diag(here.curvature) + 1e-14 * np.trace(here.curvature)
+        if only is not None:
+            diagonal[~only] = 1e6 * np.trace(here.curvature)
+        # Half-life of one iteration: directions that went flat keep some damping.
+        scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
+        models = here.curvature, here.curvature + second - here.across
+        cuts: list[tuple[Array, float]] = []
+        for _ in range(MOST_TRIALS):
+            if problem.analyses >= max_analyses:
+                return point, ANALYSES_USED_UP
+            damped = [model + damping * np.diag(scale) for model in models]
+            whole = int(counts and _definite(damped[1]))
+            step = bounded_step(
+                problem.unknowns, damped[whole], here.gradient, point.unknowns, cuts
+            )
+            if step is None:
+                damping *= 10.0
+                continue
+            predicted = [-(2.0 * here.gradient + model @ step) @ step for model in models]
+            if predicted[whole] < negligible * here.merit:
+                return point, end
+            trial = problem.evaluate(point.unknowns + step, True)
+            if trial is not None and point.stable and not trial.stable:
+                cut = _cut(problem, point.unknowns, trial.unknowns)
+                if cut is not None:
+                    cuts.append(cut)
+                    continue
+            elif trial is not None:
+                gained = here.gained(problem, trial, norms)
+                if gained > 0:
+                    break
+            if whole:  # the simple model is the one to trust
+                counts = False
+                continue
+            damping, growth = damping * growth, min(2.0 * growth, 64.0)
+        else:
+            return point, end
+        ratio = float(gained / max(float(predicted[whole]), 1e-300))
+        damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
+        growth = 2.0
+        idle = idle + 1 if gained < NO_PROGRESS * here.merit else 0
+        counts = abs(predicted[1] - gained) < abs(predicted[0] - gained)
+        there = _Near.of(problem, trial, norms, only)
+        second = _secant(second, step, there.turned(here), there.gradient - here.gradient)
+        point, here = trial, there
+        if idle >= PATIENCE:
+            return point, end
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """A point as its step sees it: residuals and slopes, weighed so that their squares add up.
+    across : what the norms of blocks curve less than their weighed squares."""
+
+    r: Array
+    j: Array
+    root: Array
+    gradient: Array
+    curvature: Array
+    across: Array
+    merit: float
+
+    @classmethod
+    def of(
+        cls, problem: FitProblem, point: Evaluation, norms: bool, only: NDArray[np.bool_] | None
+    ) -> Self:
         assert point.jacobian is not None
         root = np.ones_like(point.residual)
         if norms:
@@ -48,46 +117,34 @@ def descend(
         r, j = point.residual * root, point.jacobian * root[:, None]
         if only is not None:
             j[:, ~only] = 0.0
-        merit = float(r @ r)
-        curvature = j.T @ j
-        diagonal = np.diag(curvature) + 1e-14 * np.trace(curvature)
-        if only is not None:
-            diagonal[~only] = 1e6 * np.trace(curvature)
-        # Half-life of one iteration: directions that went flat keep some damping.
-        scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
-        gradient = j.T @ r
-        cuts: list[tuple[Array, float]] = []
-        for _ in range(MOST_TRIALS):
-            if problem.analyses >= max_analyses:
-                return point, ANALYSES_USED_UP
-            damped = curvature + damping * np.diag(scale)
-            step = bounded_step(problem.unknowns, damped, gradient, point.unknowns, cuts)
-            if step is None:
-                damping *= 10.0
-                continue
-            predicted = -(2.0 * gradient @ step + step @ curvature @ step)
-            if predicted < negligible * merit:
-                return point, end
-            trial = problem.evaluate(point.unknowns + step, True)
-            if trial is not None and point.stable and not trial.stable:
-                cut = _cut(problem, point.unknowns, trial.unknowns)
-                if cut is not None:
-                    cuts.append(cut)
-                    continue
-            elif trial is not None:
-                gained = merit - float(np.sum((trial.residual * root) ** 2))
-                if gained > 0:
-                    break
-            damping, growth = damping * growth, min(2.0 * growth, 64.0)
-        else:
-            return point, end
-        ratio = float(gained / max(float(predicted), 1e-300))
-        damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
-        growth = 2.0
-        idle = idle + 1 if gained < NO_PROGRESS * merit else 0
-        point = trial
-        if idle >= PATIENCE:
-            return point, end
+        across = np.zeros((j.shape[1],) * 2)
+        if norms:
+            slopes = np.add.reduceat(r[:, None] * j, problem.blocks.starts) / np.sqrt(sizes)[:, None]
+            across = slopes.T @ slopes
+        return cls(r, j, root, j.T @ r, j.T @ j, across, float(r @ r))
+
+    def gained(self, problem: FitProblem, trial: Evaluation, norms: bool) -> float:
+        if norms:
+            return 2*(self.merit - problem.blocks.value(trial.residual))
+        return self.merit - float(np.sum((trial.residual * self.root) ** 2))
+
+    def turned(self, before: Self) -> Array:
+        """Return the change of the gradient that comes from that of the slopes."""
+        return self.gradient - (before.j * (self.root / before.root)[:, None]).T @ self.r
+
+
+def _secant(second: Array, step: Array, turned: Array, change: Array) -> Array:
+    """Return the curvature of the residuals themselves, by the update of Dennis, Gay and Welsch.
+    ACM Trans. Math. Softw. 7 (1981) 348: it agrees with the last step and is sized first."""
+    along = float(change @ step)
+    if along <= 1e-12 * np.linalg.norm(change) * np.linalg.norm(step):
+        return second
+    had = float(step @ second @ step)
+    second = second * (min(1.0, abs(float(step @ turned) / had)) if had else 1.0)
+    off = turned - second @ step
+    both = np.outer(off, change)
+    return np.asarray(second + (both + both.T) / along
+        - float(off @ step) / along**2 * np.outer(change, change))
 
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
@@ -143,3 +200,7 @@ def _quadratic(
     except ValueError:
         return None
     return np.asarray(solution * unit)
+
+
+def _definite(matrix: Array) -> bool:
+    return bool(np.linalg.eigvalsh(matrix / np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))))[0] > 1e-10) if (np.diag(matrix) > 0).all() else False

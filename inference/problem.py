@@ -62,6 +62,7 @@ class FitProblem:
     starts: Starts = field(default_factory=RandomStarts)
     analyses: int = 0
     unstable: int = 0  # of them, ended in an equilibrium that no test can show
+    last_unstable: int = 0  # number of the last one of these
     cached: int = 0  # of them, from the cache of runs
     failure: str = ""  # why the last one that failed did
     warm_starts: bool = True
@@ -184,6 +185,7 @@ class FitProblem:
         coefficients = law.beta[list(free)]
         point = Evaluation(y.copy(), coefficients, whole, value, jacobian, tuple(histories), stable)
         self.unstable += not point.stable
+        self.last_unstable = self.last_unstable if point.stable else self.analyses
         self.cached += point.from_cache
         self._report(y, value, point.status)
         return point

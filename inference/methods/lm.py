@@ -14,6 +14,7 @@ from . import FitOptions
 SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
+QUIET = 8 # analyses 
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
 ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads
 
@@ -37,7 +38,7 @@ class LevenbergMarquardt:
         level, status = descend(problem, first, tolerance, before_last)
         best, status = _then_norms(problem, level, status, tolerance, before_last)
         for factor in STIFFER:
-            if best.value < tolerance or problem.unstable == met:
+            if best.value < tolerance or problem.unstable == met or problem.analyses-problem.last_unstable>QUIET:
                 break
             other, how = _from_stiffer(problem, best, level, factor, tolerance, before_last)
             if other.value < best.value:

@@ -33,6 +33,9 @@ CHORD_BELOW, CHORD_GAIN = 1e-2, 0.15
 # Below this residual, steps that gain no digits are rounding (fine meshes at low pressure), unless
 # the residual falls from step to step (a tangent that is nearly singular).
 ROUNDING_BELOW, MOST_IDLE = 1e-6, 3
+# A slack sheet at low pressure can wander among folds without end: after so many iterations a
+# residual beyond this, and so many times the first one, has not been seen to come back.
+WANDERING, FAR, FARTHER = 12, 10.0, 5.0
 # Where a modulus jumps full steps go to and fro: after this many, every step has to gain.
 MOST_FRUITLESS = 3
 #: Steps of a line search: after as many without equilibrium, half the way is tried instead.
@@ -143,10 +146,13 @@ class Membrane:
         flat = u.reshape(-1)
         step = before = np.empty(0)
         last, scale, backtracks, chord = np.inf, 1.0, 0, False
-        least, idle = np.inf, 0
+        least, first, idle = np.inf, np.inf, 0
         jumps, fruitless = self.law.jumps, 0
-        for _ in range(MOST_ITERATIONS):
+        for k in range(MOST_ITERATIONS):
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
+            first = norm if k == 0 else first
+            if k >= WANDERING and norm > max(FAR, FARTHER * first):
+                return None
             if norm < self.tolerance:
                 return u
             idle = idle + (norm > 0.5 * last) if 0.5 * least < norm < ROUNDING_BELOW else 0
