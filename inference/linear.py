@@ -79,9 +79,8 @@ class Linear:
         if second is not None:
             whole = whole + sharp.T @ second.added @ sharp
             answering = j - second.left[:, None] * second.slopes(problem, j)
-        estimator, answer = (
-            sharp @ np.linalg.solve(whole, sharp.T @ one.T) for one in (j, answering)
-        )
+        inverse = sharp @ np.linalg.inv(whole) @ sharp.T
+        estimator, answer = (inverse @ one.T for one in (j, answering))
         moved = answer * (weights * noise.rows)
         return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
 

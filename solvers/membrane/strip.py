@@ -13,7 +13,7 @@ from ...materials.responses import biaxial_response
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..base import History
 from .bubble import Wall
-from .factorisation import AroundTangent, tangent_for
+from .factorisation import AroundTangent, SingularTangent, tangent_for
 from .kernel import reference_elements
 from .newton import (
     Asked,
@@ -36,6 +36,8 @@ MOST_CORRECTIONS = 12
 MOST_ROUNDS, LONGEST_STEP = 60, 0.1
 #: Of its largest force, and of its stiffness: what is left of the residual.
 ROUNDED, ROUNDING = 1e-11, 1e-14
+#: Residual below which it may grow in a step.
+NEARLY = 1e-3
 #: mm of gauge elongation over mm of gauge length.
 GAUGE_TOLERANCE = 1e-10
 #: Increments from which the start of the next one is extrapolated.
@@ -161,7 +163,39 @@ class Pulling(Loading):
         return w
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
-        """Return the equilibrium (n, 3) with this elongation, by Newton on the pull; or None."""
+        """Return the equilibrium (n, 3) with this elongation; or None.
+        By Newton's iteration on displacement and pull together, else on the one for each pull."""
+        found = self._together(start, level)
+        return self._in_turn(start, level) if found is None else found
+
+    def _together(self, start: Array, level: float) -> Array | None:
+        m, u, free = self.membrane, start.copy(), self.membrane.free
+        last = np.inf
+        for _ in range(MOST_CORRECTIONS):
+            norm = m.unbalance(u, 0.0, with_tangent=True)
+            now, slope = self.elongation(u)
+            if norm < m.tolerance and abs(level - now) <= GAUGE_TOLERANCE * self.gauge_length:
+                return u
+            if not norm < max(last, NEARLY):
+                return None
+            last = norm
+            try:
+                self.tangent.factor()
+            except SingularTangent:
+                return None
+            loads = np.column_stack([m.residual, self.tangent.edge() @ self.direction])
+            moves = np.column_stack([np.zeros_like(self.direction), self.direction])
+            moves[free] = -self.tangent.solve(loads[free])
+            gained, opens = slope @ moves
+            if not opens > 0:
+                return None
+            step = moves @ np.array([1.0, (level - now - gained) / opens])
+            if not np.abs(step).max() <= m.step_limit:
+                return None
+            u += step.reshape(u.shape)
+        return None
+
+    def _in_turn(self, start: Array, level: float) -> Array | None:
         m, u = self.membrane, start
         for _ in range(MOST_CORRECTIONS):
             found = m.equilibrium(u, 0.0)
