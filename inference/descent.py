@@ -27,7 +27,7 @@ SMALLEST_DROP = 1e-3  # of the shear modulus, relative, that can explain a loss 
 def descend(
     problem: FitProblem, point: Evaluation, tolerance: float, max_analyses: int,
     norms: bool = False, only: NDArray[np.bool_] | None = None, damping: float = FIRST_DAMPING,
-    negligible: float = NEGLIGIBLE,
+    negligible: float = NEGLIGIBLE, settles: tuple[float, int] = (NO_PROGRESS, PATIENCE),
 ) -> tuple[Evaluation, str]:  # fmt: skip
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
     norms : minimise e itself, the sum of the blocks' norms, instead of their squares. only :
@@ -81,12 +81,12 @@ def descend(
         ratio = float(gained / max(float(predicted[whole]), 1e-300))
         damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
         growth = 2.0
-        idle = idle + 1 if gained < NO_PROGRESS * here.merit else 0
+        idle = idle + 1 if gained < settles[0] * here.merit else 0
         counts = abs(predicted[1] - gained) < abs(predicted[0] - gained)
         there = _Near.of(problem, trial, norms, only)
         second = _secant(second, step, there.turned(here), there.gradient - here.gradient)
         point, here = trial, there
-        if idle >= PATIENCE:
+        if idle >= settles[1]:
             return point, end
 
 

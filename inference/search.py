@@ -37,7 +37,7 @@ def approach(problem: FitProblem, start: Array, method: Method, options: FitOpti
     for last in stages[:-1]:
         part = problem.part([k for k, c in enumerate(problem.comparisons) if c.stage <= last])
         most = problem.analyses + int(LEADING * options.max_analyses)
-        optimum = method.minimise(part, y, replace(options, max_analyses=most))
+        optimum = method.minimise(part, y, replace(options, max_analyses=most, leads=True))
         problem.analyses = part.analyses
         if problem.analyses >= options.max_analyses:
             return start

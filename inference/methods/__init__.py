@@ -28,6 +28,7 @@ class FitOptions:
     constraints: Literal["margin", "boolean"] = "margin"
     tolerance: float = 1e-7
     max_analyses: int = 100
+    leads: bool = False
     max_runs: int = 10
 
 

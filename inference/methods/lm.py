@@ -14,6 +14,7 @@ from . import FitOptions
 SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
+SOON = 2e-3, 1  # relative decrease that counts as none in the first stage, so often in a row
 QUIET = 8 # analyses 
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
 ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads
@@ -35,7 +36,9 @@ class LevenbergMarquardt:
         first = problem.evaluate(start, True)
         if first is None:
             return None
-        level, status = descend(problem, first, tolerance, before_last)
+        level, status = descend(problem, first, tolerance, before_last, settles=SOON)
+        if options.leads:
+            return Optimum(level, status, problem.analyses)
         best, status = _then_norms(problem, level, status, tolerance, before_last)
         for factor in STIFFER:
             if best.value < tolerance or problem.unstable == met or problem.analyses-problem.last_unstable>QUIET:
