@@ -2,6 +2,9 @@
 
 Damping is scaled by diag(J'J) (Marquardt), positivity and bounds are constraints, so every iterate
 is feasible, and a stable equilibrium: a soft membrane can fold, as no test under pressure can show.
+Where much is left of the residual its own curvature counts: it is learnt from the steps, and taken
+as long as it foretells what a step gains better than the slopes alone (J. E. Dennis, D. M. Gay,
+R. E. Welsch, ACM Trans. Math. Softw. 7 (1981) 348).
 """
 
 from collections.abc import Sequence
@@ -19,25 +22,28 @@ from .unknowns import Unknowns
 FIRST_DAMPING = 1e-2
 MOST_TRIALS = 12  # of one step, with growing damping
 NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
-NO_PROGRESS = 1e-4  # relative decrease that counts as none ...
-PATIENCE = 3  # ... when it happens so often in a row
+#: Relative decrease that counts as no progress, and how often in a row ends the descent.
+SETTLES = 1e-4, 3
 SMALLEST_DROP = 1e-3  # of the shear modulus, relative, that can explain a loss of stability
+SMALLEST_BLOCK = 1e-6  # of the largest norm of a block, for its weight
+DEFINITE = 1e-10  # least eigenvalue of a curvature with ones on its diagonal
 
 
 def descend(
     problem: FitProblem, point: Evaluation, tolerance: float, max_analyses: int,
     norms: bool = False, only: NDArray[np.bool_] | None = None, damping: float = FIRST_DAMPING,
-    negligible: float = NEGLIGIBLE, settles: tuple[float, int] = (NO_PROGRESS, PATIENCE),
+    negligible: float = NEGLIGIBLE, settles: tuple[float, int] = SETTLES,
 ) -> tuple[Evaluation, str]:  # fmt: skip
     """Go down from `point` until e < tolerance, no progress, or `max_analyses` of the problem.
     norms : minimise e itself, the sum of the blocks' norms, instead of their squares. only :
-    (unknowns,) which may change. negligible : predicted relative decrease of the sum of squares
-    that is not worth an analysis. Returns the best point, and CONVERGED, LEVEL or ANALYSES_USED_UP.
-    """
+    (unknowns,) which may change. negligible : predicted relative decrease that is not worth an
+    analysis. settles : relative decrease that counts as none, and how often in a row it ends.
+    Returns the best point, and CONVERGED, LEVEL or ANALYSES_USED_UP."""
     end = CONVERGED if norms else LEVEL
     growth, idle = 2.0, 0
     scale: Array | None = None
-    here, second, counts = _Near.of(problem, point, norms, only), 0.0 * np.eye(len(point.unknowns)), False
+    here = _Near.of(problem, point, norms, only)
+    own, use_own = np.zeros_like(here.curvature), False
     while True:
         if point.value < tolerance:
             return point, CONVERGED
@@ -46,21 +52,21 @@ def descend(
             diagonal[~only] = 1e6 * np.trace(here.curvature)
         # Half-life of one iteration: directions that went flat keep some damping.
         scale = diagonal if scale is None else np.maximum(0.5 * scale, diagonal)
-        models = here.curvature, here.curvature + second - here.across
+        models = here.curvature, here.curvature + own - here.across
         cuts: list[tuple[Array, float]] = []
         for _ in range(MOST_TRIALS):
             if problem.analyses >= max_analyses:
                 return point, ANALYSES_USED_UP
             damped = [model + damping * np.diag(scale) for model in models]
-            whole = int(counts and _definite(damped[1]))
+            which = int(use_own and _definite(damped[1]))
             step = bounded_step(
-                problem.unknowns, damped[whole], here.gradient, point.unknowns, cuts
+                problem.unknowns, damped[which], here.gradient, point.unknowns, cuts
             )
             if step is None:
                 damping *= 10.0
                 continue
-            predicted = [-(2.0 * here.gradient + model @ step) @ step for model in models]
-            if predicted[whole] < negligible * here.merit:
+            predicted = [float(-(2.0 * here.gradient + m @ step) @ step) for m in models]
+            if predicted[which] < negligible * here.merit:
                 return point, end
             trial = problem.evaluate(point.unknowns + step, True)
             if trial is not None and point.stable and not trial.stable:
@@ -69,22 +75,22 @@ def descend(
                     cuts.append(cut)
                     continue
             elif trial is not None:
-                gained = here.gained(problem, trial, norms)
+                there = _Near.of(problem, trial, norms, only)
+                gained = here.merit - there.merit if not norms else 2 * (point.value - trial.value)
                 if gained > 0:
                     break
-            if whole:  # the simple model is the one to trust
-                counts = False
-                continue
-            damping, growth = damping * growth, min(2.0 * growth, 64.0)
+            if which:
+                use_own = False
+            else:
+                damping, growth = damping * growth, min(2.0 * growth, 64.0)
         else:
             return point, end
-        ratio = float(gained / max(float(predicted[whole]), 1e-300))
+        ratio = gained / max(predicted[which], 1e-300)
         damping = max(damping * max(1 / 8, 1 - (2 * min(ratio, 1.0) - 1) ** 3), 1e-15)
         growth = 2.0
         idle = idle + 1 if gained < settles[0] * here.merit else 0
-        counts = abs(predicted[1] - gained) < abs(predicted[0] - gained)
-        there = _Near.of(problem, trial, norms, only)
-        second = _secant(second, step, there.turned(here), there.gradient - here.gradient)
+        use_own = abs(predicted[1] - gained) < abs(predicted[0] - gained)
+        own = _learnt(own, step, there.turned(here), there.gradient - here.gradient)
         point, here = trial, there
         if idle >= settles[1]:
             return point, end
@@ -92,12 +98,13 @@ def descend(
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """A point as its step sees it: residuals and slopes, weighed so that their squares add up.
-    across : what the norms of blocks curve less than their weighed squares."""
+    """A point as its step sees it, to second order.
+    r (m,), j (m, unknowns) : weighed by `root` so that the squares add up to `merit`. gradient,
+    curvature : of half of it. across : by how much less the norms of blocks curve."""
 
+    root: Array
     r: Array
     j: Array
-    root: Array
     gradient: Array
     curvature: Array
     across: Array
@@ -112,39 +119,39 @@ class _Near:
         if norms:
             # 1/norm of each block majorises e: its weighted sum of squares falls only if e does.
             sizes = problem.blocks.norms(point.residual)
-            sizes = np.maximum(sizes, 1e-6 * sizes.max())
+            sizes = np.maximum(sizes, SMALLEST_BLOCK * sizes.max())
             root = np.asarray(1.0 / np.sqrt(sizes))[problem.blocks.of]
         r, j = point.residual * root, point.jacobian * root[:, None]
         if only is not None:
             j[:, ~only] = 0.0
-        across = np.zeros((j.shape[1],) * 2)
-        if norms:
-            slopes = np.add.reduceat(r[:, None] * j, problem.blocks.starts) / np.sqrt(sizes)[:, None]
-            across = slopes.T @ slopes
-        return cls(r, j, root, j.T @ r, j.T @ j, across, float(r @ r))
-
-    def gained(self, problem: FitProblem, trial: Evaluation, norms: bool) -> float:
-        if norms:
-            return 2*(self.merit - problem.blocks.value(trial.residual))
-        return self.merit - float(np.sum((trial.residual * self.root) ** 2))
+        curvature = j.T @ j
+        across = np.zeros_like(curvature)
+        if norms:  # a norm is not curved along its own residual
+            slopes = np.add.reduceat(r[:, None] * j, problem.blocks.starts)
+            across = (slopes.T / sizes) @ slopes
+        return cls(root, r, j, j.T @ r, curvature, across, float(r @ r))
 
     def turned(self, before: Self) -> Array:
-        """Return the change of the gradient that comes from that of the slopes."""
-        return self.gradient - (before.j * (self.root / before.root)[:, None]).T @ self.r
+        """Return the part of the gradient's change that the slopes' change makes, (unknowns,)."""
+        return self.gradient - before.j.T @ (self.root / before.root * self.r)
 
 
-def _secant(second: Array, step: Array, turned: Array, change: Array) -> Array:
-    """Return the curvature of the residuals themselves, by the update of Dennis, Gay and Welsch.
-    ACM Trans. Math. Softw. 7 (1981) 348: it agrees with the last step and is sized first."""
+def _learnt(own: Array, step: Array, turned: Array, change: Array) -> Array:
+    """Return the residuals' own curvature, sized and then changed least to agree with a step."""
     along = float(change @ step)
     if along <= 1e-12 * np.linalg.norm(change) * np.linalg.norm(step):
-        return second
-    had = float(step @ second @ step)
-    second = second * (min(1.0, abs(float(step @ turned) / had)) if had else 1.0)
-    off = turned - second @ step
-    both = np.outer(off, change)
-    return np.asarray(second + (both + both.T) / along
-        - float(off @ step) / along**2 * np.outer(change, change))
+        return own
+    had = float(step @ own @ step)
+    own = own * (min(1.0, abs(float(step @ turned) / had)) if had else 1.0)
+    off = turned - own @ step
+    both = np.outer(off, change) / along
+    back = float(off @ step) / along**2
+    return np.asarray(own + both + both.T - back * np.outer(change, change))
+
+
+def _definite(matrix: Array) -> bool:
+    unit = np.sqrt(np.abs(np.diag(matrix)))
+    return bool(np.linalg.eigvalsh(matrix / np.outer(unit, unit))[0] > DEFINITE)
 
 
 def _cut(problem: FitProblem, stable: Array, unstable: Array) -> tuple[Array, float] | None:
@@ -200,7 +207,3 @@ def _quadratic(
     except ValueError:
         return None
     return np.asarray(solution * unit)
-
-
-def _definite(matrix: Array) -> bool:
-    return bool(np.linalg.eigvalsh(matrix / np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))))[0] > 1e-10) if (np.diag(matrix) > 0).all() else False

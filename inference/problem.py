@@ -61,8 +61,7 @@ class FitProblem:
     surrogate: FitProblem | None = None
     starts: Starts = field(default_factory=RandomStarts)
     analyses: int = 0
-    unstable: int = 0  # of them, ended in an equilibrium that no test can show
-    last_unstable: int = 0  # number of the last one of these
+    last_unstable: int = 0  # the last of them that ended in an equilibrium that no test can show
     cached: int = 0  # of them, from the cache of runs
     failure: str = ""  # why the last one that failed did
     warm_starts: bool = True
@@ -134,7 +133,7 @@ class FitProblem:
 
     def reset(self) -> None:
         """Reset warm start and counts: every start of a study begins alike."""
-        self.analyses, self.unstable, self.cached = 0, 0, 0
+        self.analyses, self.last_unstable, self.cached = 0, 0, 0
         self.failure, self.warm_starts = "", True
         for comparison in self.comparisons:
             comparison.forget()
@@ -184,7 +183,6 @@ class FitProblem:
         stable = all(h.stable is not False for c, h in pairs if c.must_be_stable)
         coefficients = law.beta[list(free)]
         point = Evaluation(y.copy(), coefficients, whole, value, jacobian, tuple(histories), stable)
-        self.unstable += not point.stable
         self.last_unstable = self.last_unstable if point.stable else self.analyses
         self.cached += point.from_cache
         self._report(y, value, point.status)

@@ -33,9 +33,8 @@ METHOD = "virtual work"
 NOT_ESTIMATED = NoteKind("not estimated")
 GAP = NoteKind("not in equilibrium", weight=11)
 
-#: Analyses, tolerance, and relative decrease of the squares that is not worth an analysis.
-MOST, TOLERANCE, NEGLIGIBLE = 40, 1e-9, 1e-4
-SETTLES = 1e-2, 2
+#: Analyses, tolerance, and relative decreases that are not worth an analysis, or count as none.
+MOST, TOLERANCE, NEGLIGIBLE, SETTLES = 40, 1e-9, 1e-4, (1e-2, 2)
 #: Chi beyond which shape and law are at odds, by more than noise.
 LARGE = 2.0
 UNBALANCED = (
@@ -184,5 +183,7 @@ def _fitted(
     first = problem.evaluate(y if step is None else y + step, True)
     if first is None:
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
-    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, negligible=NEGLIGIBLE, settles=SETTLES)
+    best, _ = descend(
+        problem, first, TOLERANCE, MOST, norms=True, negligible=NEGLIGIBLE, settles=SETTLES
+    )
     return problem, best

@@ -21,15 +21,16 @@ class FitOptions:
     """Options of the fit from each start.
     constraints : "margin" (linear inequalities) or "boolean" (flags without a slope). tolerance :
     of the objective e. max_analyses : of the problem, those counted already included. max_runs : of
-    a solver that a differentiating surrogate leads."""
+    a solver that a differentiating surrogate leads. leads : to the start of another fit, for which
+    the least squares, roughly, will do."""
 
     method: str = "lm"
     gradient: Literal["exact", "differences"] = "exact"
     constraints: Literal["margin", "boolean"] = "margin"
     tolerance: float = 1e-7
     max_analyses: int = 100
-    leads: bool = False
     max_runs: int = 10
+    leads: bool = False
 
 
 class Method(Protocol):

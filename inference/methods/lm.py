@@ -14,8 +14,9 @@ from . import FitOptions
 SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
-SOON = 2e-3, 1  # relative decrease that counts as none in the first stage, so often in a row
-QUIET = 8 # analyses 
+#: Relative decrease of the squares that ends the first stage, as what follows goes on from there.
+SOON = 2e-3, 1
+AT_THE_END = 8  # analyses, among which an unstable one shows that the optimum lies at that border
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
 ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads
 
@@ -32,7 +33,7 @@ class LevenbergMarquardt:
         Stops below the tolerance, on no progress, or when the analyses are used up."""
         tolerance, most = options.tolerance, options.max_analyses
         before_last = most - 1  # the last one checks the optimum from the unloaded state
-        met = problem.unstable  # where the start was drawn is no matter of the fit
+        begun = problem.analyses
         first = problem.evaluate(start, True)
         if first is None:
             return None
@@ -40,8 +41,10 @@ class LevenbergMarquardt:
         if options.leads:
             return Optimum(level, status, problem.analyses)
         best, status = _then_norms(problem, level, status, tolerance, before_last)
-        for factor in STIFFER:
-            if best.value < tolerance or problem.unstable == met or problem.analyses-problem.last_unstable>QUIET:
+        # Where the start was drawn, and the way far from its end, are no matter of the optimum.
+        at_border = problem.last_unstable > max(begun, problem.analyses - AT_THE_END)
+        for factor in STIFFER if at_border else ():
+            if best.value < tolerance:
                 break
             other, how = _from_stiffer(problem, best, level, factor, tolerance, before_last)
             if other.value < best.value:
