@@ -15,7 +15,7 @@ SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
 #: Relative decrease of the squares that ends the first stage, as what follows goes on from there.
-SOON = 2e-3, 1
+SOON = 5e-4, 2
 AT_THE_END = 8  # analyses, among which an unstable one shows that the optimum lies at that border
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
 ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads

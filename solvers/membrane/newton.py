@@ -35,7 +35,7 @@ CHORD_BELOW, CHORD_GAIN = 1e-2, 0.15
 ROUNDING_BELOW, MOST_IDLE = 1e-6, 3
 # A slack sheet at low pressure can wander among folds without end: after so many iterations a
 # residual beyond this, and so many times the first one, has not been seen to come back.
-WANDERING, FAR, FARTHER = 12, 10.0, 5.0
+WANDERING, FAR, FARTHER = 12, 1e3, 5.0
 # Where a modulus jumps full steps go to and fro: after this many, every step has to gain.
 MOST_FRUITLESS = 3
 #: Steps of a line search: after as many without equilibrium, half the way is tried instead.
