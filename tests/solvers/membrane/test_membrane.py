@@ -21,6 +21,7 @@ from bubblefit.solvers.registry import solver_named
 
 from ...biaxial_files import BENT
 from ...complaints import complaint
+from ...inference.cases import MODEL as CASE_MODEL
 from ...published_laws import TABLE_4_2
 
 LAW = HypoelasticLaw(1e3 * np.array(TABLE_4_2), 0.24, [0.13, 0.13, 0.13])
@@ -276,3 +277,22 @@ def test_extrapolation():
     path = [np.full((1, 3), 2.0), np.full((1, 3), 3.0)]
     np.testing.assert_allclose(newton.straight_on([1.0, 3.0], path, 4.0), 3.5)
     assert newton.straight_on([1.0], path[:1], 4.0) is path[0]
+
+
+def test_a_folded_sheet_on_which_newton_wanders_is_left_soon():
+    """Its residual stays thousands of times the pressure's force: 40 iterations find nothing."""
+    x, y = (CASE_MODEL.mesh.points[:, k] / np.abs(CASE_MODEL.mesh.points).max() for k in range(2))
+    inside = 1 - x**2 - y**2
+    folds = 6.0 * np.sin(7 * x) * np.cos(6 * y) * inside
+    points = np.column_stack([CASE_MODEL.mesh.points[:, :2], folds])
+    model = replace(CASE_MODEL, mesh=replace(CASE_MODEL.mesh, points=points))
+    soft = HypoelasticLaw.linear(500.0, 300.0, 10.0)
+    membrane = MembraneSolver()._membrane(model, soft)
+    dome = np.zeros_like(points)
+    dome[:, 2] = 10.0 * inside
+    assert membrane.equilibrium(dome, 0.0005) is None
+    assert newton.WANDERING < membrane.iterations < 25 < newton.MOST_ITERATIONS
+    history = MembraneSolver().run(
+        replace(model, pressures=(0.02,), increments=(0.02,)), soft
+    )  # by other ways
+    assert history.displacement[0, :, 2].max() > 5.0

@@ -264,6 +264,17 @@ def test_guesses_and_earlier_runs_leave_the_result():
     assert (solver.run(bubble, LAW).path == inflated.path).all()
 
 
+@pytest.mark.parametrize(("model", "share"), [(straight("warp", 7), 1.0), (bias(7), 0.8)])
+def test_pull_and_displacement_together_or_in_turn(monkeypatch, model, share):
+    """Both ways lead to one equilibrium; together takes fewer assemblies."""
+    together = MembraneSolver(TIGHT).run(model, LAW)
+    monkeypatch.setattr(Pulling, "_together", lambda *given: None)
+    in_turn = MembraneSolver(TIGHT).run(model, LAW)
+    assert together.load == pytest.approx(in_turn.load, rel=1e-9)
+    assert together.displacement == pytest.approx(in_turn.displacement, abs=1e-8)
+    assert together.iterations < share * in_turn.iterations
+
+
 def test_newton_gets_past_moduli_that_jump(monkeypatch):
     """Full steps of Newton go to and fro between two sides of a break."""
     restless = HypoelasticLaw.trilinear(
