@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 NEAR = 1e-9  # of the length
 #: Of the residual, what a step of Newton's iteration may leave; rounds in which GMRES has to do it.
-STEP, ROUNDS = 1e-3, 12
+STEP, ROUNDS = 1e-3, 14
 # Above this many doubles the band of a disk no longer pays against SuperLU's fill, and above eight
 # times as many that of a tube (see benchmarks/).
 LARGEST_BAND, OF_TUBES = 1_000_000, 8
@@ -162,7 +162,8 @@ class SparseTangent(Tangent):
     """SuperLU with a symmetric-pattern ordering.
 
     Of 20,000 quads a factorisation takes 0.7 s, a solution 0.02 s and a product 0.003 s: steps of
-    Newton's iteration keep an earlier one as a preconditioner of GMRES where a few rounds do.
+    Newton's iteration keep the last one, which may be of the symmetric part, as a preconditioner of
+    GMRES where a few rounds do (from the right, so that the residual itself is small in the end).
     """
 
     def __init__(
@@ -175,20 +176,20 @@ class SparseTangent(Tangent):
         pointer = np.searchsorted(keys // size, np.arange(size + 1)).astype(np.int32)
         index = (keys % size).astype(np.int32)
         self.data = np.zeros(len(keys))
+        self.near: Any = None
         self.matrix = sp.csc_matrix((self.data, index, pointer), shape=(size, size))
 
     def factor(self) -> None:
         self.matrix.data[:] = self.data
-        self.lu = self._factors(self.matrix)
+        self.lu = self.near = self._factors(self.matrix)
 
     def step(self, rhs: Array, new: bool) -> Array:
         self.matrix.data[:] = self.data
-        before = getattr(self, "lu", None)
-        if before is not None:
-            inverse = LinearOperator(self.matrix.shape, before.solve)
-            x, left = gmres(self.matrix, rhs, rtol=STEP, restart=ROUNDS, maxiter=1, M=inverse)
+        if (near := self.near) is not None:
+            nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ near.solve(x))
+            x, left = gmres(nearly_one, rhs, rtol=STEP, restart=ROUNDS, maxiter=1)
             if left == 0:
-                return np.asarray(x)
+                return np.asarray(near.solve(x))
         return super().step(rhs, True)
 
     def definite(self) -> bool:
@@ -197,6 +198,7 @@ class SparseTangent(Tangent):
             lu = self._factors((0.5 * (self.matrix + self.matrix.T)).tocsc())
         except SingularTangent:
             return False
+        self.near = lu
         # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
         straight = np.array_equal(lu.perm_r, lu.perm_c)
         return bool(straight and (lu.U.diagonal() > 0).all())

@@ -186,6 +186,12 @@ def test_tangents_assemble_and_solve_a_known_matrix(monkeypatch, limit, kind):
     tangent.factor()
     assert tangent.solve(rhs) == pytest.approx(expected, rel=1e-9)
     assert tangent.solve(rhs[:, 0]) == pytest.approx(expected[:, 0], rel=1e-9)
+    if kind is SparseTangent:  # the symmetric part, looked at last, is near enough
+        tangent.definite()
+        near, before = tangent.near, tangent.lu
+        left = rhs[:, 0] - tangent.times(tangent.step(rhs[:, 0], True)[:, None])[:, 0]
+        assert np.linalg.norm(left) <= 1e-3 * np.linalg.norm(rhs[:, 0])
+        assert tangent.lu is before and tangent.near is near is not before
     # Steps keep a factorisation only where it leads to the solution of the present matrix.
     for change, kept in ((1.0, kind is SparseTangent), (60.0, False)):
         before, known = tangent.lu, np.flatnonzero(tangent.data)
