@@ -5,10 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.inference.methods import FitOptions
-from bubblefit.inference.problem import FitProblem
-from bubblefit.inference.unknowns import ProposedStarts, RandomStarts, SobolStarts
+from bubblefit.inference.unknowns import RandomStarts, SobolStarts
 from bubblefit.project.project import read_project
 from bubblefit.runs import fit as stages
 from bubblefit.runs.executor import Executor
@@ -27,7 +25,7 @@ METHODS = {
     "cobyla": (FitOptions("cobyla", "exact", "boolean", 1e-7, 600), "no gradient, boolean"),
 }  # fmt: skip
 FOUND = 1e-6
-ELEMENTS, EARLIER_SEED, EARLIER, SAME, OTHER = 48, 99, 5, 0.01, 1.3
+ELEMENTS, SAME = 48, 0.01
 
 
 def ended(setup, options, seed, count):
@@ -72,14 +70,12 @@ def seeds(count=1, starts=50):
 
 
 def places(starts=12, seeds=2):
-    """Compare random, Sobol and proposed starts by analyses until one ends in the best optimum."""
+    """Compare random and Sobol starts by analyses until one ends in the best optimum."""
     setup = known_setup(known_project(ELEMENTS))
     problem = setup.problem()
     ways = {
         "random": RandomStarts(),
         "Sobol": SobolStarts(),
-        "proposed by the same data": proposals(setup, problem),
-        "proposed by another fabric": proposals(setup, another(setup, problem)),
     }
     print("| starts | analyses a start | in the best optimum | analyses until it | ratio |")
     print("|---" * 5 + "|")
@@ -97,28 +93,6 @@ def places(starts=12, seeds=2):
         random = random or until
         print(f"| {way} | {analyses / len(records):.1f} | {best} of {len(records)} | "
               f"{until:.1f} | {until / random:.2f} |", flush=True)  # fmt: skip
-
-
-def proposals(setup, problem):
-    problem.starts = RandomStarts()
-    heard = []
-    for number in range(EARLIER):
-        run_start(problem, setup.options, EARLIER_SEED, number, heard.append)
-    good = [record for record in heard if record.objective is not None]
-    return ProposedStarts(
-        np.array([r.coefficients for r in good]), np.array([r.objective for r in good])
-    )
-
-
-def another(setup, problem):
-    (prepared,), (comparison,) = setup.tests, problem.comparisons
-    stiffer = prepared.known.with_beta(OTHER * prepared.known.beta)
-    history = comparison.solver.run(comparison.model, stiffer)
-    pressures = comparison.model.pressures
-    data = [FieldTarget(p, u) for p, u in zip(pressures, history.displacement, strict=True)]
-    other = setup.problem()
-    changed = replace(comparison, objective=FieldObjective(data))
-    return FitProblem((changed,), other.law, other.unknowns)
 
 
 def coarse(starts=50, *project):

@@ -15,7 +15,7 @@ from ..errors import lines as note_lines
 from ..experiments.kinds import READING
 from ..inference.methods import method_names
 from . import options as given
-from .terminal import FILE, WORSE, command, resumable, show, verbose, written_to
+from .terminal import WORSE, command, resumable, show, verbose, written_to
 
 if TYPE_CHECKING:
     from ..project.project import Project
@@ -35,10 +35,9 @@ fit_options = given.with_checks(
     click.option("--starts", type=click.IntRange(min=1), help="Random feasible starts."),
     click.option("--seed", type=click.IntRange(min=0), help="Seed of the starts."),
     click.option(
-        "--starts-from", type=click.Choice(["random", "sobol", "proposed", "estimate"]),
-        help="Where starts begin: drawn, spread evenly, by an earlier fit, or one at the estimate.",
+        "--starts-from", type=click.Choice(["random", "sobol", "estimate"]),
+        help="Where starts begin: drawn, spread evenly, or one at the estimate.",
     ),
-    click.option("--earlier", type=FILE, metavar="DIR", help="That fit's output folder."),
     given.JOBS,
     given.SCHEDULER,
     click.option("--method", metavar="NAME", help=f"Optimiser: {', '.join(method_names())}."),
@@ -122,8 +121,6 @@ def estimate_command(**options: Any) -> None:
 def settings_given(project: Project, options: Mapping[str, Any]) -> Project:
     """Return the project with starts, optimiser and workers as the command line has them."""
     chosen = {name: options[name] for name in ("seed", "method", "jobs", "starts_from")}
-    earlier: Path | None = options["earlier"]
-    chosen["earlier"] = None if earlier is None else str(earlier.absolute())
     return project.with_fit(**chosen).with_scheduler(options["scheduler"])
 
 

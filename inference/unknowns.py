@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -316,10 +315,6 @@ def allowed(unknowns: Unknowns, coefficients: Array) -> NDArray[np.bool_]:
 MOST_DRAWS = 200_000
 BATCH = 500
 SOBOL_BATCH = 512  # points of a Sobol sequence that are even in every box come in powers of two
-#: Random candidates among which the most promising is a proposed start, and evaluations that a
-#: prediction is made of.
-CANDIDATES, NEIGHBOURS = 64, 5
-EXTRA = "scikit-learn is not installed; pip install 'bubblefit[proposals]'"
 
 
 class Starts(Protocol):
@@ -367,45 +362,3 @@ class SobolStarts:
                 break
             before += len(good)
         yield from RandomStarts().candidates(unknowns, seed, number)
-
-
-@dataclass(frozen=True, eq=False)
-class ProposedStarts:
-    """Starts where earlier evaluations of the same model were good.
-    Start k is the one of 64 random candidates of its own with the least predicted objective.
-    coefficients : (n, size) MPa of the earlier evaluations. objectives : (n,). Raises InputError
-    without scikit-learn."""
-
-    coefficients: Array
-    objectives: Array
-    _made: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        try:
-            import sklearn  # noqa: F401
-        except ImportError:
-            raise InputError(None, "fit.starts_from", EXTRA) from None
-
-    def candidates(self, unknowns: Unknowns, seed: int, number: int) -> Iterator[Array]:
-        random = RandomStarts().candidates(unknowns, seed, number)
-        first = list(islice(random, CANDIDATES))
-        if first:
-            expected = self.predicted(unknowns, np.array(first))
-            yield from (first[k] for k in np.argsort(expected, kind="stable"))
-        yield from random
-
-    def predicted(self, unknowns: Unknowns, coefficients: Array) -> Array:
-        """Return (n,) the decadic logarithm of the objective predicted at (n, size)."""
-        from sklearn.neighbors import KNeighborsRegressor
-
-        if "regression" not in self._made:
-            near = KNeighborsRegressor(min(NEIGHBOURS, len(self.objectives)), weights="distance")
-            values = np.log10(np.maximum(self.objectives, np.finfo(float).tiny))
-            self._made["regression"] = near.fit(_places(unknowns, self.coefficients), values)
-        return np.asarray(self._made["regression"].predict(_places(unknowns, coefficients)))
-
-
-def _places(unknowns: Unknowns, coefficients: Array) -> Array:
-    """Return (n, size) logarithms of the moduli at the control strains."""
-    moduli = np.linalg.solve(unknowns.from_values, coefficients.T).T
-    return np.asarray(np.log(np.maximum(moduli, 1e-6)))

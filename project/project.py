@@ -134,13 +134,11 @@ def settings_of(
 
 
 def _fit_in_full(project: Project, fit: Mapping[str, Any]) -> Settings:
-    """Return [fit] with the folders that it names in full."""
-    folders = {
-        key: os.path.abspath(beside(project.path.parent, said))
-        for key in ("cache", "earlier")
-        if isinstance(said := fit.get(key), str)
-    }
-    return {**plain(fit), **folders}
+    """Return [fit] with the folder that it names in full."""
+    said, whole = fit.get("cache"), plain(fit)
+    if isinstance(said, str):
+        whole["cache"] = os.path.abspath(beside(project.path.parent, said))
+    return whole
 
 
 def _cards(project: Project) -> list[Settings]:

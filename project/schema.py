@@ -137,8 +137,7 @@ class FitSection(Section):
 
     starts: Annotated[int, Field(ge=1)] = 50
     seed: Annotated[int, Field(ge=0)] = 1
-    starts_from: Literal["random", "sobol", "proposed", "estimate"] = "random"
-    earlier: Name | None = None
+    starts_from: Literal["random", "sobol", "estimate"] = "random"
     method: Name = "lm"
     gradient: Literal["exact", "differences"] = "exact"
     constraints: Literal["margin", "boolean"] = "margin"

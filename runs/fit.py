@@ -245,7 +245,7 @@ def fit(
     tests: str | Sequence[str] | Law | None = None, *, law: Law | None = None,
     fabric: Fabric | None = None, weights: Mapping[str, float] | None = None,
     solver_options: Mapping[str, Mapping[str, Any]] | None = None, starts: int | None = None,
-    seed: int | None = None, starts_from: str | None = None, earlier: Path | str | None = None,
+    seed: int | None = None, starts_from: str | None = None,
     method: str | None = None, jobs: int | None = None, scheduler: str | None = None,
     trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
     overwrite: bool = False, progress: Listener = None,
@@ -259,9 +259,8 @@ def fit(
         of their own.
     starts, seed, method, jobs : instead of the project's; jobs are processes, all cores by default.
     scheduler : address of a Dask scheduler, whose workers run the starts.
-    starts_from, earlier : "random", "sobol" (spread evenly), "estimate" (the first at the moduli by
-        virtual work, the others drawn) or "proposed", from the evaluations in
-        the folder `earlier`.
+    starts_from : "random", "sobol" (spread evenly), or "estimate" (the first at the moduli by
+        virtual work, the others drawn).
     trust : names of doubts about the data to ignore, beside those of the project.
     out : folder in which analyses and starts are written as they end, for `resume`. overwrite : its
         content. progress : receives analyses and starts as they end,
@@ -287,7 +286,7 @@ def fit(
     project = project.with_weights(weights or {}).with_fit(
         **settings, starts=starts, seed=seed, method=method, jobs=jobs,
         trust=[*project.fit.trust, *trust],
-        starts_from=starts_from, earlier=None if earlier is None else str(Path(earlier).absolute()),
+        starts_from=starts_from,
     ).with_scheduler(scheduler)  # fmt: skip
     executor_of(project).check()
     chosen = project.chosen(tests, fitted=True)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import functools
-import io
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,14 +22,12 @@ from ..experiments.kinds import (
 )
 from ..experiments.registry import kind_named
 from ..files import one_blas_thread
-from ..files import pandas as pd
 from ..inference.comparison import Comparison, Nuisance, OwnObjective
 from ..inference.methods import FitOptions, method_named
 from ..inference.problem import FitProblem
 from ..inference.unknowns import (
     EstimatedStarts,
     LawBounds,
-    ProposedStarts,
     RandomStarts,
     SobolStarts,
     Starts,
@@ -44,12 +39,10 @@ from ..materials.law import HypoelasticLaw
 from ..materials.memory import QUANTITIES, Memory
 from ..project.project import Project
 from ..project.schema import UnknownSection
-from ..readers.sections import beside
 from ..solvers.base import DifferentiatingSolver, Solver, check_carries
 from ..solvers.registry import solver_named, usable_solver
 from ..solvers.run_cache import digest_of
-from .folder import PARTS, RUN
-from .starts import HISTORY, StartRecord, timed
+from .starts import StartRecord, timed
 
 #: Smallest modulus allowed anywhere on the strain range (MPa), unless the file says otherwise.
 MARGIN_E, MARGIN_G = 5.0, 0.5
@@ -270,45 +263,10 @@ def with_shared(
     return tuple(replace(c, nuisance=(*unknowns, *n)) for c, n in zip(several, own, strict=True))
 
 
-#: Parts that an earlier fit must share, unlike data, seed and solver.
-SAME = ("law", "tests")
-KEY = "fit.earlier (or --earlier)"
-
-
-def proposals(
-    folder: Path, parts: dict[str, str], columns: list[str], scale: float
-) -> ProposedStarts:
-    """Return starts proposed by the evaluations in the folder of an earlier fit.
-    parts : `fingerprints` of this fit. columns : of the coefficients in a history. scale : MPa per
-    unit of it. Raises InputError for no such folder, a fit of another model, no evaluation."""
-    try:
-        before = dict(json.loads((folder / RUN).read_text(encoding="utf-8"))[PARTS])
-        text = (folder / HISTORY).read_text(encoding="utf-8", errors="replace")
-        whole = io.StringIO(text[: text.rfind("\n") + 1])  # a line without its end was cut off
-        table = pd.read_csv(whole, dtype=str, on_bad_lines="skip")
-    except (OSError, ValueError, KeyError, TypeError):
-        problem = f"expected the folder of a fit, with {RUN} and {HISTORY}"
-        raise InputError(folder, KEY, problem) from None
-    other = [name for name in SAME if before.get(name) != parts[name]]
-    if other:
-        problem = f"is a fit of another model: its {' and '.join(other)} differ from this fit's"
-        raise InputError(folder, KEY, f"{problem}; name a fit of this model, or start elsewhere")
-    if any(column not in table for column in columns):
-        raise InputError(folder / HISTORY, KEY, f"has not the columns {', '.join(columns)}")
-    try:
-        known = table.dropna(subset="objective")[["objective", *columns]].to_numpy(float)
-    except ValueError as error:
-        raise InputError(folder / HISTORY, KEY, f"is damaged: {error}") from None
-    if not np.isfinite(known[:, 0]).any():
-        raise InputError(folder / HISTORY, KEY, "holds no evaluation that ended well")
-    known = known[np.isfinite(known).all(axis=1)]
-    return ProposedStarts(known[:, 1:] * scale, known[:, 0])
-
-
 #: Solver that leads the fit if the project's gives no derivatives.
 SURROGATE = "membrane"
 #: Keys of [fit] that change no start; the solver counts by its identity.
-UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache", "earlier")
+UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,7 +301,7 @@ class FitSetup:
         """Return the fit, built anew; masks : measured points that it matches, by comparison."""
         make = self.make_solver
         problem = self.problem_of(self.each(lambda test, w: test.comparisons(make, w, masks)))
-        if masks is not None and isinstance(self.starts, (ProposedStarts, EstimatedStarts)):
+        if masks is not None and isinstance(self.starts, EstimatedStarts):
             problem.starts = RandomStarts()  # nothing of the points left out may be in them
         return problem
 
@@ -433,24 +391,8 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
             saw(f"reading {test.name}")
             with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
                 ready.append(kind_named(test.kind).prepare(test, law, make))
-        setup = FitSetup(project, law, bounds, tuple(ready))
-        return replace(setup, starts=_starts(setup))
-
-
-def _starts(setup: FitSetup) -> Starts:
-    project, fit = setup.project, setup.project.fit
-    if fit.earlier is not None and fit.starts_from != "proposed":
-        said = 'means something with starts_from = "proposed" only'
-        raise InputError(project.path, KEY, said)
-    if fit.starts_from != "proposed":
-        return SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
-    if fit.earlier is None:
-        said = "name the folder of an earlier fit of this project: what it evaluated proposes"
-        raise InputError(project.path, KEY, said)
-    problem, scales = setup.problem(), project.scales
-    columns = [f"{label}_{scales.modulus_unit}" for label in problem.unknowns.labels]
-    folder = beside(project.path.parent, fit.earlier)
-    return proposals(folder, fingerprints(setup, problem), columns, scales.modulus)
+        starts: Starts = SobolStarts() if project.fit.starts_from == "sobol" else RandomStarts()
+        return FitSetup(project, law, bounds, tuple(ready), starts=starts)
 
 
 def make_solver(project: Project, name: str | None = None, **more: Any) -> Solver:
@@ -461,11 +403,7 @@ def make_solver(project: Project, name: str | None = None, **more: Any) -> Solve
 def fingerprints(setup: FitSetup, problem: FitProblem) -> dict[str, str]:
     """Return digests of all that a start's result depends on, by part."""
     fit = setup.project.fit
-    proposed = setup.starts if isinstance(setup.starts, ProposedStarts) else None
-    own = {} if proposed is None else {
-        "earlier evaluations": digest_of(proposed.coefficients, proposed.objectives)
-    }  # fmt: skip
-    return {**own, "law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
+    return {"law": digest_of(setup.law, setup.bounds, setup.project.fabric.thickness),
             "fit settings": digest_of(fit.model_dump(exclude=set(UNCOUNTED))),
             "tests": digest_of({t.test.name: dict(t.test.settings()) for t in setup.tests}),
             "data": digest_of([tuple(c.objective.data) for c in problem.comparisons]),

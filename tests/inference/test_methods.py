@@ -1,6 +1,5 @@
 """Optimisers: Levenberg-Marquardt, NLopt, starts, second order, correction."""
 
-import pickle
 import sys
 from dataclasses import replace
 from itertools import islice
@@ -29,7 +28,6 @@ from bubblefit.inference.methods import FitOptions, lm, method_names
 from bubblefit.inference.noise import Noise
 from bubblefit.inference.search import feasible_start, fit_from
 from bubblefit.inference.unknowns import (
-    ProposedStarts,
     RandomStarts,
     SobolStarts,
     allowed,
@@ -310,46 +308,6 @@ def test_a_point_that_cannot_be_analysed_is_replaced_by_a_random_one():
         fit.starts = starts or fit.starts
         expected = CUBIC.at(first(starts or RandomStarts(), 2))
         np.testing.assert_allclose(feasible_start(fit, 1, 2), expected)
-
-
-#: A valley at E2 = 400 MPa, whatever the others: objectives of earlier evaluations.
-GRID = np.array([[g, e2, e1] for g in (5.0, 20.0, 80.0) for e2 in np.geomspace(60, 900, 12)
-                 for e1 in (100.0, 500.0, 1400.0)])  # fmt: skip
-
-
-def valley(coefficients):
-    return np.abs(np.log(coefficients[:, 1] / 400.0)) + 1e-3
-
-
-PROPOSED = ProposedStarts(GRID, valley(GRID))
-
-
-def test_a_proposed_start_is_the_most_promising_of_its_own_candidates():
-    mine = random_starts(CONSTANT, 4, 66)
-    expected = PROPOSED.predicted(CONSTANT, mine[:64])
-    found = list(islice(PROPOSED.candidates(CONSTANT, 1, 4), 66))
-    np.testing.assert_array_equal(found[:64], mine[np.argsort(expected, kind="stable")])
-    np.testing.assert_array_equal(found[64:], mine[64:])  # then those that come anyway
-    # Where something is known that is predicted.
-    known = PROPOSED.predicted(CONSTANT, GRID[:5])
-    np.testing.assert_allclose(known, np.log10(valley(GRID[:5])), rtol=1e-12)
-    there = next(iter(pickle.loads(pickle.dumps(PROPOSED)).candidates(CONSTANT, 1, 4)))
-    np.testing.assert_array_equal(found[0], there)
-
-
-def test_proposed_starts_lie_in_the_valley_and_differ():
-    starts = np.array([first(PROPOSED, n, unknowns=CONSTANT) for n in range(8)])
-    random = np.array([first(RandomStarts(), n, unknowns=CONSTANT) for n in range(8)])
-    assert np.median(valley(starts)) < 0.3 * np.median(valley(random))
-    assert len(np.unique(starts[:, 0])) == len(np.unique(starts[:, 2])) == 8
-
-
-def test_few_evaluations_do_and_perfect_ones(monkeypatch):
-    one = ProposedStarts(GRID[:1], np.zeros(1))  # an objective of zero has no logarithm
-    assert np.isfinite(one.predicted(CONSTANT, GRID)).all()
-    assert len(list(islice(one.candidates(CONSTANT, 1, 0), 3))) == 3
-    monkeypatch.setitem(sys.modules, "sklearn", None)
-    assert "bubblefit[proposals]" in complaint(ProposedStarts, GRID, valley(GRID))
 
 
 #: mm of noise beside 0.5 mm that constants leave of the fields of cubics.

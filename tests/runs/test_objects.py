@@ -381,7 +381,7 @@ VALUES = {
     "law.form": "spline", "fit.method": "slsqp", "fit.constraints": "margin",
     "fit.trust": ["radius"], "fit.solver": "calculix", "fit.unknowns.nu12.bounds": [0.1, 0.4],
     "fit.unknowns.thickness.bounds": [6e-4, 9e-4], "card.beta": [0.1] * 12, "card.form": "cubic",
-    "fit.earlier": "/earlier", "fit.cache": "/runs",
+    "fit.cache": "/runs",
     "solver.marc.version": "2023.1",
 }  # fmt: skip
 

@@ -3,16 +3,13 @@
 import hashlib
 import json
 import re
-import shutil
 from dataclasses import replace
 from datetime import datetime
 
-import bubblefit as bf
 import bubblefit.runs.fit
 import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
-from bubblefit.inference.unknowns import ProposedStarts
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.project.project import read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
@@ -28,10 +25,10 @@ from bubblefit.runs.folder import (
     this_run,
     versions,
 )
-from bubblefit.runs.setup import fingerprints, proposals
+from bubblefit.runs.setup import fingerprints
 
 from ..complaints import complaint
-from ..projects import constant_strips, project_file, set_up, with_form
+from ..projects import project_file, set_up, with_form
 
 PROJECT = """
 [fabric]
@@ -317,83 +314,3 @@ def test_breaks_count(regions):
         breaks = np.array(BREAKS)
         breaks[component, 1] = 0.09
         assert changed(regions, law=replace(regions.law, form=TriLinear.at(breaks))) == ["law"]
-
-
-@pytest.fixture(scope="module")
-def earlier(strips_project, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("earlier") / "out"
-    bf.fit(strips_project, jobs=1, starts=2, out=folder)
-    return folder
-
-
-def objectives_at_first(folder):
-    rows = [row.split(",") for row in (folder / "history.csv").read_text().splitlines()[1:]]
-    return [float(row[4]) for row in rows if row[1] == "1"]
-
-
-def test_proposed_starts_begin_lower(strips_project, earlier, tmp_path):
-    settings = {"jobs": 1, "starts": 2, "seed": 9, "starts_from": "proposed"}
-    found = bf.fit(strips_project, earlier=earlier, out=tmp_path / "out", **settings)
-    own = found.setup.starts
-    assert isinstance(own, ProposedStarts)
-    lines = (earlier / "history.csv").read_text().splitlines(True)
-    assert len(own.objectives) == len(lines) - 1
-    # In MPa; G12 is not determined by strips along the yarns.
-    best = own.coefficients[np.argmin(own.objectives)]
-    np.testing.assert_allclose(best[1:], found.law.beta[found.law.beta != 0][1:], rtol=1e-3)
-    assert max(objectives_at_first(tmp_path / "out")) < min(objectives_at_first(earlier))
-    # Another history proposes other starts: it is not gone on with.
-    changed = tmp_path / "changed"
-    shutil.copytree(earlier, changed)
-    (changed / "history.csv").write_text("".join(lines[:-1]))
-    out = tmp_path / "out"
-    said = complaint(bf.fit, strips_project, earlier=changed, out=out, resume=True, **settings)
-    assert "earlier evaluations" in said
-
-
-def test_another_model_is_refused(earlier, tmp_path):
-    project = bf.read_project(constant_strips(tmp_path, ('form = "constant"', 'form = "linear"')))
-    said = complaint(bf.fit, project, jobs=1, starts_from="proposed", earlier=earlier)
-    assert said.startswith(
-        f"{earlier}: fit.earlier (or --earlier): is a fit of another model: its "
-    )
-    assert "law" in said
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("run.json", None, "expected the folder of a fit, with run.json and history.csv"),
-        ("run.json", "[]", "expected the folder of a fit"),
-        ("history.csv", None, "expected the folder of a fit"),
-        ("history.csv", "start,analysis,solver,mesh,objective,status\n", "has not the columns"),
-    ],
-)
-def test_what_is_no_fit_is_refused(strips_project, earlier, tmp_path, name, text, words):
-    folder = tmp_path / "broken"
-    shutil.copytree(earlier, folder)
-    (folder / name).unlink()
-    if text is not None:
-        (folder / name).write_text(text)
-    options = {"jobs": 1, "starts_from": "proposed", "earlier": folder}
-    assert words in complaint(bf.fit, strips_project, **options)
-
-
-def test_damaged_and_failed_rows(earlier, tmp_path):
-    parts = json.loads((earlier / "run.json").read_text())["parts"]
-    head, *rows = (earlier / "history.csv").read_text().splitlines()
-    columns = head.split(",")[6:]
-    folder = tmp_path / "some"
-    shutil.copytree(earlier, folder)
-
-    def taken(*lines):
-        (folder / "history.csv").write_text("\n".join([head, *lines]) + "\n")
-        return proposals(folder, parts, columns, 1000.0)
-
-    failed = rows[0].split(",")
-    failed[4] = ""
-    assert len(taken(rows[1], ",".join(failed), "0,3,membr").objectives) == 1
-    assert "no evaluation that ended well" in complaint(taken, ",".join(failed))
-    odd = rows[0].split(",")
-    odd[-1] = "many"
-    assert "is damaged" in complaint(taken, ",".join(odd))
