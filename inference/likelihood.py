@@ -9,9 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import linprog
-from scipy.special import gammaincinv
+import scipy
 
 from ..materials.forms.base import Array
 from .descent import bounded_step
@@ -20,7 +18,7 @@ from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns
 
 #: Of -2 log L, beyond which a value is out: chi-square of one degree of freedom.
-THRESHOLD = float(2 * gammaincinv(0.5, LEVEL))
+THRESHOLD = float(2 * scipy.special.gammaincinv(0.5, LEVEL))
 STEP, MOST_PLACES = 0.5, 16  # roots of -2 log L from place to place, and places of a side
 #: From one step to the next; a step that fails is halved so many times.
 MOST_GROWTH, HALVINGS = 3.0, 4
@@ -55,14 +53,16 @@ class Side:
         roots = np.maximum.accumulate(np.sqrt(np.maximum(self.ratios, 0.0)))
         away = np.abs(values - values[0])
         keep = np.concatenate([[True], np.diff(roots) > 0])
-        out = float(PchipInterpolator(roots[keep], away[keep])(np.sqrt(THRESHOLD)))
+        out = float(
+            scipy.interpolate.PchipInterpolator(roots[keep], away[keep])(np.sqrt(THRESHOLD))
+        )
         return float(values[0] + np.sign(values[-1] - values[0]) * out)
 
 
 def extreme(unknowns: Unknowns, row: Array, sign: float) -> float:
     """Return the largest (sign 1) or smallest (-1) row @ unknowns that the inequalities allow."""
     a, c = unknowns.inequalities
-    found = linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
+    found = scipy.optimize.linprog(-sign * row, A_ub=-a, b_ub=-c, bounds=(None, None))
     return float(row @ found.x) if found.status == 0 else float(sign * np.inf)
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, cKDTree
 
 from .charts import Array, Chart, Charts, Series, dots, faces, line
@@ -39,7 +39,7 @@ def node_cut(points: ArrayLike, displacement: ArrayLike, axis: int) -> Cut:
     along = np.linspace(xy[:, axis].min(), xy[:, axis].max(), 81)
     line = np.zeros((len(along), 2))
     line[:, axis] = along
-    between = LinearNDInterpolator(xy, u)(line)
+    between = scipy.interpolate.LinearNDInterpolator(xy, u)(line)
     inside = np.isfinite(between).all(axis=1)
     return _sorted(along[inside], between[inside], axis)
 

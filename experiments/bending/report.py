@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-import pandas as pd
-
+from ...files import pandas as pd
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.vega import saved
 from ...solvers.base import History

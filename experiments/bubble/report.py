@@ -3,15 +3,17 @@
 `findings` gives numbers and words, `show` the page of a fit, `examine` that of the data before a
 fit, `residuals` the table of all matched values, `simulate` the results of forward analyses."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ...errors import SolverFailure, percent
+from ...files import pandas as pd
 from ...inference.assessment import moduli_error
 from ...inference.comparison import Blocks
 from ...materials.forms.base import COMPONENTS
