@@ -3,7 +3,7 @@
 Damping is scaled by diag(J'J) (Marquardt), positivity and bounds are constraints, so every iterate
 is feasible, and a stable equilibrium: a soft membrane can fold, as no test under pressure can show.
 Where much is left of the residual its own curvature counts: it is learnt from the steps, and taken
-as long as it foretells what a step gains better than the slopes alone (J. E. Dennis, D. M. Gay,
+as long as it predicts what a step gains better than the slopes alone (J. E. Dennis, D. M. Gay,
 R. E. Welsch, ACM Trans. Math. Softw. 7 (1981) 348).
 """
 
@@ -25,7 +25,7 @@ NEGLIGIBLE = 1e-6  # predicted relative decrease that is not worth an analysis
 #: Relative decrease that counts as no progress, and how often in a row ends the descent.
 SETTLES = 1e-4, 3
 SMALLEST_DROP = 1e-3  # of the shear modulus, relative, that can explain a loss of stability
-SMALLEST_BLOCK = 1e-6  # of the largest norm of a block, for its weight
+SMALLEST_BLOCK = 1e-6  # of the largest norm of a block: smaller ones weigh no more than it
 DEFINITE = 1e-10  # least eigenvalue of a curvature with ones on its diagonal
 
 
@@ -75,8 +75,8 @@ def descend(
                     cuts.append(cut)
                     continue
             elif trial is not None:
-                there = _Near.of(problem, trial, norms, only)
-                gained = here.merit - there.merit if not norms else 2 * (point.value - trial.value)
+                squares = float(trial.residual @ trial.residual)
+                gained = 2 * (point.value - trial.value) if norms else here.merit - squares
                 if gained > 0:
                     break
             if which:
@@ -90,6 +90,7 @@ def descend(
         growth = 2.0
         idle = idle + 1 if gained < settles[0] * here.merit else 0
         use_own = abs(predicted[1] - gained) < abs(predicted[0] - gained)
+        there = _Near.of(problem, trial, norms, only)
         own = _learnt(own, step, there.turned(here), there.gradient - here.gradient)
         point, here = trial, there
         if idle >= settles[1]:

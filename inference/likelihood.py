@@ -53,9 +53,8 @@ class Side:
         roots = np.maximum.accumulate(np.sqrt(np.maximum(self.ratios, 0.0)))
         away = np.abs(values - values[0])
         keep = np.concatenate([[True], np.diff(roots) > 0])
-        out = float(
-            scipy.interpolate.PchipInterpolator(roots[keep], away[keep])(np.sqrt(THRESHOLD))
-        )
+        curve = scipy.interpolate.PchipInterpolator(roots[keep], away[keep])
+        out = float(curve(np.sqrt(THRESHOLD)))
         return float(values[0] + np.sign(values[-1] - values[0]) * out)
 
 

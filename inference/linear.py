@@ -16,7 +16,7 @@ from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
 from .comparison import Comparison, Nuisance
-from .descent import bounded_step
+from .descent import SMALLEST_BLOCK, bounded_step
 from .noise import Noise, misfits
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
@@ -26,7 +26,6 @@ SECOND_ORDER = NoteKind("second order")  # kinds of notes that are made here
 
 
 FLAT = 1e-13  # of the largest curvature of the misfit: below, the data say nothing of a direction
-SMALLEST = 1e-6  # of the largest norm of a block: smaller ones weigh no more than this one does
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +100,7 @@ def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)
-    return np.asarray(1.0 / np.maximum(norms, SMALLEST * largest)[blocks.of])
+    return np.asarray(1.0 / np.maximum(norms, SMALLEST_BLOCK * largest)[blocks.of])
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
@@ -378,7 +377,7 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
         norms = blocks.norms(error)
     if not (norms > 0).any():
         return Limit(np.zeros_like(best.unknowns), best.residual, error)
-    weights = 1.0 / np.maximum(norms, SMALLEST * norms.max())[blocks.of]
+    weights = 1.0 / np.maximum(norms, SMALLEST_BLOCK * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     curvature = weighted @ best.jacobian
     # An unknown of which the data say nothing stays where it is.

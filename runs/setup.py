@@ -391,7 +391,7 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
             saw(f"reading {test.name}")
             with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
                 ready.append(kind_named(test.kind).prepare(test, law, make))
-        starts: Starts = SobolStarts() if project.fit.starts_from == "sobol" else RandomStarts()
+        starts: Starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
         return FitSetup(project, law, bounds, tuple(ready), starts=starts)
 
 

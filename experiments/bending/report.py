@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from ...files import pandas as pd
+import pandas as pd
+
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.vega import saved
 from ...solvers.base import History

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from ...errors import Note, SolverFailure
-from ...files import pandas as pd
 from ...materials.designers import row_of
 from ...meshes.strip_models import elongations
 from ...reports.charts import Charts

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import marks, percent
-from ...files import pandas as pd
 from ...materials.card import BAND, LEVEL
 from ...meshes.beam_model import BeamModel
 from ...meshes.cylinder_model import CylinderModel

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
-from ...files import pandas as pd
 from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
