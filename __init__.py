@@ -34,9 +34,10 @@ if TYPE_CHECKING:
     from .project.objects import Biaxial, Bubble, Cylinder, Law, Registration, Sheet, Strips
     from .project.project import Project, read_project
     from .runs.bootstrap import bootstrap
+    from .runs.check import check
     from .runs.compare import compare
     from .runs.estimate import estimate
-    from .runs.fit import check, fit
+    from .runs.fit import fit
     from .runs.plan import plan
     from .runs.predictions import predict
     from .runs.profile import profile
@@ -66,7 +67,8 @@ _NAMES = {
     "runs.bootstrap": "bootstrap",
     "runs.compare": "compare",
     "runs.estimate": "estimate",
-    "runs.fit": "check fit",
+    "runs.check": "check",
+    "runs.fit": "fit",
     "runs.plan": "plan",
     "runs.predictions": "predict",
     "runs.profile": "profile",

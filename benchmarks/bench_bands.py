@@ -165,11 +165,11 @@ def discrepancy(fields=100, quads=192, *chosen):
                 print(f"{words}, field {number}: no fit")
                 continue
             found = done[1].certainty.discrepancy["bubble"]
-            noticed += found.significant
-            ratios.append(found.ratio)
+            noticed += found.is_significant
+            ratios.append(found.f_ratio)
             rms.append(found.rms)
         print(f"{words:24s}{noticed:4d} of {len(ratios)} told, ratio {np.median(ratios):8.3g} "
-              f"(at most {max(ratios):.3g}, by chance {found.largest:.3g}), "
+              f"(at most {max(ratios):.3g}, by chance {found.critical_ratio:.3g}), "
               f"smooth {np.median(rms):.2g} mm", flush=True)  # fmt: skip
 
 

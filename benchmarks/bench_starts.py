@@ -8,9 +8,13 @@ import numpy as np
 from bubblefit.inference.methods import FitOptions
 from bubblefit.inference.unknowns import RandomStarts, SobolStarts
 from bubblefit.project.project import read_project
-from bubblefit.runs import fit as stages
 from bubblefit.runs.executor import Executor
-from bubblefit.runs.fit import SAME_MODULI, distinct, moduli_apart
+from bubblefit.runs.multistart import (
+    SAME_MODULI,
+    MultiStart,
+    distinct_optima,
+    moduli_difference,
+)
 from bubblefit.runs.setup import coarse_problem, coarse_to_fine
 from bubblefit.runs.starts import StartRecord, run_start
 from common import known_project, known_setup, start_on
@@ -110,7 +114,7 @@ def coarse(starts=50, *project):
     Executor.run_tasks = in_this_process
     for name, way in (("full mesh", setup), ("coarse to fine", fine)):
         begun = time.process_time()
-        records = stages.every_start(way, (), lambda _: None, lambda _: None)
+        records = MultiStart(way, (), lambda _: None, lambda _: None).run()
         found.append((records, time.process_time() - begun))
         e, analyses = objectives(records), sum(r.analyses for r in records)
         print(f"{name:16s} best e {min(e):.6g}, worst {max(e):.6g}, {analyses} analyses, "
@@ -119,9 +123,9 @@ def coarse(starts=50, *project):
     print(coarse_to_fine(fine, both) or "")
     print(f"processor time: {short / long:.2f} of that of the full mesh")
     ends = [r for r in both if r.objective is not None and r.same_as is None]
-    for group in distinct(problem, full, tolerance):
+    for group in distinct_optima(problem, full, tolerance):
         if group[0].objective is not None:
-            apart = min(moduli_apart(problem, group[0], end) for end in ends)
+            apart = min(moduli_difference(problem, group[0], end) for end in ends)
             said = "found" if apart <= SAME_MODULI else "NOT FOUND"
             print(f"optimum e {group[0].objective:.6g} of {len(group)} starts: {said} coarse to "
                   f"fine, moduli within {100 * apart:.2g} %")  # fmt: skip

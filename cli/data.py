@@ -33,7 +33,7 @@ from ..reports.bubbles import sphere_charts
 from ..reports.run_pages import write_constants
 from ..reports.strips import cycle_charts
 from ..reports.vega import save
-from ..runs.fit import check
+from ..runs.check import check
 from ..runs.folder import Record, Store, data_rows, this_run, write_table
 from . import options as given
 from .options import check_out, columns_named, frame_options

@@ -23,7 +23,7 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
         "Projects, fits, predictions",
         ("project.objects:Bubble,Strips,Biaxial,Cylinder,Sheet,Registration,Law",
          "project.measured:read,register,Registered", "experiments.kinds:Fabric",
-         "project.project:read_project,Project", "runs.fit:fit,check",
+         "project.project:read_project,Project", "runs.fit:fit", "runs.check:check",
          "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
          "experiments.cycles.evaluation:cycles,Cycles,EvaluatedHistory,CycleValues",
@@ -49,9 +49,6 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "methods": ("Optimisers", ("inference.methods",)),
 }  # fmt: skip
 HEAD = "<!-- Written by docs/make_api.py from the docstrings. -->\n"
-#: "name : words" at the start of a line, and after the end of another entry.
-ENTRY = re.compile(r"\S[\w*, ]* : ")
-BESIDE = re.compile(r"(?<=[.;]) ([A-Za-z_]\w*(?:, \w+)*) : ")
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 
 
@@ -153,17 +150,16 @@ def text_of(thing: Any) -> str:
 
 
 def _entries(body: str) -> str:
-    """Return a list of the entries "name : words", of which a line may hold several."""
-    lines: list[str] = []
+    """Return a list of the entries of a section: "name : type", or a type, and words below."""
+    entries: list[tuple[str, list[str]]] = []
     for line in body.strip().splitlines():
-        if ENTRY.match(line) or not lines:
-            lines.append(line.strip())
-        else:
-            lines[-1] += f" {line.strip()}"
-    text = BESIDE.sub(r"\n\1 : ", "\n".join(lines))
+        if line.startswith(" "):
+            entries[-1][1].append(line.strip())
+        elif line:
+            name, _, kind = line.partition(" : ")
+            entries.append((f"`{name}` ({kind})" if kind else f"`{name}`", []))
     return "\n".join(
-        f"- `{name}`: {words}" if words else name
-        for name, _, words in (line.partition(" : ") for line in text.splitlines())
+        f"- {head}: {' '.join(words)}" if words else f"- {head}" for head, words in entries
     )
 
 

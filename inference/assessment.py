@@ -11,6 +11,7 @@ from ..materials.card import band_at
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from .comparison import Nuisance
+from .discrepancy import Discrepancy, notes_of_discrepancies
 from .linear import (
     LEFT,
     POINTS,
@@ -23,9 +24,10 @@ from .linear import (
     posteriors_of,
     sizes_of,
 )
-from .noise import Discrepancy, Noise, discrepancies, notes_of_discrepancies
+from .noise import Noise
 from .posterior import Posterior, bands_of
 from .problem import Evaluation, FitProblem
+from .wrong_form import discrepancies
 
 UNCERTAIN = NoteKind("uncertain", weight=6)
 MARGIN = NoteKind("on its margin", weight=3)
@@ -103,9 +105,11 @@ def certainty(
 ) -> Certainty:  # fmt: skip
     """Propagate the noise of every comparison linearly to the moduli.
     law : the reported one. limit : of ever finer models, where known: its residual counts as noise
-    (see `Noise.of`), else that of the best fit. second : terms of second order (see `Linear.of`).
+    (see `Noise.from_residual`), else that of the best fit. second : terms of second order (see
+    `Linear.of`).
     """
-    noise = noise or Noise.of(problem, best.residual if limit is None else limit.residual)
+    left = best.residual if limit is None else limit.residual
+    noise = noise or Noise.from_residual(problem, left)
     posterior, fine = posteriors_of(problem, best, noise, limit, second)
     strains, sigmas = along(problem.unknowns, law, reached, posterior.covariance)
     first = problem.comparisons[0]
@@ -114,7 +118,6 @@ def certainty(
         which = "with the tests' noise"
     if limit is not None:
         which += " and the mesh"
-    left = best.residual if limit is None else limit.residual
 
     def effect(step: Array) -> float:
         """Return the largest relative change of a modulus halfway along its strains."""

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from ..materials.forms.base import Array
-from .descent import bounded_step
+from .bounded_step import bounded_step
 from .posterior import LEVEL
 from .problem import Evaluation, FitProblem
 from .unknowns import Unknowns

@@ -15,8 +15,9 @@ from ..errors import Note, NoteKind, SolverFailure
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..solvers.base import History
+from .bounded_step import bounded_step
 from .comparison import Comparison, Nuisance
-from .descent import SMALLEST_BLOCK, bounded_step
+from .descent import MIN_BLOCK_NORM
 from .noise import Noise, misfits
 from .posterior import Posterior
 from .problem import Evaluation, FitProblem
@@ -80,7 +81,7 @@ class Linear:
             answering = j - second.left[:, None] * second.slopes(problem, j)
         inverse = sharp @ np.linalg.inv(whole) @ sharp.T
         estimator, answer = (inverse @ one.T for one in (j, answering))
-        moved = answer * (weights * noise.rows)
+        moved = answer * (weights * noise.residual_sigma)
         return cls(sizes, weights, sharp, flat, curvature[good], estimator, moved)
 
     def spread_over_curvature(self, row: Array) -> float:
@@ -96,11 +97,11 @@ class Linear:
 def weights_of(problem: FitProblem, residual: Array, noise: Noise) -> Array:
     """Return (m,) weights of the squares near the least sum of the norms of their blocks."""
     blocks = problem.blocks
-    norms = np.maximum(blocks.norms(residual), blocks.norms(noise.least))
+    norms = np.maximum(blocks.norms(residual), blocks.norms(noise.smallest_residual_sigma))
     largest = norms.max()
     if not largest > 0:
         return np.ones_like(residual)
-    return np.asarray(1.0 / np.maximum(norms, SMALLEST_BLOCK * largest)[blocks.of])
+    return np.asarray(1.0 / np.maximum(norms, MIN_BLOCK_NORM * largest)[blocks.of])
 
 
 def sizes_of(unknowns: Unknowns, best: Array) -> Array:
@@ -132,7 +133,8 @@ def posteriors_of(
     covariance = np.asarray(scaled * sizes[:, None] * sizes)
 
     # The noise makes no other optimum: what pulls at the best fit is weighted as in the objective.
-    exact = Linear.of(problem, best, replace(noise, least=np.zeros_like(noise.least)), second)
+    noiseless = replace(noise, smallest_residual_sigma=np.zeros_like(best.residual))
+    exact = Linear.of(problem, best, noiseless, second)
 
     def centre(residual: Array) -> Array:
         return np.asarray(best.unknowns - sizes * (exact.estimator @ (exact.weights * residual)))
@@ -249,8 +251,9 @@ def second_of(problem: FitProblem, best: Evaluation, noise: Noise) -> Second:
         added = t @ v.T + v @ t.T - 0.5 * v @ (inner + inner.T) @ v.T
         added = 0.5 * (added + added.T)
     # Residuals over their block's norm; zero where the block weighs by its noise.
-    sizes, own = problem.blocks.norms(best.residual), problem.blocks.norms(noise.least)
-    unit = (sizes > own) / np.where(sizes > own, sizes, 1.0)
+    sizes = problem.blocks.norms(best.residual)
+    is_large = sizes > problem.blocks.norms(noise.smallest_residual_sigma)
+    unit = is_large / np.where(is_large, sizes, 1.0)
     left = np.asarray(best.residual * unit[problem.blocks.of])
     found = Second(added, left, len(known), problem.analyses - before)
     norms = found.slopes(problem, best.jacobian * linear.sizes * linear.weights[:, None])
@@ -377,7 +380,7 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
         norms = blocks.norms(error)
     if not (norms > 0).any():
         return Limit(np.zeros_like(best.unknowns), best.residual, error)
-    weights = 1.0 / np.maximum(norms, SMALLEST_BLOCK * norms.max())[blocks.of]
+    weights = 1.0 / np.maximum(norms, MIN_BLOCK_NORM * norms.max())[blocks.of]
     weighted = best.jacobian.T * weights
     curvature = weighted @ best.jacobian
     # An unknown of which the data say nothing stays where it is.

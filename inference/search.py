@@ -8,8 +8,9 @@ import numpy as np
 from ..errors import NoFeasibleStart
 from ..materials.forms.base import Array
 from ..materials.law import HypoelasticLaw
+from .bounded_step import bounded_step
 from .comparison import Comparison
-from .descent import bounded_step, descend
+from .descent import descend
 from .methods import FitOptions, Method, method_named
 from .problem import CONVERGED, LEVEL, RUNS_USED_UP, Evaluation, FitProblem, Optimum
 from .unknowns import MOST_DRAWS, LawBounds, Unknowns
@@ -169,6 +170,8 @@ def evaluate_law(problem: FitProblem, y: Array, with_jacobian: bool = False) -> 
         return None
     free = np.arange(problem.unknowns.count) >= problem.unknowns.size
     # Squares lead to the optimum of e, the sum of norms, from further away.
-    near, _ = descend(problem, first, TOLERANCE, MOST, only=free)
-    best, _ = descend(problem, near, TOLERANCE, problem.analyses + MOST, norms=True, only=free)
+    near, _ = descend(problem, first, TOLERANCE, MOST, may_change=free)
+    best, _ = descend(
+        problem, near, TOLERANCE, problem.analyses + MOST, norms=True, may_change=free
+    )
     return best

@@ -73,8 +73,8 @@ def _determined(fit: Fit) -> Sequence[Table]:
     ]  # fmt: skip
     units = {c.name: c.objective.unit for c in fit.problem.comparisons}
     together = {
-        name: f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
-        for name, alike in sure.noise.alike.items()
+        name: f", {count:.2g} neighbouring values err as one" if count > 1.05 else ""
+        for name, count in sure.noise.correlated_count.items()
     }
     noise = ", ".join(
         f"{value:.2g} {units[name]} ({name}{together[name]})"

@@ -18,7 +18,7 @@ from ..experiments.registry import report_of
 from ..files import __version__, json_text, write_notes, write_text
 from ..inference.posterior import LEVEL
 from ..project.project import Project
-from ..runs.fit import Check
+from ..runs.check import Check
 from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
 from ..runs.predictions import Predictions
 from ..runs.result import answers

@@ -12,7 +12,7 @@ from ..errors import SOLVER, InputError, Note, NoteKind, SolverFailure
 from ..experiments.kinds import Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
-from ..inference.descent import descend
+from ..inference.descent import DescentSettings, descend
 from ..inference.linear import (
     NOT_DEFINITE,
     TOO_LITTLE,
@@ -224,7 +224,7 @@ def _certainty(
 ) -> Certainty:  # fmt: skip
     """Return the certainty by first derivatives, by second if much is left and they differ."""
     left = best.residual if limit is None else limit.residual
-    noise = Noise.of(problem, left)
+    noise = Noise.from_residual(problem, left)
     if not large(problem, left):
         return certainty(problem, best, law, reached, limit, taken_out=out, noise=noise)
     found, change = second_of(problem, best, noise), {}
@@ -331,7 +331,8 @@ def find_optimum(project: Project, card: Card, tests: str | Sequence[str] | None
         said = f"the tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(said, problem.solver.name)
     tolerance, most = project.fit.tolerance, problem.analyses + MOST
-    found, status = descend(problem, point, tolerance, most, norms=True, damping=DAMPING)
+    settings = DescentSettings(initial_damping=DAMPING)
+    found, status = descend(problem, point, tolerance, most, norms=True, settings=settings)
     y, coefficients = (tuple(v.tolist()) for v in (found.unknowns, found.coefficients))
     analyses = problem.analyses
     record = StartRecord(

@@ -15,7 +15,7 @@ from ..errors import InputError, Note, NoteKind, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
 from ..files import pandas as pd
-from ..inference.descent import descend
+from ..inference.descent import DescentSettings, descend
 from ..inference.linear import moduli_of, summary
 from ..inference.posterior import LEVEL, bands_of
 from ..inference.problem import (
@@ -275,15 +275,13 @@ def _task(found: Optimum, groups: Sequence[Group], seed: int) -> Task:
     # With derivatives, from the unloaded state: every sample starts from here.
     point = problem.evaluate(found.point.unknowns, True, warm=False)
     tolerance = found.setup.project.fit.tolerance
+    settings = DescentSettings(initial_damping=DAMPING, negligible_decrease=NEGLIGIBLE)
 
     def sample(number: int, tell: Callable[[Any], None]) -> Sample:
         counts = draw_counts(groups, np.random.default_rng([seed, number]))
         own = WeightedProblem.of(problem, factors_of(problem, groups, counts))
         assert point is not None  # it ran a moment ago
-        best, status = descend(
-            own, own.seen(point), tolerance, MOST, norms=True, damping=DAMPING,
-            negligible=NEGLIGIBLE,
-        )  # fmt: skip
+        best, status = descend(own, own.seen(point), tolerance, MOST, norms=True, settings=settings)
         return Sample(number, counts, best.unknowns.tolist(), own.analyses, status)
 
     return sample

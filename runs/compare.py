@@ -24,7 +24,7 @@ from ..project.project import Project
 from ..solvers.base import carries_load_ratios
 from .best import noise_of
 from .executor import Task
-from .fit import stored_fit
+from .fit import fit_in_series
 from .folder import Presented, check_asked, finished, shown
 from .progress import Listener, listener
 from .result import Fit
@@ -322,7 +322,7 @@ def compare(
     folder = begin_study(out, of, resume, overwrite, map(plain, projects))
     names, done = [test.name for test in chosen], []
     for name, own in projects.items():
-        found = stored_fit(
+        found = fit_in_series(
             own, names, f"{name} moduli", plain(name), folder=folder, resume=resume,
             overwrite=overwrite, progress=tell, command_line=command_line,
         )  # fmt: skip

@@ -14,8 +14,9 @@ from ..errors import InputError, Note, NoteKind, SolverFailure, checked, rows
 from ..experiments.kinds import Weighting
 from ..files import __version__, one_blas_thread
 from ..inference.assessment import certainty
+from ..inference.bounded_step import bounded_step
 from ..inference.comparison import Comparison
-from ..inference.descent import bounded_step, descend
+from ..inference.descent import DescentSettings, descend
 from ..inference.noise import misfits
 from ..inference.problem import Evaluation, FitProblem, WeightedProblem
 from ..inference.unknowns import EstimatedStarts
@@ -33,8 +34,9 @@ METHOD = "virtual work"
 NOT_ESTIMATED = NoteKind("not estimated")
 GAP = NoteKind("not in equilibrium", weight=11)
 
-#: Analyses, tolerance, and relative decreases that are not worth an analysis, or count as none.
-MOST, TOLERANCE, NEGLIGIBLE, SETTLES = 40, 1e-9, 1e-4, (1e-2, 2)
+#: Analyses and tolerance of the descent, which ends early: an estimate need not be exact.
+MOST, TOLERANCE = 40, 1e-9
+ESTIMATE = DescentSettings(negligible_decrease=1e-4, settled_decrease=1e-2, settled_steps=2)
 #: Chi beyond which shape and law are at odds, by more than noise.
 LARGE = 2.0
 UNBALANCED = (
@@ -183,7 +185,5 @@ def _fitted(
     first = problem.evaluate(y if step is None else y + step, True)
     if first is None:
         raise SolverFailure(f"no estimate: {problem.failure}", METHOD)
-    best, _ = descend(
-        problem, first, TOLERANCE, MOST, norms=True, negligible=NEGLIGIBLE, settles=SETTLES
-    )
+    best, _ = descend(problem, first, TOLERANCE, MOST, norms=True, settings=ESTIMATE)
     return problem, best

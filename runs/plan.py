@@ -218,10 +218,10 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
     if point is None:
         said = f"the present tests cannot be run with the card: {problem.failure}"
         raise SolverFailure(said, problem.solver.name)
-    noise = Noise.of(problem, point.residual)
+    noise = Noise.from_residual(problem, point.residual)
     precision = {
         c.name: Precision(
-            noise.level[c.name], noise.alike[c.name], round(np.mean(c.objective.sizes))
+            noise.level[c.name], noise.correlated_count[c.name], round(np.mean(c.objective.sizes))
         )
         for c in comparisons
     }

@@ -180,7 +180,7 @@ class Fit(Reported):
         numbers = {name: [names.index(c.name) for c in fitted.comparisons]
                    for name, fitted in self.tests.items()}  # fmt: skip
         given = leading, point, self.law, self.best.valid
-        sigma = partial(uncertainty_from, *given, noise=sure.noise.rows)
+        sigma = partial(uncertainty_from, *given, noise=sure.noise.residual_sigma)
         alone = {name: sigma(numbers=own) for name, own in numbers.items()}
         return {**alone, TOGETHER: dict(sure.sigma)}
 
@@ -485,7 +485,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
     result["noise_given"] = {name: test.numbers for name, test in fit.noise_tests.items()}
     if sure is not None:
         result["uncertainty"] = {
-            "noise": sure.noise.level, "values_that_err_as_one": sure.noise.alike,
+            "noise": sure.noise.level, "values_that_err_as_one": sure.noise.correlated_count,
             "largest_relative_sigma": {n: float(s.max()) for n, s in sure.sigma.items()},
             "median_relative_sigma": {n: float(np.median(s)) for n, s in sure.sigma.items()},
             "largest_relative_mesh": _largest(sure.mesh),
@@ -493,7 +493,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
             "mesh_error": CORRECTED if sure.taken_out else TOLD,
             "second_order": None if sure.order is None else sure.order.numbers,
             "smooth_beyond_noise": {
-                name: {**asdict(d), "told": d.significant} for name, d in sure.discrepancy.items()
+                name: discrepancy.numbers for name, discrepancy in sure.discrepancy.items()
             },
         }  # fmt: skip
     result["verdict"] = {

@@ -39,7 +39,7 @@ from ..project.project import Project, chosen_cards
 from .best import reached_by
 from .compare import candidates, errors, fit_of, plain
 from .executor import Task
-from .fit import stored_fit
+from .fit import fit_in_series
 from .folder import Presented, check_asked, check_unused, finished, shown
 from .predictions import predict
 from .progress import Listener, listener
@@ -331,7 +331,7 @@ def validate(
         [f"{plain(form)}-without-{leave}.json" for form in projects],
     )  # fmt: skip
     fitted = functools.partial(
-        stored_fit, folder=folder, resume=resume, overwrite=overwrite, progress=tell,
+        fit_in_series, folder=folder, resume=resume, overwrite=overwrite, progress=tell,
         command_line=command_line,
     )  # fmt: skip
     names, judged = [test.name for test in chosen], []
@@ -541,7 +541,7 @@ def weights(
         raise InputError(project.path, "--weights", problem)
     of = {"counted": ", ".join(names)}
     folder = begin_study(out, of, resume, overwrite, [FITTED], [RUNS])
-    found = stored_fit(
+    found = fit_in_series(
         project, [test.name for test in chosen], "the fit at the project's weights", FITTED,
         folder=folder, resume=resume, overwrite=overwrite, progress=tell, command_line=command_line,
     )  # fmt: skip

@@ -31,8 +31,9 @@ from bubblefit.experiments.registry import report_of
 from bubblefit.experiments.strips.gauge import LOST, NO_LOAD
 from bubblefit.experiments.strips.report import LEFT_OUT
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.linear import SECOND_ORDER
-from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE, DISCREPANCY
+from bubblefit.inference.noise import ABOVE_NOISE, BELOW_NOISE
 from bubblefit.materials.exports.base import CONFIRM, LOSES
 from bubblefit.project.project import read_project
 from bubblefit.readers.frames import ORDER

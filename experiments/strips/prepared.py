@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...inference.comparison import Comparison, NoiseIs
-from ...inference.noise import alike
+from ...inference.correlation import CorrelogramSettings, correlated_count
 from ...meshes.strip_models import GRIP_DISTANCE, WIDTH, UniaxialModel
 from ...readers.curves import DIRECTIONS, LoadCurve
 from ...solvers.base import History
@@ -110,8 +110,8 @@ class StripObjective(LoadObjective):
 PLACES = 1.25
 #: Specimens behind a polynomial where the number is unknown: as many as ISO 1421 asks for.
 SPECIMENS = 5
-#: Distances along a curve at which loads are compared: a specimen may have ten of them.
-RINGS = 8
+#: Along the whole curve of a specimen, in few bins: it may have ten loads.
+CURVE_CORRELOGRAM = CorrelogramSettings(max_distance=1.0 + 1e-9, bins=8)
 
 
 def loads_alike(
@@ -143,7 +143,7 @@ def independent_loads(strip: Strip, specimens: int | None = None) -> float:
     if not square > 0:
         return float(len(numbers) - 1)
     places = [elongation[own][:, None] for own in rows]
-    along = alike(blocks, places, 1.0 + 1e-9, RINGS)
+    along = correlated_count(blocks, places, CURVE_CORRELOGRAM)
     # What a specimen that is stiffer by a factor leaves, which no distance tells.
     by_factor = [
         float(block @ mean[own]) ** 2 / max(float(mean[own] @ mean[own]), 1e-300)

@@ -7,18 +7,21 @@ residual that is not zero, the blocks are weighted so that e itself (a sum of no
 import numpy as np
 
 from ...materials.forms.base import Array
-from ..descent import bounded_step, descend
+from ..bounded_step import bounded_step
+from ..descent import DescentSettings, descend
 from ..problem import ANALYSES_USED_UP, LEVEL, Evaluation, FitProblem, Optimum
 from . import FitOptions
 
 SAME = 1e-5  # e of the same equilibrium, reached twice
 MOST_OF_NORMS = 40  # analyses of the second stage
 FEW = 20  # analyses of a fit without warm starts, at least
-#: Relative decrease of the squares that ends the first stage, as what follows goes on from there.
-SOON = 5e-4, 2
+#: The first stage ends early, as what follows goes on from there.
+FIRST_STAGE = DescentSettings(settled_decrease=5e-4, settled_steps=2)
+#: A restart shows where it leads before it is exact.
+ROUGH = DescentSettings(negligible_decrease=1e-4)
 AT_THE_END = 8  # analyses, among which an unstable one shows that the optimum lies at that border
 STIFFER = (2.0, 4.0)  # in shear: factors of the restarts away from instability
-ROUGHLY, NEAR = 1e-4, 1e-3  # of the squares, by which a restart shows where it leads
+NEAR = 1e-3  # of the squares, within which a restart leads back
 
 
 class LevenbergMarquardt:
@@ -37,7 +40,7 @@ class LevenbergMarquardt:
         first = problem.evaluate(start, True)
         if first is None:
             return None
-        level, status = descend(problem, first, tolerance, before_last, settles=SOON)
+        level, status = descend(problem, first, tolerance, before_last, settings=FIRST_STAGE)
         if options.leads:
             return Optimum(level, status, problem.analyses)
         best, status = _then_norms(problem, level, status, tolerance, before_last)
@@ -94,8 +97,10 @@ def _from_stiffer(
     point = None if step is None else problem.evaluate(y + step, True)
     if point is None or not point.stable:
         return best, LEVEL
-    for only in (~shear, None):
-        point, _ = descend(problem, point, tolerance, max_analyses, only=only, negligible=ROUGHLY)
+    for may_change in (~shear, None):
+        point, _ = descend(
+            problem, point, tolerance, max_analyses, may_change=may_change, settings=ROUGH
+        )
     assert level.jacobian is not None
     away, squares = level.jacobian @ (point.unknowns - level.unknowns), np.sum(level.residual**2)
     higher = np.sum(point.residual**2) - squares

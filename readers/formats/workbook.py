@@ -11,10 +11,10 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import content_of
+from ..machine_export import Row, Rows, find_header, quantity_words, table_from_rows
 from ..machine_tables import MachineTable, TableOptions
 from ..registry import Format, register_format
 from ..tables import MOST_NAMES
-from .machine_text import Rows, find_header, table_of
 
 #: Bytes of a workbook, and of all its parts unpacked; cells of a sheet.
 LARGEST, UNPACKED, MOST_CELLS = 50 * 2**20, 500 * 2**20, 5_000_000
@@ -23,16 +23,16 @@ LARGEST, UNPACKED, MOST_CELLS = 50 * 2**20, 500 * 2**20, 5_000_000
 def read(path: Path, options: TableOptions) -> MachineTable:
     """Read the table of the sheet that is named, else of the one sheet that has such a table."""
     sheets = _sheets(path, options.sheet)
-    named, quantities = options.columns, options.quantities
-    heads = {name: find_header(rows, named, quantities) for name, rows in sheets.items()}
+    heads = {name: find_header(rows, options) for name, rows in sheets.items()}
     able = [name for name, index in heads.items() if index is not None]
     if len(able) != 1:
-        what = " and ".join(repr(named[q]) if q in named else f"one of {q}" for q in quantities)
-        problem = f"no sheet has a row of names with {what}; it has: {', '.join(map(repr, sheets))}"
+        required = quantity_words(options)
+        listed = ", ".join(map(repr, sheets))
+        problem = f"no sheet has a row of names with {required}; it has: {listed}"
         if able:
             problem = f"several sheets have such a table, {', '.join(map(repr, able))}; say sheet"
         raise InputError(path, "", problem)
-    return table_of(path, sheets[able[0]], heads[able[0]] or 0, options)
+    return table_from_rows(path, sheets[able[0]], heads[able[0]] or 0, options)
 
 
 def _sheets(path: Path, wanted: str | None) -> dict[str, Rows]:
@@ -71,7 +71,7 @@ def _rows(path: Path, sheet: Any) -> Rows:
             raise InputError(path, "", f"a sheet has more than {MOST_CELLS} cells; save it as CSV")
         text = ["" if cell is None else str(cell).strip() for cell in row]
         if any(text):
-            found.append((number, text))
+            found.append(Row(number, text))
     return found
 
 

@@ -18,7 +18,7 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.project.schema import SHIPPED, project_schema, read_content, validated
 from bubblefit.reports.content import read_page_data
-from bubblefit.runs.fit import check
+from bubblefit.runs.check import check
 from click.testing import CliRunner
 
 from ..camera import camera_project

@@ -13,7 +13,8 @@ from bubblefit.errors import SOLVER, Note, foremost
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
 from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
 from bubblefit.inference.assessment import BOUND, UNCERTAIN
-from bubblefit.inference.noise import ABOVE_NOISE, DISCREPANCY
+from bubblefit.inference.discrepancy import DISCREPANCY
+from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw

@@ -13,17 +13,16 @@ from bubblefit.inference.assessment import (
     uncertainty_from,
 )
 from bubblefit.inference.comparison import Nuisance, NuisanceOf
+from bubblefit.inference.correlation import correlated_count, correlated_count_of
 from bubblefit.inference.descent import descend
 from bubblefit.inference.linear import LawQuery, Limit, information, summary
 from bubblefit.inference.noise import (
     ABOVE_NOISE,
     BELOW_NOISE,
-    CHANCE,
+    SIGNIFICANCE,
     Misfit,
     Noise,
     NoiseTest,
-    alike,
-    alike_in,
     noise_tests,
     notes_of_noise,
 )
@@ -93,7 +92,7 @@ def test_what_a_nuisance_hides_is_not_determined():
     for unknowns in (CONSTANT, PRESSED):
         fit = flat(unknowns, model)
         point = evaluated(fit)
-        noise = Noise.of(fit, point.residual).rows
+        noise = Noise.from_residual(fit, point.residual).residual_sigma
         found.append(uncertainty_from(fit, point, FLAT_LAW, REACHED, [0], noise))
     for name in ("E1", "E2"):
         assert found[0][name].max() < 0.02 and found[1][name].min() > 0.5
@@ -204,18 +203,20 @@ def smooth(length):
 def test_smoothed_noise(width):
     fields = noise(width, 24)
     expected = max(1.0, 4 * np.pi * width**2)
-    assert alike(fields, [PLACES] * 24) == pytest.approx(expected, rel=0.15)
+    assert correlated_count(fields, [PLACES] * 24) == pytest.approx(expected, rel=0.15)
 
 
 def test_blocks_count_alike_whatever_their_size():
     fields, places = noise(1.0, 12), [PLACES] * 12
     sizes = np.array([1.0, 100.0] * 6)
     scaled = [size * field for size, field in zip(sizes, fields, strict=True)]
-    assert alike(scaled, places) == pytest.approx(alike(fields, places), rel=1e-12)
+    assert correlated_count(scaled, places) == pytest.approx(
+        correlated_count(fields, places), rel=1e-12
+    )
     # What changes its sign from point to point counts as independent; so does nothing at all.
     field = (-1.0) ** np.indices((SIDE, SIDE)).sum(axis=0).reshape(-1)
-    assert alike([field], [PLACES]) == alike([], []) == 1.0
-    assert alike([np.zeros(5), np.ones(1)], [PLACES[:5], PLACES[:1]]) == 1.0
+    assert correlated_count([field], [PLACES]) == correlated_count([], []) == 1.0
+    assert correlated_count([np.zeros(5), np.ones(1)], [PLACES[:5], PLACES[:1]]) == 1.0
 
 
 def test_a_fit_is_as_much_less_sure():
@@ -237,15 +238,17 @@ def test_a_fit_is_as_much_less_sure():
         point = fit.evaluate(fit.unknowns.at(LAW.beta), True)
         found[name] = certainty(fit, point, LAW, np.full(3, 0.08))
         if name == "shared":
-            assert alike_in(objective, point.residual) == found[name].noise.alike["bubble"]
+            count = correlated_count_of(objective, point.residual)
+            assert count == found[name].noise.correlated_count["bubble"]
     # A smooth misfit of 0.03 mm, below 0.05 mm to reckon with, does not tell.
-    assert found["smooth"].noise.alike == {"bubble": 1.0}
-    assert found["white"].noise.alike["bubble"] == pytest.approx(1.0, abs=0.15)
-    assert 3.0 < found["shared"].noise.alike["bubble"] < 12.0
+    assert found["smooth"].noise.correlated_count == {"bubble": 1.0}
+    assert found["white"].noise.correlated_count["bubble"] == pytest.approx(1.0, abs=0.15)
+    assert 3.0 < found["shared"].noise.correlated_count["bubble"] < 12.0
     for name in ("E1", "E2", "G12"):
         ratio = found["shared"].sigma[name] / found["white"].sigma[name]
         noise_ratio = found["shared"].noise.level["bubble"] / found["white"].noise.level["bubble"]
-        many = found["shared"].noise.alike["bubble"] / found["white"].noise.alike["bubble"]
+        shared, white = (found[mix].noise.correlated_count["bubble"] for mix in ("shared", "white"))
+        many = shared / white
         # Noise that is shared leaves blocks of other norms, and so of other weights.
         assert ratio == pytest.approx(noise_ratio * np.sqrt(many), rel=0.15)
 
@@ -260,9 +263,11 @@ def test_along_a_curve():
         follow[:, k] = 0.6 * follow[:, k - 1] + white[:, k]
     fine = places[:60]
     pieces = [piece for one in follow for piece in np.split(one[:1980], 33)]
-    assert alike(pieces, [fine] * len(pieces)) == pytest.approx(4.0, rel=0.15)
+    assert correlated_count(pieces, [fine] * len(pieces)) == pytest.approx(4.0, rel=0.15)
     for count in (10, 100):
-        found = [alike([random.standard_normal(count)], [places[:count]]) for _ in range(60)]
+        found = [
+            correlated_count([random.standard_normal(count)], [places[:count]]) for _ in range(60)
+        ]
         assert np.median(found) == 1.0 and np.mean(found) < 1.15
 
 
@@ -298,9 +303,10 @@ def test_what_is_counted():
     fit = fit_of_fields(NOISE)
     residual = np.random.default_rng(5).standard_normal(len(fit.scale)) * NOISE / fit.scale
     (test,) = noise_tests(fit, residual).values()
-    assert test.values == len(residual) and test.free == pytest.approx(test.independent - 3)
-    assert test.square == pytest.approx(test.independent * test.misfit.ratio**2)
-    assert test.above + test.below == pytest.approx(1.0)
+    assert test.values == len(residual)
+    assert test.degrees_of_freedom == pytest.approx(test.independent - 3)
+    assert test.chi_square == pytest.approx(test.independent * test.misfit.ratio**2)
+    assert test.probability_of_more + test.probability_of_less == pytest.approx(1.0)
     # Nobody gave it: nothing is tested.
     assert noise_tests(fit_of_fields(None), residual) == {}
 
@@ -311,11 +317,12 @@ def test_what_is_told():
     few = NoiseTest(Misfit(4.54, 3.0, "given", "N"), 300, 3.0, 2.0)
     # However many values say it: a twentieth is no matter.
     little = NoiseTest(Misfit(3.15, 3.0, "given", "N"), 10**6, 1e6, 1e6)
-    assert little.above < CHANCE
+    assert little.probability_of_more < SIGNIFICANCE
     notes = notes_of_noise({"warp": above, "fill": below, "bias": few, "other": little})
     assert [(n.kind, n.of) for n in notes] == [
         (ABOVE_NOISE, "warp"), (BELOW_NOISE, "fill"),
     ]  # fmt: skip
     assert "4.54 N RMS, 1.51 times the noise given (3 N; 300 values count as 30 " in notes[0]
-    assert above.numbers["probability_of_more"] == above.above < CHANCE < few.above
+    assert above.numbers["probability_of_more"] == above.probability_of_more
+    assert above.probability_of_more < SIGNIFICANCE < few.probability_of_more
     assert Misfit(1.0, 0.0, "assumed", "mm").ratio == np.inf

@@ -10,16 +10,13 @@ from bubblefit.experiments.bubble.objective import FieldObjective, FieldTarget
 from bubblefit.experiments.strips.prepared import LoadObjective, StripObjective
 from bubblefit.inference.assessment import notes_of_verdicts, verdicts
 from bubblefit.inference.comparison import Comparison, Nuisance, NuisanceOf
+from bubblefit.inference.discrepancy import DISCREPANCY, notes_of_discrepancies
 from bubblefit.inference.linear import posteriors_of
-from bubblefit.inference.noise import (
-    DISCREPANCY,
-    Noise,
-    alike_in_all,
-    discrepancies,
-    notes_of_discrepancies,
-)
+from bubblefit.inference.noise import Noise
 from bubblefit.inference.problem import FitProblem, folds_of
+from bubblefit.inference.specimen_discrepancy import specimen_discrepancy
 from bubblefit.inference.unknowns import Unknowns
+from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import straight_strip
@@ -214,7 +211,7 @@ def evaluated(fit, nuisance=None):
     if nuisance:
         y[12:] = nuisance
     point = fit.evaluate(y, True)
-    return point, posteriors_of(fit, point, Noise.of(fit, point.residual))[0]
+    return point, posteriors_of(fit, point, Noise.from_residual(fit, point.residual))[0]
 
 
 def test_a_prior_of_the_thickness_is_the_uncertainty_of_the_moduli():
@@ -265,7 +262,7 @@ def scattered(count, random):
 
 def found(residuals, places=None):
     own = places or [PLACES] * len(residuals)
-    return alike_in_all(list(residuals), own, [SLOPES[: len(p)] for p in own], "N")
+    return specimen_discrepancy(list(residuals), own, [SLOPES[: len(p)] for p in own], "N")
 
 
 @pytest.mark.parametrize("specimens", [3, 5, 10])
@@ -276,8 +273,8 @@ def test_specimens_that_scatter_are_seldom_told(specimens):
         off = scattered(specimens, random)
         off -= (off @ SLOPES[:, :1] / (SLOPES[:, 0] @ SLOPES[:, 0])).mean() * SLOPES[:, 0]
         one = found(off)
-        assert one is not None and one.specimens == specimens
-        told += one.significant
+        assert one is not None and one.specimen_count == specimens
+        told += one.is_significant
     assert told / sets <= 0.03
 
 
@@ -285,16 +282,16 @@ def test_of_three_specimens_it_is_the_square_of_students_t():
     """Beside the slope there is one shape to be tested, the load at no elongation."""
     off = scattered(3, np.random.default_rng(4))
     one, starts = found(off), [np.polyfit(PLACES, own, 1)[1] for own in off]
-    assert one.ratio == pytest.approx(ttest_1samp(starts, 0.0).statistic ** 2, rel=1e-9)
-    assert one.largest == pytest.approx(98.50, abs=0.01)
+    assert one.f_ratio == pytest.approx(ttest_1samp(starts, 0.0).statistic ** 2, rel=1e-9)
+    assert one.critical_ratio == pytest.approx(98.50, abs=0.01)
 
 
 def test_a_wrong_form_is_told():
     random = np.random.default_rng(8)
     bend = 60.0 * ((PLACES / 1.5 - 1.0) ** 2 - 0.4)
-    assert sum([found(bend + scattered(5, random)).significant for _ in range(100)]) > 70
+    assert sum([found(bend + scattered(5, random)).is_significant for _ in range(100)]) > 70
     ten = [found(bend + scattered(10, random)) for _ in range(50)]
-    assert all(one.significant for one in ten)
+    assert all(one.is_significant for one in ten)
     # Without what another modulus would follow.
     beside = bend - SLOPES[:, 0] * (bend @ SLOPES[:, 0]) / (SLOPES[:, 0] @ SLOPES[:, 0])
     expected = float(np.sqrt(np.mean(beside**2)))
@@ -332,10 +329,10 @@ def differences(knots, places, measured, count, slopes, model):
 )
 def test_what_all_specimens_have_in_common_points_to_its_cause(load, elongation, words):
     one = judged_strips(1.0, load, elongation)
-    assert one.significant and one.specimens == 6
+    assert one.is_significant and one.specimen_count == 6
     first, *others = one.causes
-    assert words in first.words and first.share > 0.9
-    assert all(other.share < first.share for other in others)
+    assert words in first.description and first.explained_share > 0.9
+    assert all(other.explained_share < first.explained_share for other in others)
     (note,) = notes_of_discrepancies({"warp": one})
     assert words in note
 
@@ -343,10 +340,10 @@ def test_what_all_specimens_have_in_common_points_to_its_cause(load, elongation,
 def test_what_is_small_beside_the_load_is_no_warning():
     """Beyond chance, but 0.3 N: told of strips that carry 3 N, not of those that carry 3000."""
     small, large = judged_strips(10.0, 0.3, 0.0), judged_strips(0.01, 0.3, 0.0)
-    assert small.systematic and small.ratio > 5 * small.largest
-    assert small.share < 1e-3 and not small.significant
+    assert small.is_systematic and small.f_ratio > 5 * small.critical_ratio
+    assert small.relative_rms < 1e-3 and not small.is_significant
     assert not notes_of_discrepancies({"warp": small})
-    assert large.share > 0.02 and large.significant
+    assert large.relative_rms > 0.02 and large.is_significant
 
 
 def test_what_a_spline_leaves_is_small_beside_scatter_and_load():
@@ -366,8 +363,8 @@ def test_what_a_spline_leaves_is_small_beside_scatter_and_load():
     model = SimpleNamespace(load=500 * knots)
     one = differences(knots, x, measured, count, np.tile(basis, (6, 1)), model)
     assert np.sqrt(np.mean(scatter**2)) == pytest.approx(14.0, rel=0.3)
-    assert one.systematic and one.ratio > 100 and one.rms == pytest.approx(0.3, rel=0.3)
-    assert not one.significant and not notes_of_discrepancies({"warp": one})
+    assert one.is_systematic and one.f_ratio > 100 and one.rms == pytest.approx(0.3, rel=0.3)
+    assert not one.is_significant and not notes_of_discrepancies({"warp": one})
 
 
 def test_what_the_law_can_follow_is_no_wrong_form():
@@ -376,13 +373,15 @@ def test_what_the_law_can_follow_is_no_wrong_form():
     for _ in range(20):
         off = scattered(5, random)
         before, after = found(off), found(400.0 * PLACES + off)
-        assert after.ratio == pytest.approx(before.ratio, rel=1e-6)
+        assert after.f_ratio == pytest.approx(before.f_ratio, rel=1e-6)
     # Two of four broke early: their curves say too little of the whole.
     places = [PLACES, PLACES, PLACES[:15], PLACES[:15]]
     assert found([own[: len(at)] for own, at in zip(off, places, strict=False)], places) is None
     # Specimens that do not differ leave nothing to test against, nor do two, nor single points.
     assert found(off[:2]) is None and found(np.tile(off[:1], (5, 1))) is None
-    assert alike_in_all([np.ones(1)] * 5, [np.ones(1)] * 5, [np.ones((1, 1))] * 5, "N") is None
+    assert (
+        specimen_discrepancy([np.ones(1)] * 5, [np.ones(1)] * 5, [np.ones((1, 1))] * 5, "N") is None
+    )
 
 
 @pytest.mark.parametrize(

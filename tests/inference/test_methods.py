@@ -12,7 +12,7 @@ from bubblefit.experiments.bubble.objective import FieldObjective
 from bubblefit.inference import descent, linear, methods
 from bubblefit.inference.assessment import moduli_error
 from bubblefit.inference.comparison import Blocks
-from bubblefit.inference.descent import descend
+from bubblefit.inference.descent import DescentSettings, descend
 from bubblefit.inference.linear import (
     NOT_DEFINITE,
     SECOND_ORDER,
@@ -57,6 +57,9 @@ from .cases import (
     single,
     targets,
 )
+
+PRECISE = DescentSettings(negligible_decrease=1e-12)
+LIGHTLY_DAMPED = DescentSettings(initial_damping=1e-6)
 
 
 @pytest.mark.parametrize("method", method_names())
@@ -200,10 +203,10 @@ def test_the_residuals_own_curvature_finds_what_slopes_alone_do_not(monkeypatch,
     least = [85822.2, 394.155168][norms]
     for without in (False, True):
         if without:
-            monkeypatch.setattr(descent, "_definite", lambda matrix: False)
+            monkeypatch.setattr(descent, "_is_positive_definite", lambda matrix: False)
         own = BrownAndDennis()
         point = own.evaluate(own.start, True)
-        end, _ = descend(own, point, 1e-9, 200, norms, negligible=1e-12)
+        end, _ = descend(own, point, 1e-9, 200, norms, settings=PRECISE)
         value = end.value if norms else np.sum(end.residual**2)
         assert (value > 2 * least) if without else (value == pytest.approx(least, rel=1e-6))
         assert (own.analyses == 200) if without else (own.analyses < most)
@@ -216,11 +219,11 @@ def test_curvature_is_learnt_from_a_step():
     own, step, change = own + own.T, random.standard_normal(4), random.standard_normal(4)
     change *= np.sign(change @ step)
     turned = random.standard_normal(4)
-    found = descent._learnt(own, step, turned, change)
+    found = descent._secant_update(own, step, turned, change)
     assert found @ step == pytest.approx(turned)
     assert found == pytest.approx(found.T)
-    assert descent._learnt(found, step, turned, change) == pytest.approx(found)
-    assert (descent._learnt(own, step, turned, -change) == own).all()  # that is no curvature
+    assert descent._secant_update(found, step, turned, change) == pytest.approx(found)
+    assert (descent._secant_update(own, step, turned, -change) == own).all()  # that is no curvature
 
 
 def test_reweighting_lowers_e_on_noisy_data():
@@ -329,7 +332,15 @@ def wrong():
     best = fit.evaluate(found.best.unknowns, True)
     assert best is not None
     rows = NOISE / fit.scale
-    return fit, best, replace(Noise.of(fit, best.residual), rows=rows, least=rows)
+    return (
+        fit,
+        best,
+        replace(
+            Noise.from_residual(fit, best.residual),
+            residual_sigma=rows,
+            smallest_residual_sigma=rows,
+        ),
+    )
 
 
 def test_sigma_is_the_scatter_of_refits_of_a_wrong_law(wrong):
@@ -345,7 +356,7 @@ def test_sigma_is_the_scatter_of_refits_of_a_wrong_law(wrong):
     for number in range(REFITS):
         own = noisy(number)
         point = own.evaluate(best.unknowns, True)
-        found.append(descend(own, point, 1e-9, 60, norms=True, damping=1e-6)[0].unknowns)
+        found.append(descend(own, point, 1e-9, 60, norms=True, settings=LIGHTLY_DAMPED)[0].unknowns)
     scatter = np.std(found, axis=0, ddof=1)
     # Forty refits say it to 11 %.
     assert whole == pytest.approx(scatter, rel=0.25)
@@ -356,8 +367,12 @@ def test_curvature_is_that_of_the_objective(wrong, monkeypatch):
     fit, best, noise = wrong
     for name in ("LEAST_STEP", "LARGEST_STEP"):
         monkeypatch.setattr(linear, name, 1e-4)
-    second = second_of(fit, best, replace(noise, least=0 * noise.least))
-    near = Linear.of(fit, best, replace(noise, least=0 * noise.least))
+    second = second_of(
+        fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
+    )
+    near = Linear.of(
+        fit, best, replace(noise, smallest_residual_sigma=0 * noise.smallest_residual_sigma)
+    )
     back = (near.sharp * near.curvature) @ near.sharp.T + second.added
     for k in range(3):
         step = np.zeros(3)

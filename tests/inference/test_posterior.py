@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 from bubblefit.inference import posterior as truncated
 from bubblefit.inference.comparison import Blocks, Nuisance, NuisanceOf
+from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, notes_of_discrepancies
 from bubblefit.inference.likelihood import FAILED, THRESHOLD, extreme, modulus_row, profile_side
 from bubblefit.inference.linear import Limit, posteriors_of
 from bubblefit.inference.linear import Linear as LinearFit
-from bubblefit.inference.noise import (
-    DISCREPANCY,
-    Discrepancy,
-    Noise,
-    discrepancy,
-    notes_of_discrepancies,
-    smooth_shapes,
-)
+from bubblefit.inference.noise import Noise
 from bubblefit.inference.posterior import Posterior, bands_of, truncated_draws
 from bubblefit.inference.problem import Evaluation, WeightedProblem
+from bubblefit.inference.sheet_discrepancy import sheet_discrepancy, smooth_shapes
 from bubblefit.inference.unknowns import Unknowns
 from bubblefit.materials.forms import polynomial as forms
 from bubblefit.materials.law import HypoelasticLaw
@@ -239,7 +234,7 @@ def bubble():
     """A fit of constants to noisy fields: problem, optimum, and the fit to first order."""
     fit = problem(CONSTANT, noise=NOISE)
     found = levenberg_marquardt(fit, CONSTANT.at(NEAR), 1e-9, 60)
-    return fit, found.best, Noise.of(fit, found.best.residual)
+    return fit, found.best, Noise.from_residual(fit, found.best.residual)
 
 
 def test_a_profile_is_the_least_over_the_other_unknowns(bubble):
@@ -310,7 +305,7 @@ def smooth_noise(random, width, size=0.02):
 
 
 def judged(blocks, doubts=NO_DOUBT, unknowns=3):
-    found = discrepancy(blocks, doubts, [PLACES] * BLOCKS, unknowns, "mm")
+    found = sheet_discrepancy(blocks, doubts, [PLACES] * BLOCKS, unknowns, "mm")
     assert found is not None
     return found
 
@@ -323,7 +318,7 @@ def test_noise_is_taken_for_more_in_one_of_a_hundred(width):
         blocks = smooth_noise(random, width)
         for k in range(3):
             blocks[k] = blocks[k] - SHAPES[:, k] * (SHAPES[:, k] @ blocks[k])
-        told += judged(blocks).significant
+        told += judged(blocks).is_significant
     assert told <= 3  # more in one of 600 such tests, if one of a hundred is told
 
 
@@ -331,27 +326,27 @@ def test_a_smooth_field_is_found_below_the_noise():
     """0.005 mm of one shape in every block, beside noise of 0.02 mm."""
     random, shape = np.random.default_rng(6), 0.005 * SHAPES[:, 7] * SIDE
     told = [judged([b + shape for b in smooth_noise(random, 0.0)]) for _ in range(6)]
-    assert all(one.significant for one in told)
+    assert all(one.is_significant for one in told)
     assert np.mean([one.rms for one in told]) == pytest.approx(0.005, rel=0.2)
     # What the mesh may be answerable for is none.
     found = judged([b + shape for b in smooth_noise(random, 0.0)], [shape] * BLOCKS)
-    assert not found.significant and found.rms < 0.003
+    assert not found.is_significant and found.rms < 0.003
 
 
 def test_blocks_count_alike_whatever_their_size_and_too_few_not_at_all():
     blocks = smooth_noise(np.random.default_rng(1), 0.7)
     scaled = [k * block for k, block in enumerate(blocks, start=1)]
-    assert judged(scaled).ratio == pytest.approx(judged(blocks).ratio, rel=1e-12)
+    assert judged(scaled).f_ratio == pytest.approx(judged(blocks).f_ratio, rel=1e-12)
     for few, places, unknowns in (
         (np.arange(20.0), PLACES[:20], 3),
         (np.zeros(SIDE**2), PLACES, 3),
         (smooth_noise(np.random.default_rng(0), 0.0)[0], PLACES, 15),
     ):
-        assert discrepancy([few], [np.zeros(len(few))], [places], unknowns, "mm") is None
+        assert sheet_discrepancy([few], [np.zeros(len(few))], [places], unknowns, "mm") is None
     found = {
         "bubble": Discrepancy(22.6, 1.25, 0.036, "mm"),
         "other": Discrepancy(1.2, 1.25, 0.001, "mm"),
-        "computed": Discrepancy(61.8, 1.66, 2e-8, "mm", least=4e-4),
+        "computed": Discrepancy(61.8, 1.66, 2e-8, "mm", noise_of_mean=4e-4),
     }
     (note,) = notes_of_discrepancies(found)
     assert (note.kind, note.of) == (DISCREPANCY, "bubble")

@@ -23,7 +23,7 @@ from bubblefit.reports.content import Download, Exhibit, Facts, Picture, Words
 from bubblefit.reports.fit_page import WORDS, band_words, sigma_words
 from bubblefit.reports.html import percent
 from bubblefit.runs.best import MESH
-from bubblefit.runs.fit import expected_of
+from bubblefit.runs.check import expected_of
 from bubblefit.runs.folder import versions
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.result import COMPARED, TABLES, next_step, reaches

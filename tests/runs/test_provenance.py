@@ -6,14 +6,14 @@ import re
 from dataclasses import replace
 from datetime import datetime
 
-import bubblefit.runs.fit
+import bubblefit.runs.fit_folder
 import bubblefit.solvers.run_cache
 import numpy as np
 import pytest
 from bubblefit.materials.forms.spline import TriLinear
 from bubblefit.project.project import read_project, settings_of
 from bubblefit.reports.fit_page import record_tables
-from bubblefit.runs.fit import facts_of
+from bubblefit.runs.fit_folder import facts_of
 from bubblefit.runs.folder import (
     AS_RUN,
     PROVENANCE,
@@ -145,7 +145,7 @@ def test_everything_that_differs_is_named(first, tmp_path):
 
 def test_another_version_is_named(first, tmp_path, monkeypatch):
     setup = set_up(written(tmp_path))
-    for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit):
+    for module in (bubblefit.solvers.run_cache, bubblefit.runs.fit_folder):
         monkeypatch.setattr(module, "__version__", "9.1")
     (words,) = [w for w in refused(first, setup).split("; ") if "bubblefit" in w]
     assert words == f'version of bubblefit = "{bubblefit.__version__}", now "9.1"'

@@ -19,8 +19,9 @@ from bubblefit.meshes.cylinder_model import inflated_cylinder
 from bubblefit.meshes.disk import disk_mesh, disk_modes
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, straight_strip
 from bubblefit.reports import fit_page
+from bubblefit.runs.check import check
 from bubblefit.runs.estimate import GAP, estimate_of, with_start
-from bubblefit.runs.fit import agreement, check
+from bubblefit.runs.multistart import agreement
 from bubblefit.runs.starts import StartRecord
 from bubblefit.runs.verification import (
     ISOTROPIC,

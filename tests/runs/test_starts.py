@@ -18,10 +18,16 @@ from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.project.schema import FitSection
 from bubblefit.runs import best as mesh_error
-from bubblefit.runs import fit as stages
+from bubblefit.runs import multistart
 from bubblefit.runs import starts as room
 from bubblefit.runs.best import MESH, TAKEN_OUT, UNKNOWN, notes_of_mesh, with_certainty
-from bubblefit.runs.fit import distinct, moduli_apart, one_fit
+from bubblefit.runs.multistart import (
+    MultiStart,
+    continuation_task,
+    distinct_optima,
+    moduli_difference,
+    records_of_group,
+)
 from bubblefit.runs.result import answers
 from bubblefit.runs.setup import coarse_problem, prepare_fit
 from bubblefit.runs.starts import EvaluationRecord, StartRecord, run_start
@@ -195,7 +201,7 @@ def test_interrupted_in_either_stage_it_ends_the_same(fitted, folder, tmp_path, 
 def test_it_is_the_optimum_of_the_full_way(fitted, tmp_path):
     full = bf.fit(fitted.project.with_fit(coarse_to_fine=False, starts=1))
     assert full.objective < 1e-6
-    assert moduli_apart(fitted.problem, full.best.ranked[0], fitted.best.ranked[0]) < 1e-3
+    assert moduli_difference(fitted.problem, full.best.ranked[0], fitted.best.ranked[0]) < 1e-3
     assert full.stages == "" and full.coarse_to_fine is None
     assert full.result["coarse_to_fine"] is None and "same_as" not in full.result["starts"][0]
     # Without a coarser mesh every start runs on the full one.
@@ -241,14 +247,14 @@ def test_optima_are_told_apart_by_moduli_and_by_what_they_leave(fitted):
         ended(fitted, 5, None),
         ended(fitted, 6, None),
     ]
-    assert numbers(distinct(fitted.problem, records, 1e-7)) == [[1, 4], [2], [3], [5], [6]]
+    assert numbers(distinct_optima(fitted.problem, records, 1e-7)) == [[1, 4], [2], [3], [5], [6]]
     # Below the tolerance nothing that is left tells them apart.
     fine = [ended(fitted, 0, 1e-9), ended(fitted, 1, 9e-8)]
-    assert numbers(distinct(fitted.problem, fine, 1e-7)) == [[0, 1]]
-    assert numbers(distinct(fitted.problem, fine, 1e-8)) == [[0], [1]]
+    assert numbers(distinct_optima(fitted.problem, fine, 1e-7)) == [[0, 1]]
+    assert numbers(distinct_optima(fitted.problem, fine, 1e-8)) == [[0], [1]]
     # Moduli are compared up to what either optimum reached.
     a, b = ended(fitted, 0, 0.1), ended(fitted, 1, 0.1, (80.0, 400.0, 816.0))
-    assert moduli_apart(fitted.problem, b, a) == pytest.approx(0.02)
+    assert moduli_difference(fitted.problem, b, a) == pytest.approx(0.02)
 
 
 def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch):
@@ -258,16 +264,16 @@ def test_the_next_of_a_group_is_tried_where_the_first_fails(fitted, monkeypatch)
         begun.append((number, coarse.number))
         return replace(coarse, mesh="full", objective=None if number < fails else 0.0)
 
-    monkeypatch.setattr(stages, "run_start", run_start)
+    monkeypatch.setattr(multistart, "run_start", run_start)
     group = [ended(fitted, n, 0.2) for n in (3, 5, 8)]
     for fails, tried in ((0, [3]), (4, [3, 5]), (99, [3, 5, 8])):
         begun.clear()
         told = []
-        last = stages._continuation(fitted.setup, [group])(0, told.append)
+        last = continuation_task(fitted.setup, [group])(0, told.append)
         assert begun == [(n, n) for n in tried]
         full = {r.number: r for r in (*told, last)}
         assert sorted(full) == tried
-        own = list(one_fit(group, full))
+        own = records_of_group(group, full)
         assert [r.number for r in own] == [3, 5, 8]
         if fails == 99:
             assert [r.objective for r in own] == [None] * 3
@@ -302,11 +308,11 @@ def test_many_starts_run_coarse_to_fine_unless_told(
             ran.append(what)
             return [replace(ended(fitted, n, 0.1), mesh="full") for n in numbers]
 
-    monkeypatch.setattr(stages, "executor_of", lambda project: Runs())
+    monkeypatch.setattr(multistart, "executor_of", lambda project: Runs())
     settings = fitted.project.fit.model_copy(update={"coarse_to_fine": wanted, "starts": starts})
     setup = replace(fitted.setup, project=replace(fitted.project, fit=settings))
     done = [replace(ended(fitted, 0, 0.2), mesh=begun)] if begun else []
-    records = stages.every_start(setup, done, lambda _: None, lambda _: None)
+    records = MultiStart(setup, done, lambda _: None, lambda _: None).run()
     assert ran == meshes
     assert [r.number for r in records] == list(range(starts))
     full = meshes == ["full"]

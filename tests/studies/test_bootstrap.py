@@ -286,7 +286,7 @@ def test_what_is_known_now_is_what_a_fit_says_its_tests_pin_down(tmp_path, few, 
     )
     made = plan(read_project(path), BUBBLE_CARD)
     (present,) = here
-    noise = Noise.of(present.problem, present.point.residual).rows
+    noise = Noise.from_residual(present.problem, present.point.residual).residual_sigma
     pinned = uncertainty_from(present.problem, present.point, present.law, made.ends, [0], noise)
     for name, sigma in made.now.sigma.items():
         np.testing.assert_allclose(sigma, pinned[name], rtol=1e-6)

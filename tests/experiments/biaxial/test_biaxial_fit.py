@@ -16,8 +16,8 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations
 from bubblefit.runs import setup
+from bubblefit.runs.check import check
 from bubblefit.runs.compare import candidates as candidate_laws
-from bubblefit.runs.fit import check
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import simulate_cards
 from bubblefit.solvers.registry import solver_named

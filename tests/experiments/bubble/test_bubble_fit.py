@@ -24,7 +24,7 @@ from bubblefit.experiments.bubble.section import Sheet
 from bubblefit.experiments.bubble.test import quantities, responses
 from bubblefit.experiments.kinds import CardRun, Output, Weighting
 from bubblefit.inference.comparison import Blocks
-from bubblefit.inference.noise import discrepancies
+from bubblefit.inference.wrong_form import discrepancies
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import Outline, disk_mesh, elliptic_disk_mesh
@@ -546,9 +546,11 @@ def test_the_residual_points_to_its_cause(cubic, tmp_path, name, change, words, 
     beta = own.known.beta[list(problem.unknowns.free)]
     point = problem.evaluate(problem.unknowns.at(beta), True)
     found = discrepancies(problem, point.residual, None, point, lambda step: 0.0)["bubble"]
-    assert found.significant
+    assert found.is_significant
     first = found.causes[0]
-    assert words in first.words and first.share > 0.8, found.causes
-    assert all(one.share < 0.5 * first.share for one in found.causes[1:]), found.causes
-    said = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e-\d+)?", first.words)]
+    assert words in first.description and first.explained_share > 0.8, found.causes
+    assert all(one.explained_share < 0.5 * first.explained_share for one in found.causes[1:]), (
+        found.causes
+    )
+    said = [float(n) for n in re.findall(r"[-+]?\d+\.?\d*(?:e-\d+)?", first.description)]
     assert said == pytest.approx(amounts, abs=0.1, rel=0.2)

@@ -380,7 +380,8 @@ def test_certainty_predicts_the_scatter_of_noisy_strip_fits():
 def test_what_each_data_set_pins_down():
     fit = joint(noise=10.0, bubble_noise=0.1)
     point = fit.evaluate(CUBIC.at(LAW.beta), True)
-    reached, noise = np.array([0.1, 0.1, 0.3]), Noise.of(fit, point.residual).rows
+    reached = np.array([0.1, 0.1, 0.3])
+    noise = Noise.from_residual(fit, point.residual).residual_sigma
     bubble, uniaxial, both = (
         uncertainty_from(fit, point, LAW, reached, tests, noise)
         for tests in ([0], [1, 2, 3], [0, 1, 2, 3])
@@ -455,7 +456,8 @@ def test_a_fit_reckons_with_specimens(tmp_path):
 
     fit = problem()
     point = fit.evaluate(fit.unknowns.at(np.array([10.0, 190.0, 330.0])), False)
-    assert Noise.of(fit, point.residual).alike["one: warp"] == pytest.approx(22.0, rel=1e-6)
+    noise = Noise.from_residual(fit, point.residual)
+    assert noise.correlated_count["one: warp"] == pytest.approx(22.0, rel=1e-6)
     # A polynomial of the same points says no more, though it has as many values as increments.
     warp, fill = problem(('"points"', '"polynomial"')).comparisons
     assert warp.objective.alike == pytest.approx(8.0) == fill.objective.alike
