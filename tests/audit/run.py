@@ -1,0 +1,71 @@
+"""Audit a folder with all auditors that know what wrote it."""
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from pathlib import Path
+
+from .folders import Folder
+from .ledger import Ledger
+
+PARTS = {"folders", "ledger", "laws", "pages", "run", "__main__"}
+
+
+def auditors():
+    """Return the auditor of each command, of all modules of the package."""
+    package = __package__
+    folder = str(Path(__file__).parent)
+    commands = {}
+    for module in pkgutil.iter_modules([folder]):
+        if module.name not in PARTS:
+            loaded = importlib.import_module(f"{package}.{module.name}")
+            commands |= getattr(loaded, "COMMANDS", {})
+    return commands
+
+
+def audit(path, project=None, terminal="", base=None):
+    """Return the ledger of a folder after all auditors have looked at it.
+
+    Numbers that nobody claims are among its findings.
+    """
+    folder = Folder(path, project, terminal, base)
+    ledger = Ledger(folder)
+    names = [(folder.result or {}).get("command"), *folder.tables]
+    known = auditors()
+    chosen = [known[name] for name in names if name in known]
+    if not chosen:
+        ledger.find(str(path), f"no auditor knows the command {names[0]!r}")
+    for auditor in dict.fromkeys(chosen):
+        auditor(folder, ledger)
+    for line in ledger.unclaimed():
+        ledger.find(line, "nobody audits this number")
+    return ledger
+
+
+def main(arguments=None):
+    """Print the findings and the counts of a folder; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python tests/audit", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--project", type=Path, help="project file; else as the folder says")
+    parser.add_argument("--base", type=Path, help="folder in which the command was typed")
+    given = parser.parse_args(arguments)
+    ledger = audit(given.folder, given.project, base=given.base)
+    for finding in ledger.findings:
+        print(finding)
+    kinds = ("recomputed", "consistent", "echoed", "exempt", "unclaimed")
+    print(f"{'numbers':<28}" + "".join(f"{kind:>12}" for kind in kinds))
+    total = dict.fromkeys(kinds, 0)
+    for source, counts in ledger.counts().items():
+        print(f"{source:<28}" + "".join(f"{counts[kind]:>12}" for kind in kinds))
+        for kind in kinds:
+            total[kind] += counts[kind]
+    reported = sum(total.values()) - total["exempt"]
+    share = 1.0 - total["unclaimed"] / reported if reported else 1.0
+    print(f"{'all':<28}" + "".join(f"{total[kind]:>12}" for kind in kinds))
+    print(f"{100 * share:.1f} % of {reported} numbers audited, {len(ledger.findings)} findings")
+    return 1 if ledger.findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
