@@ -366,7 +366,8 @@ class Ledger:
             )
             count(file, "exempt" if exempt else how or "unclaimed")
         for (file, _), claims in self.columns.items():
-            for kind, number in zip(*np.unique(claims[claims >= 0], return_counts=True)):
+            kinds, numbers = np.unique(claims[claims >= 0], return_counts=True)
+            for kind, number in zip(kinds, numbers, strict=True):
                 count(file, HOW[kind - 1] if kind else "unclaimed", int(number))
         for text in self.texts:
             exempt = None in text.claims.values() and self._exempt(text.source, text.place)
