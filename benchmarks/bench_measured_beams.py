@@ -58,7 +58,7 @@ def beside(model, curve):
     way = np.array([0.0, *model.deflections])[: len(history.load)]
     found = against_measured(model.reading, way, history.load, [curve])
     ratios = found.ratios
-    return [ratios[f"load at {PLACE:g} mm"], ratios["stiffness"], ratios["knee"]]
+    return [ratios[f"load at {PLACE:g} mm"], ratios["secant stiffness"], ratios["secant knee"]]
 
 
 def words(ratios):

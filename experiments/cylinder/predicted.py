@@ -85,14 +85,18 @@ Point = tuple[float, float]  # deflection in mm and load in N
 #: Shares of the reference load between which stiffness is compared with measured curves: their
 #: first newtons are friction of rig and wall.
 SECANT = (0.1, 0.35)
+#: What is compared with measured curves beside loads; none of it is the stiffness or the knee of
+#: `BendingMeasures`, which begin at zero load.
+CURVE_PROPERTIES = ("secant stiffness", "secant knee", "limit point")
 
 
 @dataclass(frozen=True)
 class Against:
     """A run beside the mean of the measured repetitions: (predicted, measured), or None.
 
-    pairs : "stiffness" (N/mm, between `SECANT` of the load at the `reference` deflection, mm, of
-    each curve its own), "knee" and "load at PLACE" (N).
+    pairs : "secant stiffness" (N/mm, between `SECANT` of the load at the `reference` deflection,
+    mm, of each curve), "secant knee" (N, where the slope is half of that), "limit point" and
+    "load at PLACE" (N).
     """
 
     reference: float
@@ -118,9 +122,10 @@ def against_measured(
     rows = []
     for x, y in curves:
         stiffness = secant_stiffness(x, y, reference)
-        knee = knee_point(x, y, stiffness, reading.slope_over)
-        rows.append({"stiffness": stiffness, "knee": knee and knee[1], **loads_at(x, y, places)})
-    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys(["stiffness", "knee", *every])
+        knee, limit = knee_point(x, y, stiffness, reading.slope_over), limit_point(x, y)
+        values = stiffness, knee and knee[1], limit and limit[1]
+        rows.append({**dict(zip(CURVE_PROPERTIES, values, strict=True)), **loads_at(x, y, places)})
+    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys([*CURVE_PROPERTIES, *every])
     for name in rows[0]:
         own, *others = (row[name] for row in rows)
         known = [value for value in others if value is not None]
@@ -159,15 +164,12 @@ class BendingMeasures:
     error: BendingError | None
     against: Against | None = None
 
-    @property
-    def buckling(self) -> Point | None:
-        """Return the limit point, else the knee."""
-        return self.limit or self.knee
-
-    @property
-    def buckling_is(self) -> str:
-        """Return the kind of the buckling load: "limit point", "knee" or "none"."""
-        return "limit point" if self.limit else "knee" if self.knee else "none"
+    def describe(self, point: Point | None) -> str:
+        """Return load and deflection of a knee or limit point, or up to where there is none."""
+        if point is None:
+            return f"none up to {self.reached:g} mm"
+        deflection, load = point
+        return f"{load:.0f} N, {deflection:.0f} mm"
 
 
 def bending_measures(
@@ -241,9 +243,9 @@ def wrinkle_onset(run: BendingRun) -> Point | None:
     return (float(run.deflection[more[0]]), float(run.load[more[0]])) if len(more) else None
 
 
-def straightness(d: Array, load: Array, buckling: float) -> tuple[float, float] | None:
-    """Return R^2 of a line up to `STRAIGHT` of buckling; its largest error over its last load."""
-    beyond = np.flatnonzero(load > STRAIGHT * buckling)
+def straightness(d: Array, load: Array, knee: float) -> tuple[float, float] | None:
+    """Return R^2 of a line up to `STRAIGHT` of a load; its largest error over its last load."""
+    beyond = np.flatnonzero(load > STRAIGHT * knee)
     count = int(beyond[0]) if len(beyond) else len(d)
     if count < FEWEST + 1:
         return None
@@ -351,7 +353,7 @@ class CylinderOutcome:
         return {n: v if v is not None and np.isfinite(v) else None for n, v in known.items()}
 
     def measured(self, number: int, name: str) -> tuple[float, float, float] | None:
-        """Return the stiffness (N/mm), or the load at the knee (N), with the ends of its band.
+        """Return the stiffness (N/mm), or the load at knee or limit (N), with its band's ends.
 
         The band holds both walls, and what the card leaves open of the load at that deflection.
         """
@@ -398,10 +400,9 @@ class CylinderOutcome:
         return {
             "reached_mm": m.reached,
             "stiffness_N_per_mm": m.stiffness,
-            "buckling": {"is": m.buckling_is, **_point(m.buckling)},
-            "knee": _point(m.knee),
-            "limit_point": _point(m.limit),
-            "wrinkle_onset": _point(m.wrinkles),
+            "knee": _point(m.knee, m.reached),
+            "limit_point": _point(m.limit, m.reached),
+            "wrinkle_onset": _point(m.wrinkles, m.reached),
             "load_N": dict(m.loads),
             "load_sigma_N": self.sigma(number),
             "spread": None if around is None else around.words,
@@ -471,7 +472,7 @@ class CylinderOutcome:
         }
 
     def lines(self) -> Sequence[str]:
-        """Return a table for the terminal: stiffness, buckling, loads and errors run by run."""
+        """Return a table for the terminal: stiffness, knee, limit, loads, errors run by run."""
         runs, spreads = self.runs, self.spreads
         places = place_names(run.test for run in runs)
         widths = [max(len(p), 13 if spreads else 7) + 2 for p in places]
@@ -481,7 +482,11 @@ class CylinderOutcome:
         names = [row[:count] for row in rows]
         wide = [max(map(len, column)) for column in zip(*names, strict=True)]
         starts = ["  ".join(f"{n:<{w}}" for n, w in zip(row, wide, strict=True)) for row in names]
-        head = f"{starts.pop(0)}   N/mm   buckles at"
+        points = {i: (m.describe(m.knee), m.describe(m.limit)) for i, m in self.measures.items()}
+        columns = list(zip(("knee", "limit point"), *points.values(), strict=False))
+        point_widths = [max(map(len, column)) + 2 for column in columns]
+        head = f"{starts.pop(0)}   N/mm"
+        head += "".join(f"{c[0]:>{w}}" for c, w in zip(columns, point_widths, strict=True))
         head += "".join(f"{p:>{w}}" for p, w in zip(places, widths, strict=True))
         lines = [head + ("   error" if compared else "")]
         for i, run in enumerate(runs):
@@ -489,8 +494,8 @@ class CylinderOutcome:
             if m is None:
                 lines.append(f"{starts[i]}  {ended}")
                 continue
-            at = f"{m.buckling[1]:.0f} N {m.buckling[0]:.0f} mm" if m.buckling else "-"
-            text = f"{starts[i]} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6} {at:>13}"
+            text = f"{starts[i]} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6}"
+            text += "".join(f"{p:>{w}}" for p, w in zip(points[i], point_widths, strict=True))
             sigma = self.sigma(i)
             for place, width in zip(places, widths, strict=True):
                 text += f"{load_words(m.loads.get(place), sigma.get(place), ' N'):>{width}}"
@@ -506,13 +511,16 @@ class CylinderOutcome:
 def _against(found: Against) -> dict[str, Any]:
     numbers: dict[str, Any] = {"reference_mm": found.reference}
     for name, pair in found.pairs.items():
-        key = f"{name.replace(' ', '_')}_{'N_per_mm' if name == 'stiffness' else 'N'}"
+        key = f"{name.replace(' ', '_')}_{'N_per_mm' if name.endswith('stiffness') else 'N'}"
         numbers[key] = pair and {"predicted": pair[0], "measured": pair[1]}
     return numbers
 
 
-def _point(point: Point | None) -> dict[str, float | None]:
-    return {"deflection_mm": point[0] if point else None, "load_N": point[1] if point else None}
+def _point(point: Point | None, reached: float) -> dict[str, float | None]:
+    """Return the numbers of a point, or up to which deflection (mm) there is none."""
+    if point is None:
+        return {"deflection_mm": None, "load_N": None, "none_up_to_mm": reached}
+    return {"deflection_mm": point[0], "load_N": point[1]}
 
 
 class CylinderPredicted:
@@ -548,7 +556,7 @@ def loads(model: CylinderModel | BeamModel, history: History) -> dict[str, float
 
 
 def quantities(model: CylinderModel | BeamModel, history: History) -> dict[str, float]:
-    """Return the quantities of a mesh study; knee and limit point where there are any."""
+    """Return the quantities of a mesh study; for a knee or limit point not reached, the travel."""
     mesh, over = model.mesh, model.reading.slope_over
     inflated = 0.5 * model.diameter_at(mesh.points + history.displacement[0])
     values = {"radius at mid-span, inflated, mm": inflated}
@@ -559,10 +567,12 @@ def quantities(model: CylinderModel | BeamModel, history: History) -> dict[str, 
     if stiffness is not None:
         values["initial stiffness, N/mm"] = stiffness
     values |= loads(model, history)
-    knee = knee_point(d, load, stiffness, over)
-    for name, point in (("knee", knee), ("limit", limit_point(d, load))):
-        if point is not None:
-            values[f"load at the {name} point, N"] = point[1]
+    knee, limit = knee_point(d, load, stiffness, over), limit_point(d, load)
+    for name, point in (("knee", knee), ("limit point", limit)):
+        if point is None:
+            values[f"no {name} up to, mm"] = float(d[-1])
+        else:
+            values[f"load at the {name}, N"] = point[1]
     return values
 
 

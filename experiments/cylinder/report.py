@@ -24,6 +24,7 @@ from ...reports.maps import write_vtu
 from ...reports.vega import save
 from ..kinds import Array, Cards, Output, PredictedRun, Runs, Shown, Simulation, record_of
 from .predicted import (
+    CURVE_PROPERTIES,
     SECANT,
     BendingRun,
     CylinderOutcome,
@@ -269,13 +270,8 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     tables = [_runs(outcome, tests), *_errors(outcome)]
     first = openings(outcome)
     parts: list[Part] = [first, *load_charts(outcome), Words(how_sure(outcome, tests))]
-    lines = [
-        f"{', '.join(map(str, row[:2]))}: stiffness {stiff}{_in(band)} N/mm, knee "
-        + (f"at {load}{_in(loads)} N and {at} mm" if load else "not reached")
-        for row in first.rows
-        for stiff, band, load, loads, at in [row[2:]]
-        if len(first.rows) <= SENTENCES and stiff
-    ]
+    sentences = [_sentence(row) for row in first.rows if row[2]]
+    lines = sentences if len(first.rows) <= SENTENCES else []
     shared = (
         ("length, mm", {t.length for t in tests}),
         ("span, mm", {t.supports.span for t in tests}),
@@ -291,24 +287,50 @@ def _in(band: object) -> str:
     return f" ({band})" if band else ""
 
 
+def _sentence(row: Sequence[object]) -> str:
+    """Return a row of the opening table in words."""
+    test, card, stiffness, band, *points = row
+    words = [f"{test}, {card}: stiffness {stiffness}{_in(band)} N/mm"]
+    for name, cells in (("knee", points[:3]), ("limit point", points[3:])):
+        load, band, deflection = cells
+        if deflection:
+            words.append(f"{name} at {load}{_in(band)} N and {deflection} mm")
+        else:
+            words.append(f"{name} {load}")
+    return ", ".join(words)
+
+
 def openings(outcome: CylinderOutcome) -> Table:
-    """Return stiffness and knee of every prediction, each with its band by card and wall."""
+    """Return stiffness, knee and limit point of every prediction, with bands by card and wall."""
     rows: list[list[object]] = []
     for i, run in enumerate(outcome.runs):
         if not run.predicted:
             continue
-        stiffness, knee = outcome.measured(i, "stiffness"), outcome.measured(i, "knee")
-        at = None if (m := outcome.measures.get(i)) is None or m.knee is None else m.knee[0]
+        stiffness = outcome.measured(i, "stiffness")
         cells = [f"{stiffness[0]:.3g}" if stiffness else None, _to(stiffness, ".3g")]
-        cells += [f"{knee[0]:.0f}" if knee else None, _to(knee, ".0f")]
-        rows.append(_unbroken([run.test.name, run.card, *cells, at and f"{at:.0f}"]))
-    header = ["test", "card", "stiffness, N/mm", "its band", "load at the knee, N", "its band",
-              "deflection there, mm"]  # fmt: skip
+        for name in ("knee", "limit"):
+            cells += _point_cells(outcome, i, name)
+        rows.append(_unbroken([run.test.name, run.card, *cells]))
+    header = ["test", "card", "stiffness, N/mm", "its band"]
+    for name in ("knee", "limit point"):
+        header += [f"load at the {name}, N", "its band", "deflection there, mm"]
     sides = [f"{100 * LEVEL:g} % by what the card leaves open"] if outcome.spreads else []
     sides += [f"from {' to '.join(end.name for end in outcome.band)}"] if outcome.band else []
     note = f"Bands: {', '.join(sides) or 'not known'}; none where it is narrower than the digits. "
-    note += "The knee is where the slope has fallen to half."
-    return Table("Stiffness and knee", header, rows, note, text=(1,))
+    note += "The knee is where the slope has fallen to half, the limit point the largest load, "
+    note += "where the load falls afterwards."
+    return Table("Stiffness, knee and limit point", header, rows, note, text=(1,))
+
+
+def _point_cells(outcome: CylinderOutcome, number: int, name: str) -> list[str | None]:
+    """Return load, band and deflection of the knee or the limit of a run."""
+    measures, load = outcome.measures.get(number), outcome.measured(number, name)
+    if measures is None:
+        return [None, None, None]
+    if load is None:
+        return [measures.describe(None), None, None]
+    deflection, _ = getattr(measures, name)
+    return [f"{load[0]:.0f}", _to(load, ".0f"), f"{deflection:.0f}"]
 
 
 def _to(found: tuple[float, float, float] | None, form: str) -> str | None:
@@ -350,27 +372,25 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         tail: list[object] = [outcome.ended(i), ", ".join(marks(run.notes)) or None]
         tail += [len(run.notes), round(run.record.seconds, 1)]
         if m is None:
-            rows.append([*head, *[None] * (5 + len(places)), *tail])
+            rows.append([*head, *[None] * (6 + len(places)), *tail])
             continue
-        where = m.buckling
-        knee = " (knee)" if m.buckling_is == "knee" else ""
-        buckles = f"{where[1]:.0f} N, {where[0]:.0f} mm{knee}" if where else None
+        points = m.describe(m.knee), m.describe(m.limit)
         wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
         strain, rise = f"{100 * max(m.body_strain):.2g}", f"{m.pressure_rise:+.2f}"
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
         spread = outcome.sigma(i)
         loads = [(m.loads.get(place), spread.get(place)) for place in places]
         listed = [None if one[0] is None else load_words(*one) for one in loads]
-        rows.append([*head, stiffness, buckles, wrinkles, *listed, strain, rise, *tail])
+        rows.append([*head, stiffness, *points, wrinkles, *listed, strain, rise, *tail])
     header = [
-        "test", "card", *walls, "stiffness, N/mm", "buckles", "wrinkles from",
+        "test", "card", *walls, "stiffness, N/mm", "knee", "limit point", "wrinkles from",
         *(f"load at {place}, N" for place in places),
         "inflation strain, %", "pressure, kPa", "ended", "marked", "notes", "s",
     ]  # fmt: skip
     slopes = _slopes(tests)
     note = (
-        f"Stiffness: to {slopes} of deflection. Buckles: the limit point where the load falls "
-        f"afterwards, else the knee, where the slope over {slopes} has fallen to half. Wrinkles: "
+        f"Stiffness: to {slopes} of deflection. Knee: where the slope over {slopes} has fallen to "
+        "half of it. Limit point: the largest load, where the load falls afterwards. Wrinkles: "
         "more of the surface than when inflated. Inflation strain: the largest along warp or fill "
         "in the body, without the quads beside seam and caps. Pressure: its rise to the last frame."
         " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
@@ -390,7 +410,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     """Return the tables of what is measured too: quantities, and loads reading by reading."""
     walls = ["wall"] if outcome.band else []
     places = place_names(run.test for run in outcome.runs)
-    compared = ["stiffness", "knee", *(f"load at {place}" for place in places)]
+    compared = [*CURVE_PROPERTIES, *(f"load at {place}" for place in places)]
     rows, beside = list[list[object]](), list[list[object]]()
     for i, m in outcome.measures.items():
         run = outcome.runs[i]
@@ -409,12 +429,13 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
     text = tuple(range(1, len(named)))
-    over = (f"{name}, {'N/mm' if name == 'stiffness' else 'N'}" for name in compared)
+    over = (f"{name}, {'N/mm' if name.endswith('stiffness') else 'N'}" for name in compared)
     columns = [*named, *(words for name in over for words in (name, "of it"))]
     low, high = (f"{100 * share:g}" for share in SECANT)
-    how = "Measured (mean of the repetitions), and predicted over measured. Stiffness: between "
-    how += f"{low} and {high} % of each curve's load at the last place that all reach; knee: where "
-    how += "the slope is half of that."
+    how = "Measured (mean of the repetitions), and predicted over measured. Secant stiffness: "
+    how += f"between {low} and {high} % of each curve's load at the last place that all reach; "
+    how += "secant knee: where the slope is half of that. Measured curves begin with friction: "
+    how += "neither is the stiffness or the knee of the tables above, which begin at zero load."
     quantities = [Table("Measured quantities", columns, beside, how, text=text)] if beside else []
     return [*quantities, Table("Against measured loads", header, rows, note, text=text)]
 

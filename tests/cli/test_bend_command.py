@@ -1,13 +1,17 @@
 """`bubblefit bend` and `simulate bend` as a user runs them."""
 
+import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
+import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
 from bubblefit.cli import options
 from bubblefit.experiments.cylinder import report as cylinder_report
+from bubblefit.experiments.cylinder.predicted import quantities
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.reports import run_pages
@@ -17,6 +21,8 @@ from bubblefit.solvers import registry
 from ..commands import in_process, one_line, result_in
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
 
+#: Warp modulus (MPa) of the card with which `Falling` has a knee and a limit point.
+FALLS = 500.0
 TOLD = "BUBBLEFIT_TEST_RUNS"  # a file that gets a letter a run
 
 
@@ -25,6 +31,17 @@ class Counted(Formula):
         with open(os.environ[TOLD], "a") as stream:
             stream.write(".")
         return super().run(*arguments, **named)
+
+
+class Falling(Formula):
+    """A load that rises to a limit point and falls with one card, a straight line with others."""
+
+    def run(self, model, law, *arguments, **named):
+        history = super().run(model, law, *arguments, **named)
+        way = np.array([0.0, *model.deflections])
+        peak = 300.0 + 1e3 * model.pressure
+        load = peak * np.sin(np.pi * way / 280.0) if law.beta[11] == FALLS else 4.0 * way
+        return replace(history, load=load)
 
 
 @pytest.fixture(autouse=True)
@@ -95,6 +112,50 @@ def test_the_files_of_a_study_agree(study, golden):
         assert row["rms_relative"] == pytest.approx(row["rms_N"] / load.max())
     assert table.loc["high", "rms_N"].isna().all()
     assert result["worst_relative_error"] == pytest.approx(table["rms_relative"].max())
+
+
+def test_knee_and_limit_point_are_the_same_figures_everywhere(tmp_path, monkeypatch):
+    """Terminal, page, runs.csv, result.json, Python, a study: knee and limit point, never mixed."""
+    monkeypatch.setitem(registry.SOLVERS, "formula", Falling)
+    path = write_project(tmp_path, soft=FALLS)
+    text = bend(path, "--out", "out", cwd=tmp_path).stdout
+    project = bf.read_project(path)
+    frame = bf.predict(project).runs().set_index(["test", "card"])
+    table = pd.read_csv(tmp_path / "out" / "runs.csv").set_index(["test", "card"])
+    page = json.loads((tmp_path / "out" / "page.json").read_text().replace("\u00a0", " "))
+    parts = [part for section in page["sections"] for part in section["parts"]]
+    tables = {part["title"]: part for part in parts if "header" in part}
+    runs, first = tables["Runs"], tables["Stiffness, knee and limit point"]
+    assert text.splitlines()[0].index("knee") < text.splitlines()[0].index("limit point")
+    for i, run in enumerate(result_in(tmp_path / "out")["runs"]):
+        test, card = run["test"], run["card"]
+        row = dict(zip(runs["header"], runs["rows"][i], strict=True))
+        line = text.splitlines()[1 + i]
+        assert line.startswith(test) and row["test"] == test and "buckl" not in line
+        study = quantities(project.tests[test].model(), Falling().run(
+            project.tests[test].model(), project.cards[card].card.law))  # fmt: skip
+        for number, (name, key) in enumerate({"knee": "knee", "limit point": "limit"}.items()):
+            point = run[name.replace(" ", "_")]
+            load, deflection = point["load_N"], point["deflection_mm"]
+            cells = first["rows"][i][4 + 3 * number : 7 + 3 * number]
+            if card == "soft":
+                words = f"{load:.0f} N, {deflection:.0f} mm"
+                assert study[f"load at the {name}, N"] == pytest.approx(load)
+                assert cells == [f"{load:.0f}", None, f"{deflection:.0f}"]
+                assert f"{name} at {load:.0f} N and {deflection:.0f} mm" in page["summary"]
+            else:
+                words = "none up to 240 mm"
+                assert load is None and point["none_up_to_mm"] == 240.0
+                assert study[f"no {name} up to, mm"] == 240.0 and cells == [words, None, None]
+                assert f"{name} none up to 240 mm" in page["summary"]
+            assert row[name] == words and words in line
+            for own in (frame, table):
+                values = own.loc[(test, card), [f"{key}_mm", f"{key}_N"]].astype(float)
+                wanted = [np.nan if v is None else v for v in (deflection, load)]
+                np.testing.assert_allclose(values, wanted, rtol=1e-9)
+                assert own.loc[(test, card), "reached_mm"] == 240.0
+        if card == "soft":
+            assert run["knee"]["load_N"] < 0.95 * run["limit_point"]["load_N"]
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -144,8 +144,8 @@ def test_failures_errors_and_notes(tmp_path, seen):
     assert len(found.warnings) == 2 and all("failed: made to" in line for line in found.warnings)
     sure = next(part for part in found.parts if isinstance(part, Words))
     assert len(sure.lines) == 6 and sum("Assumed" in line for line in sure.lines) == 5
-    titles = ["Stiffness and knee", "Runs", "Measured quantities", "Against measured loads",
-              "Notes"]  # fmt: skip
+    titles = ["Stiffness, knee and limit point", "Runs", "Measured quantities",
+              "Against measured loads", "Notes"]  # fmt: skip
     tables = [part for part in found.parts if part.part == "table"]
     assert [table.title for table in tables][:5] == titles
     assert [row[:3] for row in tables[4].rows] == [

@@ -75,7 +75,6 @@ def test_numbers_for_result_json():
     assert outcome.numbers(0) == {
         "reached_mm": 150.0,
         "stiffness_N_per_mm": 4.256,
-        "buckling": {"is": "limit point", "deflection_mm": 120.0, "load_N": 502.6},
         "knee": {"deflection_mm": 61.0, "load_N": 251.0},
         "limit_point": {"deflection_mm": 120.0, "load_N": 502.6},
         "wrinkle_onset": {"deflection_mm": 33.0, "load_N": 140.0},
@@ -91,12 +90,10 @@ def test_numbers_for_result_json():
         "error": {"rms": 3.1, "mean": -1.2, "relative": 0.0519, "compared": 17, "beyond": 4},
     }
     other = outcome.numbers(1)
-    assert other["buckling"] == {"is": "knee", "deflection_mm": 61.0, "load_N": 251.0}
-    assert other["limit_point"] == {"deflection_mm": None, "load_N": None}
+    none = {"deflection_mm": None, "load_N": None, "none_up_to_mm": 150.0}
+    assert other["knee"] == outcome.numbers(0)["knee"] and other["limit_point"] == none
     assert other["error"] is None
     assert outcome.error(0) == 0.0519 and outcome.error(1) is None and outcome.error(2) is None
-    neither = replace(MEASURES, limit=None, knee=None)
-    assert (neither.buckling_is, neither.buckling) == ("none", None)
 
 
 def test_curves_and_readings():
@@ -152,15 +149,14 @@ def test_every_cell(tmp_path, undrawn):
     runs, errors = shown.tables
     stopped = f"stopped at 80 of 160 mm: {stopped}"
     assert [unbroken(row) for row in runs.rows] == [
-        ["150/90", "soft card", "4.26", "503 N, 120 mm", "33 mm", "86", None, "2.2", "+1.60",
-         "finished", None, 2, 12.3],
-        ["150/90", "stiff", None, None, None, None, None, None, None, "failed: killed", None, 2,
-         12.3],
-        ["the wide one", "soft card", None, "251 N, 61 mm (knee)", None, "86", None, "2.2",
-         "-0.13", stopped, "snap, stopped early", 2, 12.3],
+        ["150/90", "soft card", "4.26", "251 N, 61 mm", "503 N, 120 mm", "33 mm", "86", None,
+         "2.2", "+1.60", "finished", None, 2, 12.3],
+        ["150/90", "stiff", *[None] * 8, "failed: killed", None, 2, 12.3],
+        ["the wide one", "soft card", None, "251 N, 61 mm", "none up to 150 mm", None, "86", None,
+         "2.2", "-0.13", stopped, "snap, stopped early", 2, 12.3],
     ]  # fmt: skip
-    assert "\u00a0" in str(runs.rows[0][3]) and runs.rows[2][9] == stopped  # which is broken
-    assert runs.note.count("20 mm") == 2 and runs.text == (1, 9, 10)
+    assert "\u00a0" in str(runs.rows[0][3]) and runs.rows[2][10] == stopped  # which is broken
+    assert runs.note.count("20 mm") == 2 and runs.text == (1, 10, 11)
     assert errors.rows == [["150/90", "soft\u00a0card", 3.1, "5.2\u00a0%", "-1.2", 17, 4]]
     curves = pd.read_csv(tmp_path / "out" / "c" / "load_deflection.csv")
     assert list(curves.columns) == ["test", "card", "wall", *outcome.curve(0).columns]
@@ -218,12 +214,16 @@ def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undr
     assert banded.measured(2, "knee") is None and banded.measured(3, "stiffness") is None
     shown = report.show_outcome(banded, Output(tmp_path))
     first = shown.parts[0]
-    assert first.title == "Stiffness and knee" and len(first.rows) == 2
+    assert first.title == "Stiffness, knee and limit point" and len(first.rows) == 2
     low, high = 4.256 - off[0], 5.0 + off[0]
     assert unbroken(first.rows[0][2:4]) == ["4.26", f"{low:.3g} to {high:.3g}"]
-    assert unbroken(first.rows[1][2:]) == ["4.26", None, None, None, None]
+    assert unbroken(first.rows[0][7:]) == ["503", None, "120"]  # the spread ends before it
+    assert unbroken(first.rows[1][2:]) == [
+        "4.26", None, "none up to 150 mm", None, None, "503", None, "120"
+    ]  # fmt: skip
     assert "stiffness 4.26" in shown.summary.split(";")[0]
     assert "251" in shown.summary.split(";")[0] and "61 mm" in shown.summary
+    assert "knee none up to 150 mm, limit point at 503 N and 120 mm" in unbroken([shown.summary])[0]
 
 
 def test_a_line_is_the_prediction_and_its_band_goes_to_the_other_end(
