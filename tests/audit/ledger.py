@@ -12,6 +12,10 @@ import pandas as pd
 NUMBER = re.compile(
     r"(?<![\w./:-])[-+\u2212]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w]|\.\w|-\d|/\w|:\d\d)"
 )
+#: A number within a pattern of `Ledger.text`.
+NUM = r"([-+\u2212]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
+#: Numbers that are names.
+NAMES = re.compile(r"\b(?:EN )?(?:EN|ISO) \d+(?:-\d+)?|-2 log L|\(\d+ rows\)")
 HOW = ("recomputed", "consistent", "echoed")
 #: No results: how long it took, versions, identity, seeds of the record.
 EXEMPT = (
@@ -34,6 +38,8 @@ class Text:
 
     def __post_init__(self):
         self.claims = {match.span(): None for match in NUMBER.finditer(self.text)}
+        for match in NAMES.finditer(self.text):
+            self.claim(match.span(), "wording")
 
     def claim(self, span, how):
         for place in self.claims:

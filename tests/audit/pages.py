@@ -40,6 +40,7 @@ class _Reader(HTMLParser):
         attributes = dict(attributes)
         classes = (attributes.get("class") or "").split()
         if tag in ("div", "details") and "table" in classes:
+            self._close()
             self.tables, self.heading = [], ""
         elif tag == "footer":
             self.footer = True

@@ -1,0 +1,944 @@
+"""Auditor of a fit's folder: card, moduli, coefficients, residuals, starts, verdict."""
+
+import math
+
+import numpy as np
+
+from . import bubbles, strips
+from .laws import DIRECTION, MODULI, MPA
+from .ledger import NUM, as_number
+
+#: Strains of the tables "The answer", beside the end.
+STRAINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
+WORDS = {
+    "E1": "Young's modulus along the warp, E1",
+    "E2": "Young's modulus along the fill, E2",
+    "G12": "Shear modulus between warp and fill, G12",
+}
+#: Relative one sigma of a modulus of which nothing is known before the tests.
+PRIOR = 10.0
+#: A modulus is usable where its 95 % band is within a fifth of it, not known from all of it on.
+USABLE, NOT_KNOWN = 0.2, 1.0
+KINDS = {"bubble": bubbles, "strips": strips}
+
+
+def percent(value):
+    """Return a fraction in percent as the page prints it: two digits, whole from 100 % on."""
+    return f"{100 * value:.0f} %" if value >= 0.995 else f"{100 * value:.2g} %"
+
+
+def audit_fit(folder, ledger):
+    """Audit everything in the folder of a fit."""
+    audit = FitAudit(folder, ledger)
+    audit.law()
+    audit.moduli()
+    audit.coefficients()
+    audit.residuals()
+    audit.starts()
+    audit.uncertainty()
+    audit.verdict()
+    audit.unknowns()
+    audit.page()
+    audit.notes()
+    audit.tests()
+
+
+class FitAudit:
+    """What the parts of an audit share."""
+
+    def __init__(self, folder, ledger):
+        self.folder, self.ledger, self.result = folder, ledger, folder.result
+        self.card = folder.card
+        self.table = folder.data("moduli.csv")
+        self.matched = folder.data("residuals.csv")
+        self.several = len(self.result["tests"]) > 1
+
+    # The law
+
+    def law(self):
+        """Card and result.json hold the same law; units and labels are its form's."""
+        ledger, card, result = self.ledger, self.folder.card_text, self.result
+        ledger.json(("beta", "values"), card["beta"], "consistent", rel=1e-12)
+        ledger.json(("beta", "unit"), card["unit"])
+        ledger.json("nu12", card["nu12"], "consistent", rel=1e-12)
+        unit = self.folder.project.get("units", {}).get("modulus", "GPa")
+        if card["unit"] != unit:
+            ledger.find("material.toml: unit", f"is {card['unit']}; the project's is {unit}")
+        for key, own in (("knots", card.get("knots")), ("breaks", card.get("breaks"))):
+            if own is not None and key in result:
+                ledger.json(key, own, "consistent", rel=1e-12)
+        ledger.claim_json("beta", "recomputed", file="material.toml")
+        for key in ("nu12", "thickness_mm"):
+            ledger.claim_json(key, "consistent", file="material.toml")
+        ledger.json("format", 3 if "certainty" in card else 2, "echoed", file="material.toml")
+        for name, key in DIRECTION.items():
+            low, high = card["valid_strain"][key]
+            ledger.json(("valid_strain", key), [0.0, result["valid_strain"][key]], "consistent",
+                        file="material.toml")  # fmt: skip
+            ledger.json(("valid_strain", key), high, "consistent")
+            if low != 0.0 or high != self.card.ends[name]:
+                ledger.find(f"material.toml: valid_strain.{key}", "does not begin at zero")
+        fabric = self.folder.project.get("fabric", {})
+        fitted = "thickness" in self.names_of_unknowns()
+        if not fitted and fabric.get("thickness") != card["thickness_mm"]:
+            ledger.find("material.toml: thickness_mm", f"expected {fabric.get('thickness')}")
+        law = self.folder.project.get("law", {})
+        if "nu12" not in self.names_of_unknowns() and card["nu12"] != law.get("nu12", 0.24):
+            ledger.find("material.toml: nu12", f"expected {law.get('nu12', 0.24)}")
+        ranges = law.get("strain_range")
+        for k, key in enumerate(DIRECTION.values()):
+            reached = result["strain_reached"][key]
+            self._reached(k, key)
+            limit = max(min(reached, ranges[k] if ranges else math.inf), 1e-6)
+            ledger.json(("valid_strain", key), limit, "recomputed", rel=1e-9)
+        self._certainty()
+        self._source()
+
+    def _reached(self, component, key):
+        """The largest strain is that of the best start, and at least that of straight strips."""
+        ledger, result = self.ledger, self.result
+        records = [r for r in self.folder.starts if r["objective"] is not None and r.get("reached")]
+        if records:
+            best = min(records, key=lambda r: r["objective"])
+            ledger.json(("strain_reached", key), max(best["reached"][component], 1e-6),
+                        "consistent", rel=0.02, abs=2e-4)  # fmt: skip
+        for numbers in result["tests"].values():
+            own = numbers.get("directions", {}).get(key)
+            if own is not None:
+                strain = math.log(own["final_length_mm"] / own["gauge_length_mm"])
+                if result["strain_reached"][key] < strain * (1 - 1e-6):
+                    ledger.find(f"result.json: strain_reached.{key}", f"a strip has {strain:.4g}")
+
+    def _certainty(self):
+        """The certainty of the card: its band is that of moduli.csv, its sigmas that of noise."""
+        card, ledger = self.folder.card_text, self.ledger
+        sure = card.get("certainty")
+        if sure is None:
+            return
+        ledger.claim_json(("certainty", "directions"), "consistent", file="material.toml")
+        ledger.text(r"(\d+) values of ", [len(self.matched)], "recomputed", source="material.toml")
+        directions = np.array(sure["directions"]) * MPA[card["unit"]]
+        for name in MODULI:
+            rows = self.card.rows(name, 0.5 * self.card.ends[name])[:, self.card.free]
+            sigma = float(np.linalg.norm(rows @ directions.T))
+            modulus = float(self.card.modulus(name, 0.5 * self.card.ends[name]))
+            table = self.table[self.table["modulus"] == name]
+            told = np.interp(0.5 * self.card.ends[name], table["strain"], table["sigma_relative"])
+            # Draws within the bounds against a sigma without bounds: far apart where hardly known.
+            if told < 0.1 and not 0.5 < sigma / modulus / told < 2.0:
+                ledger.find(
+                    f"material.toml: certainty.directions of {name}",
+                    f"sigma {sigma / modulus:.3g} beside {told:.3g} in moduli.csv",
+                )
+        for name, band in sure.get("band", {}).items():
+            table = self.table[self.table["modulus"] == name]
+            scale = MPA[card["unit"]]
+            strain, lower, upper = (np.array(row, dtype=float) for row in _rows(band))
+            at = np.interp(table["strain"], strain, lower), np.interp(table["strain"], strain, upper)
+            for own, column in zip(at, ("lower_MPa", "upper_MPa"), strict=True):
+                if not np.allclose(own * scale, table[column], rtol=1e-5, atol=1e-9):
+                    ledger.find(f"material.toml: certainty.band.{name}", f"is not {column}")
+            ledger.claim_json(("certainty", "band", name), "consistent", file="material.toml")
+
+    def _source(self):
+        """Words of the card on objective and misfit, and on the closed path of strain."""
+        objective = self.result["objective"]
+        self.ledger.text(r"bubblefit [\w.]+ \w+, .*, objective ([^,\s]+),", [objective])
+
+    # Its tables
+
+    def moduli(self):
+        """moduli.csv from the card: 61 strains a modulus up to the end of the valid ones."""
+        ledger, table = self.ledger, self.table
+        ledger.column("moduli.csv", "modulus", np.repeat(MODULI, 61), "echoed")
+        strain = np.concatenate([np.linspace(0.0, self.card.ends[name], 61) for name in MODULI])
+        ledger.column("moduli.csv", "strain", strain, rel=1e-8, abs=1e-15)
+        exact = np.concatenate(
+            [self.card.modulus(name, np.linspace(0.0, self.card.ends[name], 61)) for name in MODULI]
+        )
+        ledger.column("moduli.csv", "MPa", exact, rel=1e-8)
+        for column in ("lower_MPa", "upper_MPa"):
+            ledger.claim_column("moduli.csv", column, "consistent")
+        wrong = ~((table["lower_MPa"] <= table["MPa"] * (1 + 1e-8)) & (
+            table["MPa"] <= table["upper_MPa"] * (1 + 1e-8)))  # fmt: skip
+        if "lower_MPa" in table and table["lower_MPa"].notna().all() and wrong.any():
+            ledger.find("moduli.csv", f"{int(wrong.sum())} moduli lie outside their band")
+        if (table["MPa"] <= 0).any():
+            ledger.find("moduli.csv", "a modulus is not positive")
+        self._sigmas()
+        self._bounds_of_bands()
+
+    def _sigmas(self):
+        """Noise and mesh make sigma_relative; the band is near two of them where it is narrow."""
+        ledger, table = self.ledger, self.table
+        noise, mesh = table["noise_relative"], table["mesh_relative"]
+        if noise.isna().all():
+            return
+        ledger.claim_column("moduli.csv", "noise_relative", "consistent")
+        ledger.claim_column("moduli.csv", "mesh_relative", "consistent")
+        left = np.abs(mesh.fillna(0.0))
+        if self.result["uncertainty"]["mesh_error"] == "taken out":
+            left = 0.1 * left / (1.0 + mesh.fillna(0.0))
+        # Between the fit's own strains everything is interpolated.
+        ledger.column("moduli.csv", "sigma_relative", np.hypot(noise, left), rel=1e-6, abs=1e-12)
+        if (table["sigma_relative"] < 0).any():
+            ledger.find("moduli.csv: sigma_relative", "is negative")
+
+    def _bounds_of_bands(self):
+        """Bands lie within the bounds that the project gives for the moduli."""
+        bounds = self.folder.project.get("law", {}).get("bounds", {})
+        scale = MPA[self.folder.project.get("units", {}).get("modulus", "GPa")]
+        for name in MODULI:
+            if name in bounds:
+                low, high = (scale * end for end in bounds[name])
+                own = self.table[self.table["modulus"] == name]
+                if (own["lower_MPa"] < low * (1 - 1e-6)).any() or (
+                    own["upper_MPa"] > high * (1 + 1e-6)
+                ).any():
+                    self.ledger.find(f"moduli.csv: {name}", "the band goes beyond the bounds")
+
+    def names_of_unknowns(self):
+        return list(self.result.get("unknowns", {}))
+
+    def coefficients(self):
+        """coefficients.csv: values of the card, bounds of the project, correlations."""
+        ledger, card = self.ledger, self.card
+        table = self.folder.data("coefficients.csv")
+        free = [str(label) for label in card.labels]
+        nuisance = self.names_of_unknowns()
+        names = [*free, *nuisance]
+        file, size = "coefficients.csv", len(free)
+        ledger.column(file, "unknown", np.array(names), "echoed")
+        unit = self.folder.card_text["unit"]
+        unknowns = self.result.get("unknowns", {})
+        units = [unit] * size + [unknowns[name]["unit"] for name in nuisance]
+        ledger.column(file, "unit", np.array(units), "echoed")
+        of_law = slice(0, size)
+        ledger.column(file, "value", card.beta[card.free], "consistent", rel=1e-8, rows=of_law)
+        beside = slice(size, None)
+        for column, key in (("value", "value"), ("sigma", "sigma")):
+            values = np.array([unknowns[name][key] for name in nuisance], dtype=float)
+            ledger.column(file, column, values, "consistent", rel=1e-8, rows=beside)
+        for k, column in enumerate(("lower_bound", "upper_bound")):
+            values = np.array([unknowns[name]["bounds"][k] for name in nuisance], dtype=float)
+            ledger.column(file, column, values, "consistent", rel=1e-8, rows=beside)
+        self._sigma_of_coefficients(table, size)
+        self._bounds_of_coefficients(table, size)
+        self._correlations(table, names)
+
+    def _sigma_of_coefficients(self, table, size):
+        """Their covariance gives the noise of the moduli."""
+        ledger, card = self.ledger, self.card
+        sigma = table["sigma"].to_numpy(float)[:size]
+        ledger.claim_column("coefficients.csv", "sigma", "consistent", rows=np.arange(size))
+        if not np.isfinite(sigma).all():
+            return
+        names = [*card.labels]
+        correlation = table[names].to_numpy(float)[:size]
+        covariance = correlation * np.outer(sigma, sigma)
+        for name in MODULI:
+            own = self.table[self.table["modulus"] == name]
+            # Ends and middle are strains of the fit itself.
+            for at in (0, 30, 60):
+                strain = own["strain"].iloc[at]
+                rows = card.rows(name, strain)[0, card.free]
+                told = own["noise_relative"].iloc[at]
+                spread = card.mpa * np.sqrt(max(rows @ covariance @ rows, 0.0))
+                relative = spread / float(card.modulus(name, strain))
+                if self.second_order or self.mesh_taken_out:
+                    right = told / 3 < relative < 3 * told
+                else:
+                    # Of strongly correlated coefficients nine digits leave little.
+                    right = math.isclose(relative, told, rel_tol=1e-2, abs_tol=1e-6)
+                if not right and told < 0.99 * PRIOR:
+                    ledger.find(
+                        f"coefficients.csv: {name} at {strain:.3g}",
+                        f"sigmas and correlations give {relative:.4g}; moduli.csv has {told:.4g}",
+                    )
+
+    @property
+    def second_order(self):
+        order = self.result.get("uncertainty", {}).get("second_order")
+        return order is not None and order["order"] == 2
+
+    @property
+    def mesh_taken_out(self):
+        return self.result.get("uncertainty", {}).get("mesh_error") == "taken out"
+
+    def _bounds_of_coefficients(self, table, size):
+        """Bounds are the project's, in its unit, where it bounds coefficients or constants."""
+        ledger, form = self.ledger, self.card.form
+        bounds = self.folder.project.get("law", {}).get("bounds", {})
+        rows = np.arange(size)
+        ends = None
+        if "lower" in bounds:
+            ends = [bounds["lower"], bounds["upper"]]
+            if len(ends[0]) == len(self.card.beta) != size:
+                ends = [[own[k] for k in self.card.free] for own in ends]
+        elif form == "constant" and set(MODULI) <= set(bounds):
+            ends = [[bounds[name][k] for name in ("G12", "E2", "E1")] for k in (0, 1)]
+        elif form.startswith("spline") and set(MODULI) <= set(bounds):
+            ends = [[bounds[label.split()[0]][k] for label in self.card.labels] for k in (0, 1)]
+        for k, column in enumerate(("lower_bound", "upper_bound")):
+            if ends is None:
+                ledger.claim_column("coefficients.csv", column, "consistent", rows=rows)
+                continue
+            own = np.array(ends[k], dtype=float)
+            ledger.column("coefficients.csv", column, own, "echoed", rel=1e-8, rows=rows)
+        low, value, high = (
+            table[name].to_numpy(float)[:size] for name in ("lower_bound", "value", "upper_bound")
+        )
+        room = 1e-6 * np.abs(value)
+        # The fit keeps the bounds; what takes the error of the mesh out may move the law.
+        if not self.mesh_taken_out and ((value < low - room) | (value > high + room)).any():
+            ledger.find("coefficients.csv", "a value lies outside its bounds")
+
+    def _correlations(self, table, names):
+        ledger = self.ledger
+        for name in names:
+            ledger.claim_column("coefficients.csv", name, "consistent")
+        matrix = table[names].to_numpy(float)
+        if np.isfinite(matrix).all():
+            if not np.allclose(matrix, matrix.T, rtol=1e-7, atol=1e-9):
+                ledger.find("coefficients.csv", "correlations are not symmetric")
+            if not np.allclose(np.diag(matrix), 1.0, atol=1e-8) or (np.abs(matrix) > 1 + 1e-8).any():
+                ledger.find("coefficients.csv", "correlations are none")
+
+    # What was matched
+
+    def residuals(self):
+        """residuals.csv: differences, and the objective and misfits that they make."""
+        ledger, table, result = self.ledger, self.matched, self.result
+        file = "residuals.csv"
+        ledger.column(file, "difference", (table["modelled"] - table["measured"]).to_numpy(),
+                      rel=1e-8, abs=3e-9 * float(table["measured"].abs().max()))  # fmt: skip
+        ledger.claim_column(file, "modelled", "consistent")
+        blocks, names = {}, []
+        for (test, part), own in table.groupby(["test", "part"], sort=False):
+            name = test if self._is_bubble(test) else f"{test}: {part}"
+            names.append(name)
+            blocks[name] = own
+            rms = float(np.sqrt(np.mean(own["difference"] ** 2)))
+            units = own["unit"].unique()
+            if len(units) != 1:
+                ledger.find(f"{file}: {name}", f"has the units {units}")
+            misfit = result["misfit"].get(name)
+            if misfit is None:
+                ledger.find(f"result.json: misfit.{name}", "is missing")
+                continue
+            place = ("misfit", name)
+            ledger.json((*place, "unit"), units[0])
+            ledger.json((*place, "rms"), rms, rel=1e-6, abs=1e-9 * _size(own))
+            noise = misfit["noise"]
+            ratio = misfit["rms"] / noise if noise > 0 else None
+            ledger.json((*place, "times_noise"), ratio, rel=1e-9)
+        if set(result["misfit"]) != set(names):
+            ledger.find("result.json: misfit", f"is of {sorted(result['misfit'])}")
+        self.blocks = blocks
+        self._noise()
+
+    def _is_bubble(self, test):
+        return "mean_abs_mm" in self.result["tests"][test]
+
+    def kind_of(self, test):
+        """Return the section of the project that a test is of, and the test's table."""
+        project, numbers = self.folder.project, {}
+        for kind in ("bubble", "strips", "biaxial", "cycles", "cylinder", "bending", "tube"):
+            own = project.get(kind, [])
+            for k, section in enumerate(own):
+                default = kind if len(own) == 1 else f"{kind}-{k + 1}"
+                numbers[section.get("name", default)] = (kind, section)
+        return numbers.get(test, (None, {}))
+
+    def _noise(self):
+        """Noise: the project's, the scatter of specimens, or usual for such an instrument."""
+        ledger, result = self.ledger, self.result
+        for name, misfit in result["misfit"].items():
+            test = name.partition(":")[0]
+            kind, section = self.kind_of(test)
+            expected = "given" if "noise" in section else None
+            if expected and misfit["noise_is"] != expected:
+                ledger.find(f"result.json: misfit.{name}.noise_is", f"is {misfit['noise_is']!r}")
+            place = ("misfit", name, "noise")
+            if misfit["noise_is"] == "given":
+                ledger.json(place, section.get("noise"), "echoed", rel=1e-12)
+            elif kind == "bubble":
+                ledger.json(place, 0.05, "echoed")
+            elif kind == "strips" and misfit["noise_is"] == "assumed":
+                largest = float(self.blocks[name]["measured"].abs().max())
+                ledger.json(place, 0.005 * largest, rel=1e-8)
+            elif kind == "strips":
+                direction = name.partition(": ")[2]
+                scatter = result["tests"][test]["directions"][direction]["scatter_N"]
+                ledger.json(place, scatter, "consistent", rel=1e-12)
+            else:
+                ledger.claim_json(place, "consistent")
+
+    # How it was found
+
+    def starts(self):
+        """Starts: starts.jsonl, history.csv and result.json count the same."""
+        folder, ledger, result = self.folder, self.ledger, self.result
+        records = folder.starts
+        for k, record in enumerate(records):
+            own = ("starts", k)
+            for key, name in (("start", "number"), ("objective", "objective"),
+                              ("analyses", "analyses"), ("external_runs", "external_runs")):  # fmt: skip
+                ledger.json((*own, key), record[name], "consistent", rel=1e-12)
+            ledger.json((*own, "status"), record["status"])
+            ledger.json((*own, "cached_runs"), record.get("cached_runs", 0), "consistent")
+            seed = record["seed"]
+            if seed != [result["seed"], record["number"]]:
+                ledger.find(f"starts.jsonl: {k}", f"has the seed {seed}")
+            for key in record:
+                ledger.claim_json((k, key), "consistent", file="starts.jsonl")
+        if len(result["starts"]) != len(records):
+            ledger.find("result.json: starts", f"are {len(result['starts'])} of {len(records)}")
+        for key in ("analyses", "external_runs", "cached_runs"):
+            total = sum(record.get(key, 0) for record in records)
+            ledger.json(key, total, "recomputed")
+        objectives = [r["objective"] for r in records if r["objective"] is not None]
+        self.objectives = sorted(objectives)
+        coarse = result.get("coarse_to_fine")
+        if coarse is None:
+            ledger.json("coarse_to_fine", None)
+        if objectives:
+            # The best start runs once more from the unloaded state.
+            ledger.json("objective", min(objectives), "consistent", rel=1e-4, abs=1e-9)
+        self._objective()
+        self._history(records)
+        self._agreement()
+
+    def _objective(self):
+        """The objective from the residuals: RMS of each block, relative, weighted."""
+        ledger, result = self.ledger, self.result
+        errors = {}
+        weights = {}
+        for test in result["tests"]:
+            kind, section = self.kind_of(test)
+            weights[test] = float(section.get("weight", 1.0))
+            if kind in KINDS:
+                errors[test] = KINDS[kind].objective(self, test, section)
+        if any(error is None for error in errors.values()) or len(errors) < len(result["tests"]):
+            return
+        floor = 1e-9 * max(1.0, sum(weights.values()))
+        if self.several:
+            total = sum(weights[test] * errors[test] for test in errors)
+            ledger.json("objective", total, rel=1e-6, abs=floor)
+            ledger.json("mean_relative_error", errors, rel=1e-6, abs=floor)
+            ledger.json("weights", weights, "echoed")
+        else:
+            (error,) = errors.values()
+            ledger.json("objective", error, rel=1e-6, abs=floor * _size(self.matched))
+
+    def _history(self, records):
+        """history.csv: a row an analysis; the best objective of each start."""
+        ledger, folder = self.ledger, self.folder
+        file = "history.csv"
+        if file not in folder.tables:
+            return
+        table = folder.data(file)
+        counted = [(k, r["analyses"] + r.get("coarse_analyses", 0)) for k, r in enumerate(records)]
+        for number, count in counted:
+            own = table[table["start"] == records[number]["number"]]
+            if len(own) != records[number]["analyses"] and len(own) != count:
+                ledger.find(f"{file}: start {number}", f"has {len(own)} rows of {count} analyses")
+            steps = own["analysis"].to_numpy()
+            if not np.array_equal(steps, np.arange(1, len(own) + 1)):
+                ledger.find(f"{file}: start {number}", "analyses are not numbered from 1")
+            full = own[own["mesh"] == "full"] if "mesh" in own else own
+            values = full["objective"].to_numpy(float)
+            if len(values) and records[number]["objective"] is not None:
+                if np.nanmin(values) > records[number]["objective"] * (1 + 1e-6) + 1e-12:
+                    ledger.find(f"{file}: start {number}", "no analysis has the start's objective")
+            external = int((own["solver"] != "membrane").sum())
+            if external != records[number]["external_runs"] + records[number].get("cached_runs", 0):
+                if self.result["solver"] != "membrane":
+                    ledger.find(f"{file}: start {number}", f"has {external} external runs")
+        for column in table:
+            ledger.claim_column(file, column, "consistent")
+
+    def _agreement(self):
+        """How many starts ended in the best optimum."""
+        words = self.result["optima"]
+        count = len(self.objectives)
+        if not words:
+            if count > 1:
+                self.ledger.find("result.json: optima", f"says nothing of {count} starts")
+            return
+        best = self.objectives[0]
+        near = sum(value <= best + 1e-3 * max(best, 1e-12) + 1e-9 for value in self.objectives)
+
+        def expected(match):
+            all_of, some, of = match.groups()
+            if all_of is not None:
+                return [count, None, None]
+            return [None, near if near < count else int(some), count]
+
+        self.ledger.text(
+            r"(?:all (\d+)|(\d+) of (\d+)) starts(?: \([^)]*\))? end in the", expected, "recomputed",
+            needed=False,
+        )  # fmt: skip
+
+    # How certain it is
+
+    def uncertainty(self):
+        """The summary of moduli.csv in result.json, and the noise that it counts."""
+        ledger, result = self.ledger, self.result
+        sure = result.get("uncertainty")
+        if sure is None:
+            return
+        for name, misfit in result["misfit"].items():
+            ledger.json(("uncertainty", "noise", name), max(misfit["rms"], misfit["noise"]),
+                        rel=0.05 if sure["largest_relative_mesh"] else 1e-6)  # fmt: skip
+            alike = sure["values_that_err_as_one"][name]
+            count = len(self.blocks[name])
+            ledger.claim_json(("uncertainty", "values_that_err_as_one", name), "consistent")
+            if not 1.0 - 1e-9 <= alike <= count * (1 + 1e-9):
+                ledger.find(f"result.json: values_that_err_as_one.{name}", f"is {alike} of {count}")
+        for name in MODULI:
+            own = self.table[self.table["modulus"] == name]
+            columns = {
+                "largest_relative_sigma": own["noise_relative"].max(),
+                "median_relative_sigma": own["noise_relative"].median(),
+                "largest_relative_mesh": own["mesh_relative"].abs().max(),
+                "largest_relative_total": own["sigma_relative"].max(),
+            }
+            for key, value in columns.items():
+                if sure[key] is not None:
+                    ledger.json(("uncertainty", key, name), float(value), "recomputed",
+                                rel=1e-6, abs=1e-12)  # fmt: skip
+        self._pinned(sure)
+
+    def _pinned(self, sure):
+        """What each test determines: less than all together, at most the prior."""
+        ledger, result = self.ledger, self.result
+        pinned = result.get("pinned", {})
+        together = pinned.get("all together", {})
+        for name, own in together.items():
+            ledger.json(("pinned", "all together", name, "median"),
+                        sure["median_relative_sigma"][name], "consistent")  # fmt: skip
+            ledger.json(("pinned", "all together", name, "largest"),
+                        sure["largest_relative_sigma"][name], "consistent")  # fmt: skip
+            table = self.table[self.table["modulus"] == name]
+            ledger.json(("pinned", "all together", name, "least"),
+                        float(table["noise_relative"].min()), "recomputed", abs=1e-12)  # fmt: skip
+            for source in pinned:
+                alone = pinned[source][name]
+                ledger.claim_json(("pinned", source, name), "consistent")
+                if not 0 <= alone["least"] <= alone["median"] <= alone["largest"]:
+                    ledger.find(f"result.json: pinned.{source}.{name}", f"is not sorted: {alone}")
+                if alone["largest"] > PRIOR * (1 + 1e-6):
+                    ledger.find(f"result.json: pinned.{source}.{name}", "exceeds the prior")
+                if alone["median"] < 0.9 * own["median"]:
+                    ledger.find(f"result.json: pinned.{source}.{name}", "one knows more than all")
+            if self.card.form == "constant":
+                self._precisions_add(name, pinned)
+
+    def _precisions_add(self, name, pinned):
+        """Of constants that hardly correlate, the tests' precisions add, the prior counted once."""
+        total = sum(
+            own[name]["median"] ** -2 - PRIOR**-2 for source, own in pinned.items()
+            if source != "all together"
+        )  # fmt: skip
+        expected = (total + PRIOR**-2) ** -0.5
+        told = pinned["all together"][name]["median"]
+        if expected < told * 0.8:
+            self.ledger.find(
+                f"result.json: pinned of {name}", f"alone they make {expected:.4g}, not {told:.4g}"
+            )
+
+    def verdict(self):
+        """Where each modulus is usable, and not known, by its band in moduli.csv."""
+        ledger, result = self.ledger, self.result
+        ledger.json(("verdict", "within"), USABLE, "echoed")
+        for name in MODULI:
+            own = self.table[self.table["modulus"] == name]
+            value, end = own["MPa"], self.card.ends[name]
+            off = np.maximum(own["upper_MPa"] - value, value - own["lower_MPa"]) / value
+            strain = own["strain"].to_numpy()
+            known = off.notna().any()
+            spans = {
+                "usable": _longest(strain, (off <= USABLE).to_numpy()) if known else None,
+                "not_known": _longest(strain, (off >= NOT_KNOWN).to_numpy()) if known else [0, end],
+            }
+            for key, span in spans.items():
+                ledger.json(("verdict", "moduli", name, key), span, rel=1e-6, abs=1e-12)
+        self._verdict_words()
+
+    def _verdict_words(self):
+        """The page's sentence on it."""
+        ledger, moduli = self.ledger, self.result["verdict"]["moduli"]
+
+        def spans(key):
+            words = []
+            for name in MODULI:
+                span, end = moduli[name][key], self.card.ends[name]
+                if span is None:
+                    if key == "usable":
+                        words.append(f"{name} nowhere")
+                elif end < 1e-4:
+                    words.append(f"{name} at any strain")
+                else:
+                    low, high = (f"{100 * v:.2g} %" for v in span)
+                    between = f"from {low} to {high}" if span[0] > 0 else f"up to {high}"
+                    words.append(f"{name} {between}")
+            return ", ".join(words) or "nothing"
+
+        begin = f"Usable to within 20 % (95 % band): {spans('usable')}; not known: "
+        begin += f"{spans('not_known')}; next: {self.result['verdict']['next']}."
+        seen = [text for text in ledger.texts if text.text.startswith("Usable to within")]
+        for text in seen:
+            plain = text.text.replace("\u00a0", " ")
+            if plain != begin:
+                ledger.find(f"{text.source}: verdict", f"is {plain!r}; expected {begin!r}")
+            for span in text.claims:
+                text.claims[span] = "recomputed"
+        if self.folder.page is not None and not seen:
+            ledger.find("page", "has no verdict")
+
+    def unknowns(self):
+        """Unknowns beside the moduli: numbers, words and the page's table."""
+        ledger = self.ledger
+        rows = []
+        for name, own in self.result.get("unknowns", {}).items():
+            place = ("unknowns", name)
+            ledger.claim_json(place, "consistent")
+            low, high = own["bounds"]
+            value, sigma, prior = own["value"], own["sigma"], own["prior"]
+            if not low - 1e-9 * abs(low) <= value <= high + 1e-9 * abs(high):
+                ledger.find(f"result.json: unknowns.{name}", f"{value} lies outside its bounds")
+            on = None
+            if value - low <= 1e-6 * (high - low):
+                on = "lower"
+            elif high - value <= 1e-6 * (high - low):
+                on = "upper"
+            ledger.json((*place, "on_bound"), on)
+            known = 0.9 * prior if prior is not None else (high - low) / math.sqrt(12.0)
+            ledger.json((*place, "determined"), sigma < known)
+            for modulus, rho in own["correlation"].items():
+                if not abs(rho) <= 1 + 1e-9:
+                    ledger.find(f"result.json: unknowns.{name}.correlation.{modulus}", f"is {rho}")
+            self._correlation_in_the_middle(name, own)
+            self._words_of_unknown(name, own)
+            unit = own["unit"]
+            told = own["sigma"] if own["determined"] else "not determined"
+            rows.append([name, unit, value, told, low, high, prior, own["verdict"]])
+        if rows and self.folder.page is not None:
+            ledger.table("Unknowns beside the moduli", None, rows)
+
+    def _correlation_in_the_middle(self, name, own):
+        """Its correlation with each modulus at half of the valid strains, from coefficients.csv."""
+        table = self.folder.data("coefficients.csv")
+        size = len(self.card.labels)
+        sigma = table["sigma"].to_numpy(float)[:size]
+        matrix = table[list(self.card.labels)].to_numpy(float)
+        row = table["unknown"].tolist().index(name)
+        covariance = matrix[:size] * np.outer(sigma, sigma)
+        for modulus, rho in own["correlation"].items():
+            slope = self.card.rows(modulus, 0.5 * self.card.ends[modulus])[0, self.card.free]
+            spread = math.sqrt(max(slope @ covariance @ slope, 0.0))
+            expected = float(slope @ (matrix[row] * sigma)) / max(spread, 1e-300)
+            if abs(expected - rho) > 0.02:
+                self.ledger.find(
+                    f"result.json: unknowns.{name}.correlation.{modulus}",
+                    f"is {rho:.3f}; coefficients.csv gives {expected:.3f}",
+                )
+
+    def _words_of_unknown(self, name, own):
+        """The sentence on an unknown has its numbers."""
+        ledger, words = self.ledger, own["verdict"]
+        unit = f" {own['unit']}" if own["unit"] else ""
+        begin = f"{own['value']:.4g}{unit}"
+        if own["on_bound"]:
+            begin += f", on its {own['on_bound']} bound"
+        if own["determined"]:
+            begin += f", 1 sigma {own['sigma']:.2g}{unit}"
+            modulus, rho = max(own["correlation"].items(), key=lambda item: abs(item[1]))
+            if abs(rho) >= 0.5:
+                begin += f", correlation {rho:.2f} with {modulus}"
+        else:
+            begin += ": the data say nothing of it ("
+            if own["prior"] is not None:
+                begin += f"known to {own['prior']:.2g}{unit} before)"
+            else:
+                low, high = own["bounds"]
+                begin += f"it may be {low:.4g} to {high:.4g}{unit})"
+        if not words.startswith(begin):
+            ledger.find(f"result.json: unknowns.{name}.verdict", f"is {words!r}; expected {begin!r}")
+        for text in ledger.texts:
+            if words in text.text or text.text == words:
+                at = text.text.find(words)
+                text.claim((at, at + len(words)), "consistent")
+
+    # The page
+
+    def page(self):
+        if self.folder.page is None:
+            return
+        self._answers()
+        self._trust()
+        self._determined()
+        self._found()
+
+    def _answers(self):
+        """The answer: moduli and bands at few strains, MPa and kN/m."""
+        ledger, card, table = self.ledger, self.card, self.table
+        for name in MODULI:
+            end = card.ends[name]
+            own = table[table["modulus"] == name]
+            rows = []
+            for strain in [*(s for s in STRAINS if s < 0.95 * end), end]:
+                if 0.0 < strain < 1e-4:
+                    continue
+                value = float(card.modulus(name, strain))
+                band = [float(np.interp(strain, own["strain"], own[c]))
+                        for c in ("lower_MPa", "upper_MPa")]  # fmt: skip
+                cells = []
+                for scale in (1.0, card.thickness):
+                    numbers = [scale * v for v in (value, *band)]
+                    cells.append(_banded(numbers))
+                label = f"{100 * strain:.2g} %{', its end' if strain == end else ''}"
+                rows.append([label, *cells])
+            # Between the fit's strains the band is interpolated: its last digit may differ.
+            ledger.table(WORDS[name], ["strain", "MPa", "kN/m"], rows, "recomputed", digits=3,
+                         slack=2e-3)  # fmt: skip
+            rest = float(card.modulus(name, 0.0)), float(card.modulus(name, end))
+            ledger.text(rf"^{name}, [^:]*: from {NUM} MPa at rest to {NUM} MPa at {NUM} %",
+                        [*rest, 100 * end], digits=3)  # fmt: skip
+        ledger.text(r"kN/m: MPa times the thickness of (\S+) mm", [card.thickness])
+        ledger.text(r"In brackets the (95) % band", ["95"], needed=False)
+        ledger.text(r"with their bands \((95) %, noise and mesh together\)", ["95"], needed=False)
+        ledger.text(r"What each test pins down.*above (1000) %", ["1000"], needed=False)
+        ledger.text(r"add strips at 45 degrees", [], needed=False)
+
+    def _trust(self):
+        """Misfit beside noise, errors against a known law, where the moduli end."""
+        ledger, result = self.ledger, self.result
+        rows = [
+            [name, m["rms"], m["noise"], m["unit"], m["noise_is"], m["times_noise"]]
+            for name, m in result["misfit"].items()
+        ]
+        header = ["compared", "RMS residual", "noise", "unit", "noise is", "residual over noise"]
+        ledger.table("Residual beside the noise", header, rows)
+        rows = [
+            [key, 100 * result["valid_strain"][key], 100 * result["strain_reached"][key]]
+            for key in DIRECTION.values()
+        ]
+        header = ["direction", "moduli fitted up to, %", "largest strain reached, %"]
+        ledger.table("Where they end", header, rows)
+        fixed = "fitted" if "nu12" in self.names_of_unknowns() else "fixed"
+        ledger.fact(f"Poisson's ratio nu12 ({fixed})", float(result["nu12"]))
+        label = "thickness (fitted)" if "thickness" in self.names_of_unknowns() else "thickness"
+        change = self.folder.card_text.get("thickness_change", "constant")
+        ledger.fact(label, (rf"(\S+) mm, {change}", self.card.thickness))
+        records, best = self.folder.starts, result["objective"]
+        ranked = sum(r["objective"] is not None for r in records)
+        ledger.text(r"Best of (\d+) starts: objective ([^;\s]+);", [ranked, best], digits=3)
+
+    def _determined(self):
+        """What the data determine; coefficients and their bounds."""
+        ledger, result = self.ledger, self.result
+        sure = result.get("uncertainty")
+        if sure is None:
+            return
+        rows = []
+        for name in MODULI:
+            mesh = sure["largest_relative_mesh"]
+            cells = [sure["median_relative_sigma"][name], sure["largest_relative_sigma"][name]]
+            rows.append([
+                name, *map(percent, cells),
+                "not known" if mesh is None else percent(round(mesh[name], 6)),
+                percent(sure["largest_relative_total"][name]),
+            ])  # fmt: skip
+        header = ["modulus", "median 1 sigma", "largest 1 sigma", "mesh, largest",
+                  "together, largest"]  # fmt: skip
+        ledger.table("What the data determine", header, rows)
+        self._noise_note(sure)
+        pinned = result.get("pinned")
+        if pinned:
+            rows = [
+                [source, name, *(percent(own[k]) if own[k] < 0.999 * PRIOR else "unknown"
+                                 for k in ("median", "largest"))]
+                for source, moduli in pinned.items() for name, own in moduli.items()
+            ]  # fmt: skip
+            header = ["test", "modulus", "median 1 sigma", "largest 1 sigma"]
+            ledger.table("What each test pins down", header, rows)
+            ledger.text(r"every modulus is taken to be known to (\d+) %", [int(100 * PRIOR)])
+            for source, moduli in pinned.items():
+                for name, own in moduli.items():
+                    pattern = rf"^{source} alone does not determine {name} \(1 sigma above 100 %"
+                    said = any(text.text.startswith(pattern[1:].replace("\\", ""))
+                               for text in ledger.texts)  # fmt: skip
+                    if said != (own["least"] > 1.0 and source != "all together"):
+                        ledger.find(f"notes: {source}, {name}", "says the wrong of 'alone'")
+        ledger.text(r"alone does not determine \w+ \(1 sigma above 100 % everywhere\)", [],
+                    needed=False)  # fmt: skip
+
+    def _noise_note(self, sure):
+        """The note that lists the noise of every comparison."""
+        units = {name: m["unit"] for name, m in self.result["misfit"].items()}
+
+        def listed():
+            for name, value in sure["noise"].items():
+                alike = sure["values_that_err_as_one"][name]
+                together = f", {alike:.2g} neighbouring values err as one" if alike > 1.05 else ""
+                yield f"{value:.2g} {units[name]} ({name}{together})"
+
+        expected = f"noise of {', '.join(listed())} on everything matched"
+        for text in self.ledger.texts:
+            if text.source == "page" and text.text.startswith("noise of ") and (
+                "on everything matched" in text.text
+            ):
+                if not text.text.startswith(expected):
+                    self.ledger.find("page: what the data determine", f"notes {text.text!r}")
+                text.claim((0, len(expected)), "consistent")
+        self.ledger.text(r"Uncertainty of (?:first|second) order.*", self._order, needed=False)
+
+    def _order(self, match):
+        order = self.result["uncertainty"]["second_order"]
+        changes = ", ".join(
+            f"{name} {100 * by:+.0f} %" for name, by in order["change_of_sigma"].items()
+        )
+        if changes not in match[0] and order["why"] != "not positive definite":
+            self.ledger.find("page: uncertainty", f"{match[0]!r} is without {changes!r}")
+        return []
+
+    def _found(self):
+        """How it was found: facts, starts, bounds."""
+        ledger, result, folder = self.ledger, self.result, self.folder
+        records = folder.starts
+        ranked = sum(r["objective"] is not None for r in records)
+        ledger.fact(f"objective: {result['objective_is']}", float(result["objective"]))
+        ledger.fact("starts", (r"(\d+) feasible of (\d+)", ranked, len(records)))
+        ledger.fact("analyses", result["analyses"])
+        if result["external_runs"] or result["cached_runs"]:
+            ledger.fact(f"of them by {result['solver']}", result["external_runs"])
+        if result["cached_runs"]:
+            ledger.fact("of them from the cache", result["cached_runs"])
+        order = sorted(records, key=lambda r: math.inf if r["objective"] is None else r["objective"])
+        rows = [
+            [k, r["number"], r["objective"], r["analyses"], r["status"]]
+            for k, r in enumerate(order, start=1)
+        ]
+        header = ["rank", "start", "objective", "analyses", "how it ended"]
+        ledger.table("Starts, best first", header, rows)
+        ends = [r["objective"] for r in records if r["objective"] is not None]
+        if ends:
+            said = max(min(ends), 1e-16), max(float(np.median(ends)), 1e-16), max(*ends, 1e-16)
+            ledger.text(r"(\d+) starts?(?:, (\d+) without a result)?: best (\S+), median (\S+), "
+                        r"worst ([^\s.]\S*?)(?=\.?$)",
+                        [len(records), len(records) - ranked, *said], digits=3)  # fmt: skip
+        self._tables_of_coefficients()
+
+    def _tables_of_coefficients(self):
+        ledger, card = self.ledger, self.card
+        table = self.folder.data("coefficients.csv")
+        size = len(card.labels)
+        unit = self.folder.card_text["unit"]
+        rows = [
+            [own.unknown, float(own.value), float(own.lower_bound), float(own.upper_bound)]
+            for own in table.head(size).itertuples()
+        ]
+        header = ["coefficient", f"value, {unit}", "lower bound", "upper bound"]
+        ledger.table("Coefficients of the law", header, rows, digits=[4, 6, 4, 4])
+        if not np.isfinite(table["sigma"].astype(float)).all():
+            return
+        names = table["unknown"].tolist()
+        rows = [
+            [own["unknown"], float(own["value"]), float(own["sigma"]), own["unit"],
+             *(f"{round(own[name], 2) + 0.0:.2f}" for name in names)]
+            for _, own in table.iterrows()
+        ]  # fmt: skip
+        header = ["unknown", "value", "1 sigma", "unit", *names]
+        title = "How sure the coefficients are, and how they hang together"
+        ledger.table(title, header, rows)
+
+    # Words
+
+    def notes(self):
+        """Warnings, notes and notes.csv are the same lines; numbers in those of a fit."""
+        ledger, result = self.ledger, self.result
+        lines = [f"{n['of']}: {n['note']}" if n["of"] else n["note"] for n in result["notes"]]
+        if lines != result["warnings"]:
+            ledger.find("result.json: warnings", "are not the notes")
+        if "notes.csv" in self.folder.tables:
+            table = self.folder.tables["notes.csv"]
+            for key in ("of", "kind", "note"):
+                ledger.column("notes.csv", key, np.array([n[key] for n in result["notes"]], object))
+        if self.folder.page is not None:
+            shown = {text for tag, _, text in self.folder.page.sentences if tag == "li"}
+            for line in lines:
+                if " ".join(line.split()) not in shown:
+                    ledger.find("page: warnings", f"without {line!r}")
+        reached = {key: 100 * own for key, own in result["strain_reached"].items()}
+        ranges = self.folder.project.get("law", {}).get("strain_range")
+        limit = dict(zip(DIRECTION.values(), ranges or [math.nan] * 3, strict=True))
+
+        def beyond(match):
+            key, strain, _ = match.groups()
+            if as_number(strain) > reached[key] * 1.01:
+                ledger.find("notes", f"{match[0]!r}, but {reached[key]:.3g} % is reached at most")
+            return [None, None, 100 * limit[key]]
+
+        pattern = r"(warp|fill|shear) strain reached ([\d.]+) %, beyond law.strain_range of ([\d.]+) %"
+        if ledger.text(pattern, beyond, digits=3, needed=False):
+            ledger.text(r"(?:warp|fill|shear) strain reached ([\d.]+) %",
+                        lambda m: [m[1]], needed=False)  # fmt: skip
+        for name in MODULI:
+            own = self.table[self.table["modulus"] == name]
+            worst = own.loc[own["sigma_relative"].idxmax()] if own["sigma_relative"].any() else None
+            if worst is None:
+                continue
+            expected = [100 * worst["sigma_relative"], 100 * worst["strain"]]
+            seen = self.ledger.text(
+                rf"{name} is uncertain by up to (\d+) % \(1 sigma[^)]*\), worst at (\S+) % of strain",
+                [f"{expected[0]:.0f}", expected[1]], digits=3, needed=False,
+            )  # fmt: skip
+            if seen != (worst["sigma_relative"] > 0.25):
+                self.ledger.find(f"notes: {name}", f"uncertain by {worst['sigma_relative']:.3g}")
+
+    def tests(self):
+        for test, numbers in self.result["tests"].items():
+            kind, section = self.kind_of(test)
+            if kind in KINDS:
+                KINDS[kind].audit(self, test, section, numbers)
+            if not self.several:
+                # Numbers of a single test also stand at the top.
+                for key, own in numbers.items():
+                    self.ledger.json(key, own, "consistent", rel=1e-12)
+
+
+def _rows(band):
+    """Return strain, lower and upper of the card's band, in whichever form it is written."""
+    if isinstance(band, dict):
+        return band["strain"], band["lower"], band["upper"]
+    return band
+
+
+def _banded(numbers):
+    """Return the pattern of "364 (281 to 442)" with its numbers; whole from 99.5 on."""
+    if not np.isfinite(numbers[1:]).all():
+        return float(numbers[0])
+    return (r"(\S+) \((\S+) to (\S+)\)", *map(float, numbers))
+
+
+def _size(table):
+    return float(np.abs(table["measured"].to_numpy(float)).max())
+
+
+def _longest(strain, chosen):
+    """Return the longest run of chosen strains; None where it is below a twentieth of all."""
+    best, start = None, None
+    for k, own in enumerate([*chosen, False]):
+        if own and start is None:
+            start = k
+        elif not own and start is not None:
+            run = float(strain[start]), float(strain[k - 1])
+            if best is None or run[1] - run[0] > best[1] - best[0]:
+                best = run
+            start = None
+    return list(best) if best and best[1] - best[0] > 0.05 * strain[-1] else None
+
+
+COMMANDS = dict.fromkeys(("bubble", "strips", "fit", "biaxial-fit", "cycles-fit"), audit_fit)
