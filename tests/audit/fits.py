@@ -1,6 +1,7 @@
 """Auditor of a fit's folder: card, moduli, coefficients, residuals, starts, verdict."""
 
 import math
+import re
 
 import numpy as np
 
@@ -85,14 +86,26 @@ class FitAudit:
         law = self.folder.project.get("law", {})
         if "nu12" not in self.names_of_unknowns() and card["nu12"] != law.get("nu12", 0.24):
             ledger.find("material.toml: nu12", f"expected {law.get('nu12', 0.24)}")
-        ranges = law.get("strain_range")
+        self.ranges = law.get("strain_range") or self._ranges_of_tests()
         for k, key in enumerate(DIRECTION.values()):
             reached = result["strain_reached"][key]
             self._reached(k, key)
-            limit = max(min(reached, ranges[k] if ranges else math.inf), 1e-6)
+            limit = max(min(reached, self.ranges[k]), 1e-6)
             ledger.json(("valid_strain", key), limit, "recomputed", rel=1e-9)
         self._certainty()
         self._source()
+
+    def _ranges_of_tests(self):
+        """Return how far the strips go, along warp and fill, and the shear of the bias strip."""
+        ranges = [-math.inf] * 3
+        for test, numbers in self.result["tests"].items():
+            angle = self.kind_of(test)[1].get("bias_angle", 45.0)
+            for direction, own in numbers.get("directions", {}).items():
+                strain = math.log(own["final_length_mm"] / own["gauge_length_mm"])
+                factor = 2 * math.sin(math.radians(2 * angle)) if direction == "bias" else 1.0
+                k = ("warp", "fill", "bias").index(direction)
+                ranges[k] = max(ranges[k], factor * strain)
+        return [end if math.isfinite(end) else math.inf for end in ranges]
 
     def _reached(self, component, key):
         """The largest strain is that of the best start, and at least that of straight strips."""
@@ -134,7 +147,10 @@ class FitAudit:
             table = self.table[self.table["modulus"] == name]
             scale = MPA[card["unit"]]
             strain, lower, upper = (np.array(row, dtype=float) for row in _rows(band))
-            at = np.interp(table["strain"], strain, lower), np.interp(table["strain"], strain, upper)
+            at = (
+                np.interp(table["strain"], strain, lower),
+                np.interp(table["strain"], strain, upper),
+            )
             for own, column in zip(at, ("lower_MPa", "upper_MPa"), strict=True):
                 if not np.allclose(own * scale, table[column], rtol=1e-5, atol=1e-9):
                     ledger.find(f"material.toml: certainty.band.{name}", f"is not {column}")
@@ -301,7 +317,10 @@ class FitAudit:
         if np.isfinite(matrix).all():
             if not np.allclose(matrix, matrix.T, rtol=1e-7, atol=1e-9):
                 ledger.find("coefficients.csv", "correlations are not symmetric")
-            if not np.allclose(np.diag(matrix), 1.0, atol=1e-8) or (np.abs(matrix) > 1 + 1e-8).any():
+            if (
+                not np.allclose(np.diag(matrix), 1.0, atol=1e-8)
+                or (np.abs(matrix) > 1 + 1e-8).any()
+            ):
                 ledger.find("coefficients.csv", "correlations are none")
 
     # What was matched
@@ -311,7 +330,7 @@ class FitAudit:
         ledger, table, result = self.ledger, self.matched, self.result
         file = "residuals.csv"
         ledger.column(file, "difference", (table["modelled"] - table["measured"]).to_numpy(),
-                      rel=1e-8, abs=3e-9 * float(table["measured"].abs().max()))  # fmt: skip
+                      rel=1e-8, abs=2e-8 * float(table["measured"].abs().max()))  # fmt: skip
         ledger.claim_column(file, "modelled", "consistent")
         blocks, names = {}, []
         for (test, part), own in table.groupby(["test", "part"], sort=False):
@@ -380,16 +399,23 @@ class FitAudit:
         """Starts: starts.jsonl, history.csv and result.json count the same."""
         folder, ledger, result = self.folder, self.ledger, self.result
         records = folder.starts
-        for k, record in enumerate(records):
+        ended = [r for r in records if r["objective"] is not None]
+        self.best_start = min(ended, key=lambda r: r["objective"], default=None)
+        for record in records:
+            k = record["number"]
             own = ("starts", k)
-            for key, name in (("start", "number"), ("objective", "objective"),
-                              ("analyses", "analyses"), ("external_runs", "external_runs")):  # fmt: skip
-                ledger.json((*own, key), record[name], "consistent", rel=1e-12)
+            for key, name in (("start", "number"), ("analyses", "analyses"),
+                              ("external_runs", "external_runs")):  # fmt: skip
+                ledger.json((*own, key), record[name], "consistent")
+            # The best start runs once more from the unloaded state.
+            near = {"rel": 1e-4, "abs": 1e-9} if record is self.best_start else {"rel": 1e-12}
+            ledger.json((*own, "objective"), record["objective"], "consistent", **near)
             ledger.json((*own, "status"), record["status"])
             ledger.json((*own, "cached_runs"), record.get("cached_runs", 0), "consistent")
             seed = record["seed"]
             if seed != [result["seed"], record["number"]]:
                 ledger.find(f"starts.jsonl: {k}", f"has the seed {seed}")
+        for k, record in enumerate(records):
             for key in record:
                 ledger.claim_json((k, key), "consistent", file="starts.jsonl")
         if len(result["starts"]) != len(records):
@@ -438,21 +464,22 @@ class FitAudit:
         if file not in folder.tables:
             return
         table = folder.data(file)
-        counted = [(k, r["analyses"] + r.get("coarse_analyses", 0)) for k, r in enumerate(records)]
-        for number, count in counted:
-            own = table[table["start"] == records[number]["number"]]
-            if len(own) != records[number]["analyses"] and len(own) != count:
+        for record in records:
+            number = record["number"]
+            own = table[table["start"] == number]
+            count = record["analyses"] + (record.get("coarse_analyses") or 0)
+            if len(own) not in (record["analyses"], count):
                 ledger.find(f"{file}: start {number}", f"has {len(own)} rows of {count} analyses")
             steps = own["analysis"].to_numpy()
             if not np.array_equal(steps, np.arange(1, len(own) + 1)):
                 ledger.find(f"{file}: start {number}", "analyses are not numbered from 1")
             full = own[own["mesh"] == "full"] if "mesh" in own else own
             values = full["objective"].to_numpy(float)
-            if len(values) and records[number]["objective"] is not None:
-                if np.nanmin(values) > records[number]["objective"] * (1 + 1e-6) + 1e-12:
+            if np.isfinite(values).any() and record["objective"] is not None:
+                if np.nanmin(values) > record["objective"] * (1 + 1e-6) + 1e-12:
                     ledger.find(f"{file}: start {number}", "no analysis has the start's objective")
             external = int((own["solver"] != "membrane").sum())
-            if external != records[number]["external_runs"] + records[number].get("cached_runs", 0):
+            if external != record["external_runs"] + record.get("cached_runs", 0):
                 if self.result["solver"] != "membrane":
                     ledger.find(f"{file}: start {number}", f"has {external} external runs")
         for column in table:
@@ -508,7 +535,43 @@ class FitAudit:
                 if sure[key] is not None:
                     ledger.json(("uncertainty", key, name), float(value), "recomputed",
                                 rel=1e-6, abs=1e-12)  # fmt: skip
+        self._discrepancies(sure)
         self._pinned(sure)
+
+    def _discrepancies(self, sure):
+        """What noise does not explain of a residual is not more than the residual."""
+        for name, own in sure["smooth_beyond_noise"].items():
+            place = ("uncertainty", "smooth_beyond_noise", name)
+            self.ledger.claim_json(place, "consistent")
+            misfit = self.result["misfit"][name]
+            self.ledger.json((*place, "unit"), misfit["unit"])
+            rows = self.blocks[name]
+            size = float(np.sqrt(np.mean(rows["measured"] ** 2)))
+            self.ledger.json((*place, "share"), own["rms"] / size, "recomputed", rel=0.02)
+            if own["rms"] > 2 * misfit["rms"] + 1e-3 * misfit["noise"] and not self.mesh_in_it:
+                self.ledger.find(f"result.json: {'.'.join(place)}.rms", f"is {own['rms']}")
+            self._causes(own)
+            shares = [cause["share"] for cause in own["causes"]]
+            if any(not 0 <= share <= 1 + 1e-9 for share in shares) or (
+                shares != sorted(shares, reverse=True)
+            ):
+                self.ledger.find(f"result.json: {'.'.join(place)}.causes", f"have shares {shares}")
+
+    def _causes(self, own):
+        """Amounts of causes stand alike in result.json and in the note."""
+        for cause in own["causes"]:
+            amount = re.search(NUM, cause["words"])
+            if amount is None:
+                continue
+            for text in self.ledger.texts:
+                at = text.text.find(cause["words"])
+                if at >= 0:
+                    text.claim((at, at + len(cause["words"])), "consistent")
+
+    @property
+    def mesh_in_it(self):
+        """Whether the residual of ever finer meshes is another than that of residuals.csv."""
+        return bool(self.result["uncertainty"]["largest_relative_mesh"])
 
     def _pinned(self, sure):
         """What each test determines: less than all together, at most the prior."""
@@ -665,7 +728,9 @@ class FitAudit:
                 low, high = own["bounds"]
                 begin += f"it may be {low:.4g} to {high:.4g}{unit})"
         if not words.startswith(begin):
-            ledger.find(f"result.json: unknowns.{name}.verdict", f"is {words!r}; expected {begin!r}")
+            ledger.find(
+                f"result.json: unknowns.{name}.verdict", f"is {words!r}; expected {begin!r}"
+            )
         for text in ledger.texts:
             if words in text.text or text.text == words:
                 at = text.text.find(words)
@@ -787,8 +852,10 @@ class FitAudit:
 
         expected = f"noise of {', '.join(listed())} on everything matched"
         for text in self.ledger.texts:
-            if text.source == "page" and text.text.startswith("noise of ") and (
-                "on everything matched" in text.text
+            if (
+                text.source == "page"
+                and text.text.startswith("noise of ")
+                and ("on everything matched" in text.text)
             ):
                 if not text.text.startswith(expected):
                     self.ledger.find("page: what the data determine", f"notes {text.text!r}")
@@ -816,9 +883,12 @@ class FitAudit:
             ledger.fact(f"of them by {result['solver']}", result["external_runs"])
         if result["cached_runs"]:
             ledger.fact("of them from the cache", result["cached_runs"])
-        order = sorted(records, key=lambda r: math.inf if r["objective"] is None else r["objective"])
+        records = result["starts"]
+        order = sorted(
+            records, key=lambda r: math.inf if r["objective"] is None else r["objective"]
+        )
         rows = [
-            [k, r["number"], r["objective"], r["analyses"], r["status"]]
+            [k, r["start"], r["objective"], r["analyses"], r["status"]]
             for k, r in enumerate(order, start=1)
         ]
         header = ["rank", "start", "objective", "analyses", "how it ended"]
@@ -856,6 +926,32 @@ class FitAudit:
 
     # Words
 
+    def _unstable(self):
+        """Loads at which equilibria are unstable are those of increments or frames."""
+        for test, numbers in self.result["tests"].items():
+            for direction in numbers.get("directions", {}):
+                prefix = f"{test}-" if self.several else ""
+                loads = self.folder.data(f"{prefix}loads.csv")
+                own = loads[loads["direction"] == direction]["elongation_mm"]
+                self.steps = {*getattr(self, "steps", set()), *(f"{u:.4g}" for u in own)}
+        frames = self.matched.get("pressure_kPa")
+        if frames is not None:
+            self.steps = {*getattr(self, "steps", set()), *(f"{p:.4g}" for p in frames.dropna())}
+
+        def expected(match):
+            for number in re.findall(NUM, match[0]):
+                if number not in self.steps:
+                    self.ledger.find("notes", f"{match[0]!r}: {number} is no load of the model")
+            return []
+
+        pattern = rf"unstable equilibri(?:um|a) at {NUM} [^:]*"
+        for text in self.ledger.texts:
+            for match in re.finditer(pattern, text.text):
+                expected(match)
+                for span in text.claims:
+                    if match.start() <= span[0] < match.end():
+                        text.claims[span] = "consistent"
+
     def notes(self):
         """Warnings, notes and notes.csv are the same lines; numbers in those of a fit."""
         ledger, result = self.ledger, self.result
@@ -871,9 +967,9 @@ class FitAudit:
             for line in lines:
                 if " ".join(line.split()) not in shown:
                     ledger.find("page: warnings", f"without {line!r}")
+        self._unstable()
         reached = {key: 100 * own for key, own in result["strain_reached"].items()}
-        ranges = self.folder.project.get("law", {}).get("strain_range")
-        limit = dict(zip(DIRECTION.values(), ranges or [math.nan] * 3, strict=True))
+        limit = dict(zip(DIRECTION.values(), self.ranges, strict=True))
 
         def beyond(match):
             key, strain, _ = match.groups()
@@ -881,7 +977,9 @@ class FitAudit:
                 ledger.find("notes", f"{match[0]!r}, but {reached[key]:.3g} % is reached at most")
             return [None, None, 100 * limit[key]]
 
-        pattern = r"(warp|fill|shear) strain reached ([\d.]+) %, beyond law.strain_range of ([\d.]+) %"
+        pattern = (
+            r"(warp|fill|shear) strain reached ([\d.]+) %, beyond law.strain_range of ([\d.]+) %"
+        )
         if ledger.text(pattern, beyond, digits=3, needed=False):
             ledger.text(r"(?:warp|fill|shear) strain reached ([\d.]+) %",
                         lambda m: [m[1]], needed=False)  # fmt: skip

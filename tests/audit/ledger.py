@@ -21,6 +21,7 @@ HOW = ("recomputed", "consistent", "echoed")
 EXEMPT = (
     ("result.json", r"versions\..*|(.*\.)?wall_s|(.*\.)?seconds|(.*\.)?seed(\.\d+)?|.*\.date"),
     ("starts.jsonl", r"(.*\.)?(wall_s|seconds|seed(\.\d+)?)"),
+    ("history.csv", r"status .*"),
     ("page", r".*The record.*|.*How to cite.*|.*Files of the folder.*"),
     ("page", r".* fact (date|fabric|laboratory|wall time, s)"),
     ("terminal", r".*(page:|wall time|seconds|\d s\b).*"),
@@ -154,6 +155,17 @@ class Ledger:
                 title, rows = page.tables[number].title, len(page.tables[number].rows)
                 if count != rows:
                     self.find(f"page: {title}", f"({count} rows) stands above {rows} rows")
+
+        self._names()
+
+    def _names(self):
+        """Numbers in names that the project gives are no results."""
+        fabric = self.folder.project.get("fabric", {})
+        names = {fabric.get("name"), fabric.get("lab"), (self.folder.result or {}).get("title")}
+        for name in filter(None, names):
+            for text in self.texts:
+                for match in re.finditer(re.escape(" ".join(str(name).split())), text.text):
+                    text.claim(match.span(), "wording")
 
     # What auditors say
 

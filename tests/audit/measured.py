@@ -83,10 +83,27 @@ def load_curves(folder, test, section):
             names = dict.fromkeys(specimens[of]) if specimens is not None else [None]
             for name in names:
                 chosen = of if name is None else of & (specimens == name)
-                curves.setdefault(_plain(direction), []).append(
-                    (name, along[chosen], load[chosen])
-                )
+                parts = [(name, along[chosen], load[chosen])]
+                if name is None:
+                    parts = _split(directions[of][0], along[chosen], load[chosen])
+                curves.setdefault(_plain(direction), []).extend(parts)
     return curves
+
+
+def _split(name, along, load):
+    """Return specimens without names: one begins where the elongation falls below half."""
+    starts, reached = [0], 0.0
+    for k, value in enumerate(along):
+        if reached > 0 and value < 0.5 * reached:
+            starts.append(k)
+            reached = 0.0
+        if value > 0.01 * along.max():
+            reached = max(reached, value)
+    if len(starts) == 1:
+        return [(name, along, load)]
+    ends = [*starts[1:], len(along)]
+    return [(f"{name} {n}", along[a:b], load[a:b])
+            for n, (a, b) in enumerate(zip(starts, ends, strict=True), start=1)]  # fmt: skip
 
 
 def _plain(direction):

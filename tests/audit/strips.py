@@ -1,5 +1,7 @@
 """Auditor of strip tests within a fit."""
 
+import re
+
 import numpy as np
 
 from . import measured
@@ -197,8 +199,13 @@ class Strips:
         along fill; the stress is the integral of the modulus.
         """
         audit, card = self.audit_of, self.audit_of.card
-        if direction == "bias" or audit.mesh_taken_out or "ratio" in card.form or (
-            "crimp" in card.form or audit.folder.card_text.get("thickness_change") != "constant"
+        if (
+            direction == "bias"
+            or audit.mesh_taken_out
+            or "ratio" in card.form
+            or (
+                "crimp" in card.form or audit.folder.card_text.get("thickness_change") != "constant"
+            )
         ):
             return None
         name, other = ("E1", "E2") if direction == "warp" else ("E2", "E1")
@@ -246,13 +253,17 @@ class Strips:
         before = f"{self.test}: " if self.audit_of.several else ""
         ledger.text(rf"{before}RMS errors in N: {pattern}, together {NUM}",
                     [*numbers, total], digits=[3] * len(own) + [4])  # fmt: skip
-        ledger.text(rf"{before}RMS errors in N: {pattern}(?![\d.]|, together)", numbers, needed=False)
-        scattered = ", ".join(
-            rf"{d} {NUM}(?: \(specimens scatter by {NUM}\))?" for d in own
+        ledger.text(
+            rf"{before}RMS errors in N: {pattern}(?![\w.+-])(?![\d.]|, together)",
+            numbers,
+            needed=False,
         )
+        scattered = ", ".join(rf"{d} {NUM}(?: \(specimens scatter by {NUM}\))?" for d in own)
         each = [v for o in own.values() for v in (o["rms_N"], o["scatter_N"])]
         ledger.text(rf"RMS error, N: {scattered}; sum {NUM}", [*each, total],
                     digits=[3] * len(each) + [4], source="terminal", needed=False)  # fmt: skip
+        angle = float(self.section.get("bias_angle", 45.0))
+        ledger.text(rf"{NUM}° bias", [angle], needed=False)
         if self.folder.page is None:
             return
         rows = []
@@ -316,11 +327,14 @@ def standard(ledger, folder, file, curves, width, gauges, section):
         for k, column in enumerate(columns):
             ledger.column(file, column, values[:, k], rel=1e-7)
         ledger.column(file, "direction", np.array([d for d, _ in names], object), "echoed")
+        ledger.column(file, "specimen", np.array([str(n) for _, n in names], object), "echoed")
     ledger.column(file, "width_mm", width, "echoed", rel=1e-8)
     ledger.column(file, "gauge_length_mm", np.array([gauges[d] for d in table["direction"]]),
                   "echoed", rel=1e-8)  # fmt: skip
     if "rate" in section:
         ledger.claim_column(file, "rate_mm_per_min", "echoed")
+    for name in table["specimen"].unique():
+        ledger.text(rf"^{re.escape(str(name))}$", [], source=file, needed=False)
     for column in ("specimen", "direction"):
         ledger.claim_column(file, column, "echoed")
 
