@@ -20,6 +20,9 @@ WORDS = {
 PRIOR = 10.0
 #: A modulus is usable where its 95 % band is within a fifth of it, not known from all of it on.
 USABLE, NOT_KNOWN = 0.2, 1.0
+#: Two starts end in one optimum where objectives and moduli differ by no more, relative; an
+#: objective that is larger than the best by no more is as good.
+SAME_OBJECTIVE, SAME_MODULI, AS_GOOD = 0.01, 0.02, 1e-4
 KINDS = {"bubble": bubbles, "strips": strips}
 
 
@@ -493,19 +496,71 @@ class FitAudit:
             if count > 1:
                 self.ledger.find("result.json: optima", f"says nothing of {count} starts")
             return
-        best = self.objectives[0]
-        near = sum(value <= best + 1e-3 * max(best, 1e-12) + 1e-9 for value in self.objectives)
+        groups = self._optima()
+        best = next(group for group in groups if self.best_start in group)
+        good = self.objectives[0] * (1 + AS_GOOD) + self.tolerance
+        near = sum(
+            record in best or record["objective"] <= good
+            for record in self.folder.starts
+            if record["objective"] is not None
+        )
 
         def expected(match):
-            all_of, some, of = match.groups()
+            all_of, _, _ = match.groups()
             if all_of is not None:
+                if near != count:
+                    self.ledger.find("result.json: optima", f"{near} of {count} are alike")
                 return [count, None, None]
-            return [None, near if near < count else int(some), count]
+            return [None, near, count]
 
         self.ledger.text(
-            r"(?:all (\d+)|(\d+) of (\d+)) starts(?: \([^)]*\))? end in the", expected, "recomputed",
+            r"(?:all (\d+)|(\d+) of (\d+)) starts(?: \([^)]*\))? end in the",
+            expected,
+            "recomputed",
             needed=False,
-        )  # fmt: skip
+        )
+        self.ledger.text(
+            rf"only one of (\d+) starts(?: \([^)]*\))? end in the best of .*\(objective {NUM}, "
+            rf"the next {NUM}\).*--starts (\d+)",
+            [count, *self.objectives[:2], 5 * count],
+            "recomputed",
+            needed=False,
+        )
+        self.ledger.text(r"(\d+) distinct optima", [len(groups)], "recomputed", needed=False)
+
+    @property
+    def tolerance(self):
+        return self.folder.project.get("fit", {}).get("tolerance", 1e-7)
+
+    def _optima(self):
+        """Return starts by optimum: objectives within the tolerance and 1 %, moduli within 1 %."""
+        groups = []
+        for start in sorted(self.folder.starts, key=lambda r: r["number"]):
+            if start["objective"] is None:
+                continue
+            for group in groups:
+                if self._alike(group[0], start):
+                    group.append(start)
+                    break
+            else:
+                groups.append([start])
+        return groups
+
+    def _alike(self, one, other):
+        limit = self.tolerance + SAME_OBJECTIVE * min(one["objective"], other["objective"])
+        if abs(one["objective"] - other["objective"]) > limit:
+            return False
+        card, scale = self.card, 1.0 / self.card.mpa
+        for k, name in enumerate(MODULI):
+            end = max(one["reached"][k], other["reached"][k])
+            strain = np.linspace(0.0, min(end, self.ranges[k]), 31)
+            a, b = (
+                card.modulus_beyond(name, strain, scale * np.array(r["coefficients"]))
+                for r in (one, other)
+            )
+            if np.abs(a / b - 1.0).max() > SAME_MODULI:
+                return False
+        return True
 
     # How certain it is
 
@@ -613,7 +668,7 @@ class FitAudit:
 
     def verdict(self):
         """Where each modulus is usable, and not known, by its band in moduli.csv."""
-        ledger, result = self.ledger, self.result
+        ledger = self.ledger
         ledger.json(("verdict", "within"), USABLE, "echoed")
         for name in MODULI:
             own = self.table[self.table["modulus"] == name]
@@ -959,7 +1014,6 @@ class FitAudit:
         if lines != result["warnings"]:
             ledger.find("result.json: warnings", "are not the notes")
         if "notes.csv" in self.folder.tables:
-            table = self.folder.tables["notes.csv"]
             for key in ("of", "kind", "note"):
                 ledger.column("notes.csv", key, np.array([n[key] for n in result["notes"]], object))
         if self.folder.page is not None:
@@ -990,7 +1044,8 @@ class FitAudit:
                 continue
             expected = [100 * worst["sigma_relative"], 100 * worst["strain"]]
             seen = self.ledger.text(
-                rf"{name} is uncertain by up to (\d+) % \(1 sigma[^)]*\), worst at (\S+) % of strain",
+                rf"{name} is uncertain by up to (\d+) % \(1 sigma[^)]*\), "
+                r"worst at (\S+) % of strain",
                 [f"{expected[0]:.0f}", expected[1]], digits=3, needed=False,
             )  # fmt: skip
             if seen != (worst["sigma_relative"] > 0.25):

@@ -58,6 +58,10 @@ class Law:
         strain = np.clip(np.asarray(strain, dtype=float), 0.0, self.ends[name])
         return self.mpa * self._value(name, strain, beta)
 
+    def modulus_beyond(self, name, strain, beta):
+        """Return a modulus in MPa at strains, also beyond the valid ones of the card."""
+        return self.mpa * self._value(name, np.asarray(strain, dtype=float), np.asarray(beta))
+
     def rows(self, name, strain):
         """Return (strains, coefficients): derivatives of a modulus (unit of the card) by beta."""
         unit = np.eye(len(self.beta))
