@@ -14,6 +14,7 @@ import types
 import typing
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, ParamSpec, TypeVar
 
@@ -24,6 +25,8 @@ _UNSEEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 #: The table of the notes in an output folder, and its description on a page.
 NOTES = "notes.csv"
 NOTES_ARE = "what a reader of the numbers should know, note by note"
+#: Weight from which a note is printed on the terminal, however many there are.
+GRAVE = 10.0
 #: Up to so many notes that differ in numbers only are printed one by one on the terminal.
 FEW = 3
 #: A number, or several in a row: they differ between notes of the same words.
@@ -180,27 +183,51 @@ def one_line(text: str) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Against:
+    """What speaks against the moduli of a fit, for its verdict.
+
+    Attributes
+    ----------
+    words : str
+        The reason.
+    advice : str
+        What to do about it, in words that follow "next:".
+    unusable : bool
+        Whether the moduli are not to be used at all.
+    """
+
+    words: str
+    advice: str
+    unusable: bool = False
+
+
 class NoteKind(str):
     """Name a kind of note by its words; the same words are the same kind.
 
     weight : place among the notes of a fit. mark : among those of a run in tables, 0 for none.
+    against : what a note of this kind says against the moduli of a fit.
     """
 
     weight: float
     mark: int
+    against: Against | None
     known: ClassVar[dict[str, NoteKind]] = {}
 
-    def __new__(cls, words: str, weight: float = 0.0, mark: int = 0) -> NoteKind:
+    def __new__(
+        cls, words: str, weight: float = 0.0, mark: int = 0, against: Against | None = None
+    ) -> NoteKind:
         if not words.strip():
             raise ValueError("a kind of note is named by words")
         kind = cls.known.setdefault(words, super().__new__(cls, words))
         kind.weight = max(weight, getattr(kind, "weight", 0.0))
         kind.mark = mark or getattr(kind, "mark", 0)
+        kind.against = against or getattr(kind, "against", None)
         return kind
 
-    def __getnewargs__(self) -> tuple[str, float, int]:  # type: ignore[override]
+    def __getnewargs__(self) -> tuple[str, float, int, Against | None]:  # type: ignore[override]
         """Return the arguments that restore the kind in another process."""
-        return str(self), self.weight, self.mark
+        return str(self), self.weight, self.mark, self.against
 
 
 #: Notes in plain words, of a solver of another distribution.
@@ -243,9 +270,10 @@ def marks(notes: Iterable[str]) -> list[NoteKind]:
     return sorted((kind for kind in kinds if kind.mark), key=lambda kind: kind.mark)
 
 
-def foremost(notes: Iterable[Note]) -> Note | None:
-    """Return the weightiest note, the first of its kind; None where there is none."""
-    return max(notes, key=lambda note: note.kind.weight, default=None)
+def gravest(notes: Iterable[Note]) -> list[Note]:
+    """Return all notes of `GRAVE` weight, else the weightiest, the gravest first."""
+    ordered = sorted(notes, key=lambda note: -note.kind.weight)
+    return [note for note in ordered if note.kind.weight >= GRAVE] or ordered[:1]
 
 
 def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
@@ -253,7 +281,7 @@ def rows(notes: Iterable[Note]) -> list[dict[str, str]]:
     return [{"of": note.of, "kind": str(note.kind), "note": str(note)} for note in notes]
 
 
-def lines(notes: Sequence[Note]) -> list[str]:
+def lines(notes: Sequence[Note], begin: str = "note") -> list[str]:
     """Return lines for the terminal; notes that many things share but for numbers are one."""
     alike: dict[tuple[NoteKind, str], list[Note]] = {}
     for note in notes:
@@ -261,9 +289,9 @@ def lines(notes: Sequence[Note]) -> list[str]:
     said = []
     for same in alike.values():
         if len(same) <= FEW:
-            said += [f"note: {note.line}" for note in same]
+            said += [f"{begin}: {note.line}" for note in same]
         else:
-            said.append(f"note, {len(same)} times ({NOTES} has each), as {same[0].line}")
+            said.append(f"{begin}, {len(same)} times ({NOTES} has each), as {same[0].line}")
     return said
 
 

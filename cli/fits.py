@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from ..errors import NOTES, InputError, Note, foremost
+from ..errors import NOTES, InputError, Note, gravest
 from ..errors import lines as note_lines
 from ..experiments.kinds import READING
 from ..inference.methods import method_names
@@ -156,7 +156,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
 
 def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
     """Return the summary, moduli first, verdict and page last; with `every`, all notes."""
-    from ..reports.fit_page import sigma_words, verdict_words
+    from ..reports.fit_page import sigma_words
 
     shown = [one for one in fit.verdicts if one.shared or one.prior is None]
     lines = [f"{one.name}: {one.words}" for one in shown]
@@ -182,7 +182,7 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
         *lines,
         *start_lines(fit),
         *(note_lines(fit.notes) if every else warning_lines(fit.notes, folder)),
-        verdict_words(fit),
+        fit.verdict.words,
         written_to(folder),
     ]
 
@@ -234,12 +234,11 @@ def start_lines(fit: Fit) -> list[str]:
 
 
 def warning_lines(notes: Sequence[Note], folder: Path) -> list[str]:
-    """Return the gravest note, how files were read, and where the others are."""
-    first = foremost(notes)
-    if first is None:
-        return []
-    read = [note for note in notes if note.kind == READING and note is not first]
-    more = len(notes) - len(read) - 1
+    """Return all grave notes, how files were read, and where the others are."""
+    grave = gravest(notes)
+    others = [note for note in notes if all(note is not printed for printed in grave)]
+    read = [note for note in others if note.kind == READING]
+    more = len(others) - len(read)
     where = f"{folder / NOTES} (or --verbose)"
     further = [f"{more} further note{'s' * (more > 1)}: {where}"] if more else []
-    return [f"warning: {first.line}", *note_lines(read), *further]
+    return [*note_lines(grave, "warning"), *note_lines(read), *further]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from ..errors import InputError, Note, NoteKind, SolverFailure, apart, as_note
+from ..errors import Against, InputError, Note, NoteKind, SolverFailure, apart, as_note
 from ..files import is_file, replacing
 from ..files import pandas as pd
 from ..materials.card import MaterialCard, State, positive, thickness_difference
@@ -40,11 +40,22 @@ if TYPE_CHECKING:
 
 #: Kinds of notes that are made here.
 BEYOND_CARD = NoteKind("beyond card range", mark=1)
-UNSTABLE = NoteKind("unstable", weight=14, mark=3)
+UNSTABLE = NoteKind(
+    "unstable",
+    weight=12.5,
+    mark=3,
+    against=Against(
+        "equilibria of the model are unstable", "leave the unstable loads out of the fit"
+    ),
+)
 THICKNESS = NoteKind("other thickness")
 BEYOND_LAW = NoteKind("beyond law.strain_range", weight=8)
 UNMATCHED = NoteKind("unmatched direction", weight=9)
-DOUBTFUL = NoteKind("doubtful data", weight=12)
+DOUBTFUL = NoteKind(
+    "doubtful data",
+    weight=12,
+    against=Against("the data are doubtful", "settle the doubts about the data (bubblefit check)"),
+)
 READING = NoteKind("how a file was read")
 STATES = NoteKind("tests in different states", weight=9)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Note, NoteKind
+from ..errors import Against, Note, NoteKind
 from ..materials.card import band_at
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
@@ -30,8 +30,12 @@ from .problem import Evaluation, FitProblem
 from .wrong_form import discrepancies
 
 UNCERTAIN = NoteKind("uncertain", weight=6)
-MARGIN = NoteKind("on its margin", weight=3)
-BOUND = NoteKind("on a bound", weight=7)
+BOUNDS_REACHED = Against(
+    "bounds are reached",
+    "widen the bounds that are reached, or add a test that determines what lies on them",
+)
+MARGIN = NoteKind("on its margin", weight=17, against=BOUNDS_REACHED)
+BOUND = NoteKind("on a bound", weight=18, against=BOUNDS_REACHED)
 
 #: A modulus less certain than this (1 sigma, relative) anywhere is said to be undetermined.
 LARGEST_SIGMA = 0.25

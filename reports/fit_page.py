@@ -24,7 +24,8 @@ from ..materials.forms.base import COMPONENTS
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from ..runs.folder import AS_RUN, DIGITS, PROVENANCE, RESULT, Record, Store, write_table
-from ..runs.result import USABLE, Fit, answers, next_step, reaches
+from ..runs.result import Fit, answers
+from ..runs.verdict import LEAST_STRAIN, SPACE
 from .charts import Chart, Charts, dots, line, moduli_charts, pinned_charts, spans_a_decade
 from .content import Download, Exhibit, Facts, Listing, Part, Report, Section, Table, Words
 from .html import percent, write_report
@@ -193,10 +194,6 @@ WORDS: Mapping[str, str] = {
     "E2": "Young's modulus along the fill, E2",
     "G12": "Shear modulus between warp and fill, G12",
 }
-#: Between words that stay on one line.
-SPACE = "\u00a0"
-#: Strains that end below this one are none: no test reached them.
-LEAST_STRAIN = 1e-4
 
 
 def band_words(value: float, lower: float, upper: float) -> str:
@@ -248,27 +245,6 @@ def reached_table(fit: Fit) -> Table:
     )
     header = ["direction", "moduli fitted up to, %", "largest strain reached, %"]
     return Table("Where they end", header, rows, note)
-
-
-def verdict_words(fit: Fit) -> str:
-    """Return in one sentence where the moduli are usable, what is not known, and what is next."""
-    found = reaches(fit)
-    usable = [f"{n} {_span(r.usable, r.end)}" for n, r in found.items()]
-    unknown = [f"{n} {_span(r.unknown, r.end)}" for n, r in found.items() if r.unknown]
-    return (
-        f"Usable to within {percent(USABLE)} ({percent(LEVEL)} band): {', '.join(usable)}; "
-        f"not known: {', '.join(unknown) or 'nothing'}; next: {next_step(fit)}."
-    )
-
-
-def _span(span: tuple[float, float] | None, end: float) -> str:
-    """Return strains in words; end : of the fitted strains."""
-    if span is None:
-        return "nowhere"
-    if end < LEAST_STRAIN:
-        return "at any strain"
-    low, high = (f"{100 * v:.2g}{SPACE}%" for v in span)
-    return f"from {low} to {high}" if span[0] > 0.0 else f"up to {high}"
 
 
 def about_of(project: Project, record: Record | None) -> list[tuple[str, object]]:
@@ -351,7 +327,7 @@ def _page(fit: Fit, folder: Path) -> Report:
     header = ["modulus", "largest error", "from strain, %", "to strain, %"]
     return Report(
         title=fit.project.title,
-        summary=verdict_words(fit),
+        summary=fit.verdict.words,
         about=about_of(fit.project, fit.record),
         sections=[
             Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import SOLVER, InputError, Note, NoteKind, SolverFailure
+from ..errors import SOLVER, Against, InputError, Note, NoteKind, SolverFailure
 from ..experiments.kinds import Refinable, strains_of
 from ..inference.assessment import Certainty, certainty
 from ..inference.comparison import Blocks
@@ -41,7 +41,11 @@ from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .simulation import GivenCard, card_of, card_words
 from .starts import StartRecord
 
-MESH = NoteKind("mesh error", weight=16)
+MESH = NoteKind(
+    "mesh error",
+    weight=16,
+    against=Against("the error of the mesh is large", "fit on a finer mesh (more elements)"),
+)
 UNKNOWN = NoteKind("mesh error not known", weight=5)
 TAKEN_OUT = NoteKind("mesh error taken out")
 NOT_THE_CARD = NoteKind("not where the card is")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, as_note, check_one_of, rows
+from ..errors import Against, InputError, Note, NoteKind, as_note, check_one_of, rows
 from ..experiments.kinds import (
     BEYOND_LAW,
     WIDER,
@@ -39,10 +39,17 @@ from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
+from .verdict import FitVerdict, verdict_of
 
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
-NOT_CONVERGED = NoteKind("not converged", weight=9)
+NOT_CONVERGED = NoteKind(
+    "not converged",
+    weight=20,
+    against=Against(
+        "the fit has not converged", "raise fit.max_analyses and fit again", unusable=True
+    ),
+)
 #: Number of best starts of which the laws are drawn together.
 BEST = 5
 #: Tables of `Fit.write_table`.
@@ -167,6 +174,16 @@ class Fit(Reported):
     def notes(self) -> list[Note]:
         """Return what a reader must know before using the numbers."""
         return notes_of_fit(self, pinned_numbers(self))
+
+    @cached_property
+    def verdict(self) -> FitVerdict:
+        """Return whether the moduli are to be used, why not, and what is next."""
+        unknowns = self.problem.unknowns
+        moduli, lower, upper = unknowns.form.modulus_of, *unknowns.box
+        ends = zip(moduli, lower, upper, strict=True)
+        fitted = {name for name, low, high in ends if high > low}
+        names = [comparison.name for comparison in self.problem.comparisons]
+        return verdict_of(self.best, self.notes, names, fitted)
 
     @cached_property
     def pinned(self) -> dict[str, dict[str, Array]]:
@@ -380,64 +397,6 @@ def answers(best: BestFit, thickness: float) -> list[Answer]:
     return found
 
 
-#: Relative half width of the 95 % band up to which a modulus is to be used, and from which it is
-#: not known.
-USABLE, NOT_KNOWN = 0.2, 1.0
-#: Share of the strains below which a stretch of them is none.
-SHORT = 0.05
-#: Weight from which a note speaks against the moduli themselves.
-AGAINST = 10.0
-Span = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Reach:
-    """The longest stretches of strain, up to `end`, at which a modulus is usable or not known."""
-
-    usable: Span | None
-    unknown: Span | None
-    end: float
-
-
-def reaches(fit: Fit) -> dict[str, Reach]:
-    """Return where each modulus is usable, and where it is not known, by its 95 % band."""
-    found, sure = {}, fit.best.certainty
-    for name, component in COMPONENTS.items():
-        end = float(fit.best.valid[component])
-        if sure is None:
-            found[name] = Reach(None, (0.0, end), end)
-            continue
-        strain, (lower, upper) = sure.strain[name], sure.band[name]
-        value = fit.law.modulus(name, strain)
-        off = np.maximum(upper - value, value - lower) / value
-        usable, unknown = _longest(strain, off <= USABLE), _longest(strain, off >= NOT_KNOWN)
-        found[name] = Reach(usable, unknown, end)
-    return found
-
-
-def _longest(strain: Array, chosen: Array) -> Span | None:
-    """Return the ends of the longest run of chosen strains; None where it is hardly one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
-    runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
-    longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
-    return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
-
-
-def next_step(fit: Fit) -> str:
-    """Return what brings the fit furthest, in words that follow "next:"."""
-    if any(note.kind.weight >= AGAINST for note in fit.notes):
-        return "settle the first warning"
-    short = [
-        name for name, r in reaches(fit).items()
-        if r.usable is None or r.usable[0] > 0.0 or r.usable[1] < NEAR * r.end
-    ]  # fmt: skip
-    if "G12" in short and not any("bias" in c.name for c in fit.problem.comparisons):
-        return "add strips at 45 degrees (bias), which shear the fabric"
-    if short:
-        return f"rank the tests that narrow {', '.join(short)} (bubblefit plan)"
-    return "predict a test that was not fitted (bubblefit validate)"
-
-
 #: Columns before the correlations.
 COLUMNS = ("unknown", "unit", "value", "sigma", "lower_bound", "upper_bound")
 #: Relative 1 sigma beyond which a test says nothing about a modulus.
@@ -496,12 +455,7 @@ def result_of(fit: Fit) -> dict[str, Any]:
                 name: discrepancy.numbers for name, discrepancy in sure.discrepancy.items()
             },
         }  # fmt: skip
-    result["verdict"] = {
-        "within": USABLE, "next": next_step(fit),
-        "moduli": {
-            name: {"usable": r.usable, "not_known": r.unknown} for name, r in reaches(fit).items()
-        },
-    }  # fmt: skip
+    result["verdict"] = fit.verdict.numbers
     if fit.verdicts:
         result["unknowns"] = {verdict.name: verdict.numbers for verdict in fit.verdicts}
     result["provenance"] = PROVENANCE

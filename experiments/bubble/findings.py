@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...errors import Note, NoteKind, apart
+from ...errors import Against, Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import METRIC
 from ...readers.pressure_log import ClockOffset
@@ -17,8 +17,20 @@ from .registration import Registration
 from .section import DIRECTIONS
 
 INVERSE_CRIME = NoteKind("inverse crime", weight=4)
-SURFACES = NoteKind("unfaithful surfaces", weight=10)
-FLAT_SHEET = NoteKind("sheet taken for flat", weight=11)
+SURFACES = NoteKind(
+    "unfaithful surfaces",
+    weight=10,
+    against=Against("polynomial surfaces bias the moduli", "match the bubble by points"),
+)
+FLAT_SHEET = NoteKind(
+    "sheet taken for flat",
+    weight=19,
+    against=Against(
+        "the sheet of a real bubble is taken for flat, so that its moduli are not to be believed",
+        "take the measured surface of the sheet, or fit its modes ([bubble.sheet])",
+        unusable=True,
+    ),
+)
 NOT_BELIEVED = (
     "the moduli of this test are not to be believed: the sheet is taken for flat and taut in the "
     "reference picture, as a real one is not, which has moved E1 by a factor of up to eight; let "

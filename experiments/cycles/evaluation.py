@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...errors import InputError, Note, NoteKind
+from ...errors import Against, InputError, Note, NoteKind
 from ...files import pandas as pd
 from ...materials.forms.spline import Spline
 from ...materials.law import HypoelasticLaw, law_slopes
@@ -36,7 +36,12 @@ from ...readers.histories import (
 )
 from ..kinds import READING, Array
 
-SLIP, DRIFT = NoteKind("extensometer slip", 3.0), NoteKind("extensometer drift", 2.0)
+SLIP = NoteKind(
+    "extensometer slip",
+    weight=11.5,
+    against=Against("an extensometer slipped", "leave the cycles with slip out of the fit"),
+)
+DRIFT = NoteKind("extensometer drift", weight=2.0)
 GRIPS, CHANGING = NoteKind("strain between grips", 1.0), NoteKind("not conditioned", 1.0)
 #: Of a cycle's peak: the ends of the tangent stiffness.
 RANGE = (0.4, 0.9)

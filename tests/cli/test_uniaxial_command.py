@@ -9,10 +9,12 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import SOLVER, Note, foremost
+from bubblefit.cli.fits import warning_lines
+from bubblefit.errors import GRAVE, SOLVER, Note, gravest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
-from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
-from bubblefit.inference.assessment import BOUND, UNCERTAIN
+from bubblefit.experiments.cycles.evaluation import SLIP
+from bubblefit.experiments.kinds import DOUBTFUL, READING, UNSTABLE
+from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY
 from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.materials.card import MaterialCard, write_card
@@ -20,7 +22,7 @@ from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.runs.best import MESH, UNKNOWN
-from bubblefit.runs.result import ALONE, STARTS, answers
+from bubblefit.runs.result import ALONE, NOT_CONVERGED, STARTS, answers
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows
@@ -305,16 +307,25 @@ def test_moduli_are_told_up_to_where_they_are_fitted_with_sigma_and_band_of_the_
 
 
 def test_what_makes_moduli_wrong_is_said_before_what_makes_them_unsure():
-    wrong = [MESH, DISCREPANCY, UNSTABLE, ABOVE_NOISE, DOUBTFUL, FLAT_SHEET, SURFACES]
-    unsure = [BOUND, UNCERTAIN, UNKNOWN]
-    weights = [kind.weight for kind in (*wrong, *unsure, STARTS)]
+    wrong = [NOT_CONVERGED, FLAT_SHEET, BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE]
+    wrong += [DOUBTFUL, SURFACES]
+    assert all(kind.weight >= GRAVE and kind.against is not None for kind in wrong)
+    weights = [kind.weight for kind in (*wrong, UNCERTAIN, UNKNOWN, STARTS)]
     assert weights == sorted(weights, reverse=True)
     notes = [Note(STARTS, "one"), Note(UNKNOWN, "two"), Note(DISCREPANCY, "three")]
     for order in permutations(notes):
-        assert foremost(order) == "three"
-    assert foremost([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == "it"
-    assert foremost([Note(MESH, "first"), Note(MESH, "second")]) == "first"
-    assert foremost([]) is None
+        assert gravest(order) == ["three"]
+    assert gravest([Note(SOLVER, "none of these"), Note(ALONE, "it")]) == ["it"]
+    assert gravest([Note(UNSTABLE, "3"), Note(MESH, "1"), Note(MESH, "2")]) == ["1", "2", "3"]
+    assert gravest([]) == []
+
+
+def test_every_grave_note_is_printed_and_the_others_are_counted(tmp_path):
+    notes = [Note(STARTS, "one"), Note(UNSTABLE, "it would not stay"), Note(READING, "column c")]
+    notes += [Note(SLIP, "a negative loop"), Note(UNKNOWN, "two")]
+    *printed, counted = warning_lines(notes, tmp_path)
+    assert printed == ["warning: it would not stay", "warning: a negative loop", "note: column c"]
+    assert counted.startswith("2 further notes: ")
 
 
 LAST = DesignersConstants(800.0, 640.0, 0.4, 0.5)

@@ -8,9 +8,8 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import Note, NoteKind, foremost, marks, rows
+from bubblefit.errors import Note, NoteKind, gravest, marks, rows
 from bubblefit.experiments.cylinder import report as cylinders
-from bubblefit.experiments.kinds import UNSTABLE
 from bubblefit.experiments.strips import report as strips_report
 from bubblefit.inference.assessment import certainty
 from bubblefit.inference.unknowns import LawBounds
@@ -26,7 +25,7 @@ from bubblefit.runs.best import MESH
 from bubblefit.runs.check import expected_of
 from bubblefit.runs.folder import versions
 from bubblefit.runs.predictions import predict
-from bubblefit.runs.result import COMPARED, TABLES, next_step, reaches
+from bubblefit.runs.result import COMPARED, TABLES
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers import registry
 
@@ -181,40 +180,6 @@ def test_the_answer_in_words(together, written, tmp_path):
     inside.write_text(card.text)
     assert card.file == "material.toml"
     assert bf.read_card(inside).law.beta == pytest.approx(fit.law.beta)
-
-
-@pytest.mark.parametrize(
-    ("off", "usable", "unknown", "said"),
-    [
-        (lambda x: 0.1 + 0 * x, (0.0, 0.1), None, "E1 up to 10\u00a0%"),
-        (lambda x: 11 * x, (0.0, 0.018), (0.091, 0.1), "E1 from 9.1\u00a0% to 10\u00a0%"),
-        (lambda x: 2.0 - 19 * x, (0.095, 0.1), (0.0, 0.052), "E1 up to 5.2\u00a0%"),
-        # A crossing is no stretch of strains.
-        (lambda x: abs(x - 0.049) * 50 + 0.1, None, (0.067, 0.1), "E1 nowhere"),
-    ],
-)  # fmt: skip
-def test_where_a_modulus_is_usable(off, usable, unknown, said):
-    strain = np.linspace(0, 0.1, 101)
-    names, law = ("E1", "E2", "G12"), HypoelasticLaw.linear(600.0, 120.0, 15.0)
-    band = {n: law.modulus(n, strain) * np.array([1 - off(strain), 1 + off(strain)]) for n in names}
-    sure = SimpleNamespace(strain=dict.fromkeys(names, strain), band=band)
-    best = SimpleNamespace(valid=np.full(3, 0.1), certainty=sure)
-    fit = SimpleNamespace(law=law, best=best, notes=[])
-    fit.problem = SimpleNamespace(comparisons=[SimpleNamespace(name="bubble")])
-    found = reaches(fit)["E1"]
-    assert found.usable == (usable and pytest.approx(usable, abs=6e-4))
-    assert found.unknown == (unknown and pytest.approx(unknown, abs=1.1e-3))
-    assert said in page.verdict_words(fit)
-    steps = [next_step(fit)]
-    for name in ("strips: bias", "bubble"):
-        fit.problem = SimpleNamespace(comparisons=[SimpleNamespace(name=name)])
-        steps.append(next_step(fit))
-        fit.notes = [Note(UNSTABLE, "u")]
-    whole = usable == (0.0, 0.1)
-    assert [("bias" in s, "plan" in s, "validate" in s, "first" in s) for s in steps] == [
-        (not whole, False, whole, False), (False, not whole, whole, False),
-        (False, False, False, True),
-    ]  # fmt: skip
 
 
 def test_what_is_determined_in_closed_form(together, written):
@@ -432,5 +397,5 @@ def test_kinds_of_notes_are_no_closed_list():
     note = pickle.loads(pickle.dumps(Note(kind, "the load fell by 3 %", "a strip")))
     assert note.kind is kind and kind == "creep" and kind.mark == 0
     assert rows([note]) == [{"of": "a strip", "kind": "creep", "note": "the load fell by 3 %"}]
-    assert foremost([note, Note(MESH, "m")]) == "m" and marks([note]) == []
+    assert gravest([note, Note(MESH, "m")]) == ["m"] and marks([note]) == []
     raised(ValueError, "named by words", NoteKind, " ")

@@ -1,0 +1,206 @@
+"""The verdict of a fit: whether its moduli are to be used, up to which strains, what is next."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import Against, Note, percent
+from ..inference.posterior import LEVEL
+from ..materials.forms.base import COMPONENTS, SHEAR, Array
+from .best import BestFit
+
+State = Literal["usable", "usable within limits", "not to be used"]
+Span = tuple[float, float]
+
+#: Relative half width of the 95 % band up to which a modulus is usable, and from which it is not
+#: known.
+USABLE, NOT_KNOWN = 0.2, 1.0
+#: Share of the strains below which a stretch of them is too short to count.
+SHORT = 0.05
+#: Share of the end of the strains up to which a modulus must be usable, for no more to be asked.
+NEAR_END = 0.95
+#: Strains that end below this one were not reached by any test.
+LEAST_STRAIN = 1e-4
+#: Between words that stay on one line.
+SPACE = "\u00a0"
+
+NO_CERTAINTY = Against(
+    "the solver gives no derivatives, so that the uncertainty is not known",
+    "fit with a solver that differentiates (bubblefit doctor lists them)",
+)
+NOTHING_USABLE = f"no modulus is known to within {percent(USABLE)} at any strain"
+
+
+@dataclass(frozen=True)
+class UsableRange:
+    """The longest stretches of strain, up to `end`, at which a modulus is usable or not known."""
+
+    usable: Span | None
+    unknown: Span | None
+    end: float
+
+    @property
+    def is_reached(self) -> bool:
+        """Return whether a test strained the fabric so that this modulus acts."""
+        return self.end >= LEAST_STRAIN
+
+    @property
+    def is_short(self) -> bool:
+        """Return whether it is not usable over all its strains."""
+        if self.usable is None:
+            return True
+        return self.usable[0] > 0.0 or self.usable[1] < NEAR_END * self.end
+
+
+@dataclass(frozen=True)
+class FitVerdict:
+    """The verdict of a fit, as terminal, page and result.json show it.
+
+    Attributes
+    ----------
+    state : str
+    reasons : tuple of str
+        What speaks against the moduli, the gravest first.
+    moduli : dict of UsableRange
+        By modulus.
+    next_step : str
+        What brings the fit furthest, in words that follow "next:".
+    """
+
+    state: State
+    reasons: tuple[str, ...]
+    moduli: Mapping[str, UsableRange]
+    next_step: str
+
+    @property
+    def words(self) -> str:
+        """Return the verdict in one sentence."""
+        reasons = "; ".join(self.reasons)
+        if self.state == "not to be used":
+            return f"Not to be used: {reasons}; next: {self.next_step}."
+        usable = [f"{name} {span_words(r.usable, r.end)}" for name, r in self.moduli.items()]
+        unknown = [
+            f"{name} {span_words(r.unknown, r.end)}" for name, r in self.moduli.items() if r.unknown
+        ]
+        within = f"to within {percent(USABLE)} ({percent(LEVEL)} band)"
+        begin = f"Usable {within}: "
+        if self.reasons:
+            begin = f"Usable within limits ({reasons}), {within}: "
+        return (
+            f"{begin}{', '.join(usable)}; not known: {', '.join(unknown) or 'nothing'}; "
+            f"next: {self.next_step}."
+        )
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Return the verdict as it is written to `result.json`."""
+        return {
+            "state": self.state,
+            "reasons": list(self.reasons),
+            "within": USABLE,
+            "next": self.next_step,
+            "moduli": {
+                name: {"usable": r.usable, "not_known": r.unknown}
+                for name, r in self.moduli.items()
+            },
+        }
+
+
+def verdict_of(
+    best: BestFit, notes: Sequence[Note], comparisons: Collection[str], fitted: Collection[str]
+) -> FitVerdict:
+    """Judge a fit by its bands and by the notes that speak against its moduli.
+
+    Parameters
+    ----------
+    best : BestFit
+    notes : sequence of Note
+        All notes of the fit.
+    comparisons : collection of str
+        Names of what was compared; a 45 degree strip has "bias" in its name.
+    fitted : collection of str
+        Moduli of which a number is fitted.
+
+    Returns
+    -------
+    FitVerdict
+    """
+    against = reasons_against(notes)
+    if best.certainty is None:
+        against.append(NO_CERTAINTY)
+    moduli = usable_ranges(best)
+    reasons = [reason.words for reason in against]
+    state: State = "usable within limits" if against else "usable"
+    if any(reason.unusable for reason in against):
+        state = "not to be used"
+    elif best.certainty is not None and not any(r.usable for r in moduli.values()):
+        state = "not to be used"
+        reasons.append(NOTHING_USABLE)
+    elif any(r.is_short for name, r in moduli.items() if r.is_reached and name in fitted):
+        state = "usable within limits"
+    step = against[0].advice if against else _further_test(moduli, comparisons, fitted)
+    return FitVerdict(state, tuple(reasons), moduli, step)
+
+
+def reasons_against(notes: Sequence[Note]) -> list[Against]:
+    """Return what notes say against the moduli, what makes a fit unusable first, each once."""
+    by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
+    against = dict.fromkeys(kind.against for kind in by_weight if kind.against is not None)
+    return sorted(against, key=lambda reason: not reason.unusable)
+
+
+def _further_test(
+    moduli: Mapping[str, UsableRange], comparisons: Collection[str], fitted: Collection[str]
+) -> str:
+    """Return the test to make next of a fit that nothing speaks against."""
+    # A strap, or strips along one yarn only, say nothing of a fabric's shear, nor are they to.
+    has_both_yarns = all(r.is_reached for name, r in moduli.items() if name != SHEAR)
+    short = [
+        name
+        for name, r in moduli.items()
+        if name in fitted and r.is_short and (r.is_reached or (name == SHEAR and has_both_yarns))
+    ]
+    if SHEAR in short and not any("bias" in name for name in comparisons):
+        return "add strips at 45 degrees (bias), which shear the fabric"
+    if short:
+        return f"rank the tests that narrow {', '.join(short)} (bubblefit plan)"
+    return "predict a test that was not fitted (bubblefit validate)"
+
+
+def usable_ranges(best: BestFit) -> dict[str, UsableRange]:
+    """Return where each modulus is usable, and where it is not known, by its 95 % band."""
+    ranges, sure = {}, best.certainty
+    for name, component in COMPONENTS.items():
+        end = float(best.valid[component])
+        if sure is None:
+            ranges[name] = UsableRange(None, (0.0, end), end)
+            continue
+        strain, (lower, upper) = sure.strain[name], sure.band[name]
+        value = best.law.modulus(name, strain)
+        off = np.maximum(upper - value, value - lower) / value
+        usable = _longest(strain, off <= USABLE)
+        unknown = _longest(strain, off >= NOT_KNOWN)
+        ranges[name] = UsableRange(usable, unknown, end)
+    return ranges
+
+
+def _longest(strain: Array, chosen: Array) -> Span | None:
+    """Return the ends of the longest run of chosen strains; None where it is too short."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    runs = [(float(strain[a]), float(strain[b - 1])) for a, b in edges.reshape(-1, 2)]
+    longest = max(runs, key=lambda run: run[1] - run[0], default=(0.0, 0.0))
+    return longest if longest[1] - longest[0] > SHORT * strain[-1] else None
+
+
+def span_words(span: Span | None, end: float) -> str:
+    """Return strains in words; end : of the fitted strains."""
+    if span is None:
+        return "nowhere"
+    if end < LEAST_STRAIN:
+        return "at any strain"
+    low, high = (f"{100 * v:.2g}{SPACE}%" for v in span)
+    return f"from {low} to {high}" if span[0] > 0.0 else f"up to {high}"

@@ -1,0 +1,108 @@
+"""The verdict of a fit: its state, the reasons in their order, what is usable, what is next."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from bubblefit.errors import Note
+from bubblefit.experiments.bubble.findings import FLAT_SHEET
+from bubblefit.experiments.cycles.evaluation import SLIP
+from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
+from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
+from bubblefit.inference.discrepancy import DISCREPANCY
+from bubblefit.inference.noise import ABOVE_NOISE
+from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.runs.best import MESH
+from bubblefit.runs.result import NOT_CONVERGED
+from bubblefit.runs.verdict import usable_ranges, verdict_of
+
+ALL = frozenset(COMPONENTS)
+GOOD = dict.fromkeys(COMPONENTS, 0.1)
+
+
+def best_with(half_widths, ends=(0.1, 0.1, 0.1)):
+    """A best fit whose bands are so wide: a number, or a function of the strain, by modulus."""
+    law = HypoelasticLaw.linear(600.0, 120.0, 15.0)
+    strains, bands = {}, {}
+    for name, component in COMPONENTS.items():
+        strains[name] = np.linspace(0, ends[component], 101)
+        off = half_widths[name]
+        off = off(strains[name]) if callable(off) else off + 0 * strains[name]
+        bands[name] = law.modulus(name, strains[name]) * np.array([1 - off, 1 + off])
+    sure = SimpleNamespace(strain=strains, band=bands)
+    return SimpleNamespace(valid=np.array(ends), certainty=sure, law=law)
+
+
+def judge(half_widths=GOOD, kinds=(), comparisons=("bubble",), fitted=ALL, ends=(0.1, 0.1, 0.1)):
+    notes = [Note(kind, "words") for kind in kinds]
+    return verdict_of(best_with(half_widths, ends), notes, comparisons, fitted)
+
+
+@pytest.mark.parametrize(
+    ("off", "usable", "unknown", "words"),
+    [
+        (lambda x: 0.1 + 0 * x, (0.0, 0.1), None, "E1 up to 10\u00a0%"),
+        (lambda x: 11 * x, (0.0, 0.018), (0.091, 0.1), "E1 from 9.1\u00a0% to 10\u00a0%"),
+        (lambda x: 2.0 - 19 * x, (0.095, 0.1), (0.0, 0.052), "E1 up to 5.2\u00a0%"),
+        # A crossing is no stretch of strains.
+        (lambda x: abs(x - 0.049) * 50 + 0.1, None, (0.067, 0.1), "E1 nowhere"),
+    ],
+)
+def test_where_a_modulus_is_usable(off, usable, unknown, words):
+    half_widths = {**GOOD, "E1": off}
+    found = usable_ranges(best_with(half_widths))["E1"]
+    assert found.usable == (usable and pytest.approx(usable, abs=6e-4))
+    assert found.unknown == (unknown and pytest.approx(unknown, abs=1.1e-3))
+    verdict = judge(half_widths)
+    assert words in verdict.words and not verdict.reasons
+    assert (verdict.state == "usable") == (usable == (0.0, 0.1))
+
+
+def test_reasons_come_in_their_order_and_make_a_fit_unusable():
+    limits = [BOUND, MARGIN, MESH, DISCREPANCY, ABOVE_NOISE, UNSTABLE, DOUBTFUL, SLIP]
+    verdict = judge(kinds=[*reversed(limits), UNCERTAIN])
+    # Two kinds of bounds are one reason.
+    expected = [kind.against.words for kind in limits if kind is not MARGIN]
+    assert list(verdict.reasons) == expected and verdict.state == "usable within limits"
+    assert verdict.words.startswith("Usable within limits (bounds are reached; the error of the ")
+    assert "), to within 20 % (95 % band): E1 up to 10" in verdict.words
+    assert verdict.next_step == BOUND.against.advice
+
+    worst = judge(kinds=[BOUND, FLAT_SHEET, NOT_CONVERGED])
+    assert worst.state == "not to be used"
+    assert worst.words == (
+        "Not to be used: the fit has not converged; the sheet of a real bubble is taken for flat, "
+        "so that its moduli are not to be believed; bounds are reached; next: raise "
+        "fit.max_analyses and fit again."
+    )
+    assert worst.numbers["state"] == worst.state and worst.numbers["within"] == 0.2
+    assert worst.numbers["reasons"] == list(worst.reasons)
+
+
+def test_moduli_that_are_known_nowhere_are_not_to_be_used():
+    verdict = judge(dict.fromkeys(COMPONENTS, 0.5))
+    assert verdict.state == "not to be used"
+    assert "no modulus is known to within 20 % at any strain" in verdict.words
+    unknown = SimpleNamespace(valid=np.full(3, 0.1), certainty=None)
+    verdict = verdict_of(unknown, [], ("bubble",), ALL)
+    assert verdict.state == "usable within limits" and "no derivatives" in verdict.words
+    assert "differentiates" in verdict.next_step
+
+
+@pytest.mark.parametrize(
+    ("half_widths", "comparisons", "fitted", "ends", "step"),
+    [
+        (GOOD, ["bubble"], ALL, (0.1, 0.1, 0.1), "bubblefit validate"),
+        ({**GOOD, "G12": 0.5}, ["bubble"], ALL, (0.1, 0.1, 0.1), "45 degrees"),
+        ({**GOOD, "G12": 0.5}, ["warp", "fill"], ALL, (0.1, 0.1, 1e-6), "45 degrees"),
+        ({**GOOD, "G12": 0.5}, ["strips: bias"], ALL, (0.1, 0.1, 0.1), "narrow G12 (bubblefit"),
+        # A law whose shear is given, and a strap, of which no test strains the fill.
+        ({**GOOD, "G12": 0.5}, ["bubble"], {"E1", "E2"}, (0.1, 0.1, 0.1), "bubblefit validate"),
+        ({"E1": 0.1, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "bubblefit validate"),
+        ({"E1": 0.5, "E2": 9, "G12": 9}, ["strap"], ALL, (0.1, 1e-6, 1e-6), "narrow E1 (bubblefit"),
+    ],
+)
+def test_the_next_step_fits_the_project(half_widths, comparisons, fitted, ends, step):
+    verdict = judge(half_widths, (), comparisons, fitted, ends)
+    assert step in verdict.next_step
