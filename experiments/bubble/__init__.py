@@ -16,9 +16,10 @@ class BubbleKind:
     predicted = None
     studied = STUDIED
     doubts = (
-        "frame-numbers", "length-unit", "zero-points", "outliers", "z-flipped", "frame-order",
-        "repeated-frame", "deformed-coordinates", "axis-flipped", "radius", "pressure-unit",
-        "flat-sheet", "camera-frame", "off-centre", "tilted", "turned", "swapped",
+        "frame-numbers", "exchanged", "length-unit", "zero-points", "outliers", "z-flipped",
+        "frame-order", "repeated-frame", "deformed-coordinates", "radius", "axis-flipped",
+        "strain-rise", "pressure-unit", "height-flipped", "flat-sheet", "camera-frame",
+        "off-centre", "tilted", "turned", "swapped",
     )  # fmt: skip
     read = staticmethod(read)
     prepare = staticmethod(prepare)

@@ -16,6 +16,14 @@ from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
 from ..kinds import Array, Doubt, Expected
 from . import registration
+from .column_consistency import (
+    CentreMotion,
+    ConsistencyLimits,
+    centre_motion,
+    flattened_share,
+    spreads,
+    strain_of_rise,
+)
 from .registration import MAD
 from .sheet import fit_disk_polynomial
 
@@ -29,8 +37,7 @@ SAME_STATE, USUAL, JUDGED = 0.1, 0.2, 0.02
 FOLLOWS, MOST_FOLLOWED, LIKE = 0.5, 2.0, 0.9
 #: Of the median motion between two frames: places this close are one; of the points, most of them.
 CLOSE, MOST = 0.05, 0.5
-#: Of the larger strain at the apex: the other one is not as negative as this under pressure.
-NEGATIVE = -0.25
+LIMITS = ConsistencyLimits()
 ADVICE = "let a registration find the frame ([bubble.data.points.registration])"
 #: Of the radius: a centre, or a sheet's height, further off is no small thing.
 OFF, FAR_OFF, HIGH = 0.035, 0.15, 0.1
@@ -151,6 +158,14 @@ class View:
             return tuple(apex_of(field, self.outline.minor) for field in self.fields)
         except (InputError, np.linalg.LinAlgError):
             return ()
+
+    @cached_property
+    def centre_motions(self) -> tuple[CentreMotion | None, ...]:
+        """Return the motion about the centre in the first and the last frame."""
+        return tuple(
+            centre_motion(f, self.outline, LIMITS)
+            for f in self.fields[:: max(1, len(self.fields) - 1)]
+        )
 
     @property
     def surfaces(self) -> list[tuple[Array, Array]]:
@@ -358,18 +373,83 @@ def _follows(place: Array, moved: Array) -> float:
     return float((a * b).sum() / (b**2).sum())
 
 
-def mirrored(view: View, expected: Expected) -> Iterator[Doubt]:
-    """Doubt x or y flipped in places or in displacements, not in both."""
-    strain = np.array(view.apexes[-1].strain if view.apexes else [])
-    if len(strain) and not strain.max() > 0:
-        text = f"the sheet shrinks at its centre (strains {strain[0]:.3g}, {strain[1]:.3g})"
-        yield Doubt("axis-flipped", True, f"{text}: x, y, dx and dy do not go together")
+def places_exchanged(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt places of which z is not the height: the points spread more along it than across."""
+    spread, within = spreads(view.fields)
+    if np.isfinite(within) and spread[2] > within:
+        flat = "xyz"[int(np.argmin(spread))]
+        text = (
+            f"the points spread by {spread[0]:.3g}, {spread[1]:.3g} and {spread[2]:.3g} mm along "
+            f"x, y and z (standard deviations), and a sheet is flat along z: exchange {flat} and z "
+            "of the places"
+        )
+        yield Doubt("exchanged", True, text)
+
+
+def rise_exchanged(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt displacements of which dz is not the rise: dx or dy has the dome."""
+    motion = view.centre_motions[-1]
+    if motion is None:
         return
-    for name, own in zip("xy", strain, strict=False):
-        if own < NEGATIVE * strain.max():
-            text = f"the centre is strained by {strain[0]:.3g} along x and {strain[1]:.3g} along y"
-            text += f": {name} and d{name} have opposite senses; flip one of them"
-            yield Doubt("axis-flipped", True, text)
+    dx, dy, dz = np.abs(motion.dome)
+    highest = max(dx, dy)
+    if highest < LIMITS.visible_dome * view.outline.radius or dz > LIMITS.dome_share * highest:
+        return
+    name = "dx" if dx > dy else "dy"
+    text = (
+        f"{name} is a dome of {highest:.3g} mm over the disk at {view.top} kPa and dz of "
+        f"{dz:.2g} mm, but the sheet rises along z: exchange {name} and dz, or the same two of x, "
+        "y and z"
+    )
+    yield Doubt("exchanged", True, text)
+
+
+def strain_and_rise(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt dx and dy that do not go with x and y, or not with the rise."""
+    first, last = view.centre_motions[0], view.centre_motions[-1]
+    if last is None:
+        return
+    comparison = strain_of_rise(first if len(view.fields) > 1 else None, last, view.outline, LIMITS)
+    if not comparison.judged or not comparison.outside(LIMITS.unusual):
+        return
+    least, most = comparison.principal
+    rise, lower = comparison.rise
+    due = " to ".join(dict.fromkeys(f"{strain:.2g}" for strain in comparison.due))
+    rises = f"a rise of {rise:.3g} mm" if not lower else f"a rise from {lower:.3g} to {rise:.3g} mm"
+    text = (
+        f"the centre is strained by {least:.2g} and {most:.2g} (principal strains, of dx and dy), "
+        f"and {rises} calls for about {due}"
+    )
+    sure = comparison.outside(LIMITS.sure)
+    name, remedy = _remedy(comparison.assignment) if sure else ("strain-rise", "")
+    if not remedy:
+        remedy = "are dx, dy and dz all there and in one unit, and is the radius right?"
+    yield Doubt(name, sure, f"{text}: {remedy}")
+
+
+def _remedy(assignment: tuple[tuple[int, int], tuple[int, int]]) -> tuple[str, str]:
+    """Return the name of a doubt and what to do so that dx grows with x, dy with y."""
+    (x_sign, x_column), (y_sign, _) = assignment
+    if x_column == 1:
+        minus_x, minus_y = ("minus " if sign < 0 else "" for sign in (x_sign, y_sign))
+        text = f"dx and dy are exchanged; take {minus_x}dy for dx and {minus_y}dx for dy"
+        return "exchanged", f"{text}, or exchange x and y in the same way"
+    if x_sign > 0 and y_sign > 0:
+        return "strain-rise", ""
+    wrong = [name for name, sign in (("x", x_sign), ("y", y_sign)) if sign < 0]
+    senses = " and ".join(f"{name} and d{name} have opposite senses" for name in wrong)
+    return "axis-flipped", f"{senses}; flip one of them"
+
+
+def height_flipped(view: View, expected: Expected) -> Iterator[Doubt]:
+    """Doubt heights z of the first shape that the rise adds to: pressure pulls a sheet flat."""
+    slope = flattened_share(view.last, view.outline, LIMITS)
+    if slope is not None and slope > LIMITS.height_slope:
+        text = (
+            f"dz follows the bumps of the heights z by {slope:+.0%} at {view.top} kPa, and a sheet "
+            "that is pulled flat has -100%: change the sign of z"
+        )
+        yield Doubt("height-flipped", False, text)
 
 
 def camera_height(view: View, expected: Expected) -> Iterator[Doubt]:
@@ -552,9 +632,9 @@ def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.
 CHECKS = (
-    length_unit, rejected_at_zero, outliers, upside_down, order, repeated, same_states,
-    deformed_coordinates, mirrored, clamped_elsewhere, pressure_unit, first_shape, camera_height,
-    off_centre, tilted, turned, swapped,
+    places_exchanged, rise_exchanged, length_unit, rejected_at_zero, outliers, upside_down, order,
+    repeated, same_states, deformed_coordinates, clamped_elsewhere, strain_and_rise, pressure_unit,
+    height_flipped, first_shape, camera_height, off_centre, tilted, turned, swapped,
 )  # fmt: skip
 
 

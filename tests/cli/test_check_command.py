@@ -41,6 +41,9 @@ def folder(tmp_path_factory):
     text, _ = camera_project(place, lambda x, u: (x, u))
     (place / "project.toml").write_text(text)
     (place / "flipped.toml").write_text(text.replace('y = "y"', 'y = "minus_y"'))
+    (place / "exchanged.toml").write_text(
+        text.replace('dx = "dx", dy = "dy"', 'dx = "dy", dy = "dx"')
+    )
     for frame in place.glob("frame_*.csv"):
         table = np.loadtxt(frame, delimiter=",", skiprows=1)
         wide = np.column_stack([table, -table[:, 1]])
@@ -57,6 +60,22 @@ def test_good_data_are_said_to_be_fine(folder, golden):
     assert (out / "registration.png").is_file() and (out / "rises.png").is_file()
     said = complaint(check, bf.read_project(folder / "project.toml"), None, ["weather"])
     assert "fit.trust" in said and "weather" in said and "z-flipped" in said
+
+
+def test_a_fit_of_exchanged_displacements_does_not_begin(folder):
+    done = in_process("bubble", "exchanged.toml", "--starts", 1, "--out", "no", cwd=folder, code=2)
+    one_line(done, "the centre is strained by", "calls for about", "take dy for dx and dx for dy")
+    assert "[exchanged]" in done.stderr and not (folder / "no").exists()
+
+
+def test_a_shape_out_of_equilibrium_is_a_warning_of_check(folder):
+    """The shape of which y is flipped is no equilibrium of any law."""
+    run = ("check", "flipped.toml", "--trust", "axis-flipped", "--out", "gap")
+    said = " ".join(in_process(*run, cwd=folder).stdout.split())
+    assert "bubble: warning: no law within the bounds keeps the measured shape in eq" in said
+    assert "nothing doubtful" not in said
+    page = (folder / "gap" / "report.html").read_text()
+    assert "carry 2 of the doubts below" in page
 
 
 LAB = f"""

@@ -1,0 +1,159 @@
+"""All 48 signed permutations of x, y, z and of dx, dy, dz: each is refused or doubted."""
+
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from bubblefit.errors import InputError
+from bubblefit.experiments.bubble.column_consistency import ConsistencyLimits, strain_of_rise
+from bubblefit.experiments.bubble.doubts import View, doubts_of
+from bubblefit.experiments.bubble.registration import RegistrationOptions, register_fields
+from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.meshes.bubble_model import BubbleModel
+from bubblefit.meshes.disk import elliptic_disk_mesh
+from bubblefit.project.project import read_project
+from bubblefit.readers.fields import DisplacementField
+from bubblefit.runs.check import expected_of
+from bubblefit.runs.setup import prepare_fit
+from bubblefit.solvers.membrane.solver import MembraneSolver
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial.transform import Rotation
+
+from ...needs import measured_data
+from ...places import ROOT
+from .test_bubble_doubts import CIRCLE, FABRIC, THICKNESS, points_on
+
+LAW = HypoelasticLaw.linear(700.0, 220.0, 15.0)
+PRESSURES = (0.01, 0.1, 0.3)
+#: mm, of every coordinate and displacement.
+NOISE = 0.03
+PERMUTATIONS = [
+    (columns, signs) for columns in permutations(range(3)) for signs in product((1, -1), repeat=3)
+]
+IDENTITY = ((0, 1, 2), (1, 1, 1))
+#: z of the places with the other sign: a sheet that is flat and taut is the same then, so that
+#: nothing can tell and nothing is wrong. All other 47 of each triple change the experiment. Those
+#: of x and y that a rotation of the sheet undoes do so only together with dx and dy.
+Z_REVERSED = ((0, 1, 2), (1, 1, -1))
+
+
+def bumps(points):
+    """Heights (n,) mm of a first shape that is neither plane nor symmetric."""
+    x, y = points.T / 100.0
+    return 3.0 * (1 - x**2 - y**2) * (x * (1 - 3 * y**2) + 0.5 * y - 0.3)
+
+
+def measured(height, cut=-70.0):
+    """Fields with noise on points of which those beyond a line are lost (mm from the centre)."""
+    mesh = elliptic_disk_mesh(CIRCLE, 300, "full")
+    flat = mesh.points[:, :2].copy()
+    mesh.points[:, 2] = height(flat)
+    history = MembraneSolver().run(BubbleModel(mesh, THICKNESS, PRESSURES), LAW)
+    points = points_on(CIRCLE)
+    points = points[points @ (0.9, 0.3) > cut]
+    random = np.random.default_rng(3)
+    fields = []
+    for pressure, displacement in zip(PRESSURES, history.displacement, strict=True):
+        values = CloughTocher2DInterpolator(flat, displacement)(points)
+        values += NOISE * random.standard_normal(values.shape)
+        z = height(points) + NOISE * random.standard_normal(len(points))
+        fields.append(DisplacementField(pressure, points, values, z=z))
+    return tuple(fields)
+
+
+@pytest.fixture(scope="module")
+def sheets():
+    return {"flat": measured(lambda points: np.zeros(len(points))), "bumps": measured(bumps)}
+
+
+@pytest.fixture(scope="module")
+def whole_sheet():
+    return measured(lambda points: np.zeros(len(points)), cut=-200.0)
+
+
+def permuted(values, permutation):
+    columns, signs = permutation
+    return values[:, columns] * signs
+
+
+def with_places(field, permutation):
+    places = permuted(field.frame.points, permutation)
+    return replace(field, points=places[:, :2].copy(), z=places[:, 2].copy())
+
+
+def with_displacements(field, permutation):
+    return replace(field, displacement=permuted(field.displacement, permutation))
+
+
+def seen_by(camera, field):
+    places = camera.apply(field.frame.points)
+    displacement = camera.apply(field.displacement)
+    return replace(
+        field, points=places[:, :2].copy(), z=places[:, 2].copy(), displacement=displacement
+    )
+
+
+def doubts_about(fields):
+    flat = np.ptp(fields[0].z) < 1.0
+    return doubts_of(View(tuple(fields), CIRCLE, THICKNESS, False, flat), FABRIC)
+
+
+@pytest.mark.parametrize("sheet", ["flat", "bumps"])
+def test_columns_in_their_places_raise_no_doubt(sheets, sheet):
+    assert not doubts_about(sheets[sheet])
+
+
+def expected_name(permutation, change, sheet):
+    columns, (first, second, third) = permutation
+    if columns[2] != 2:
+        return "exchanged"
+    if change is with_displacements and third < 0:
+        return "z-flipped"
+    if columns[0] != 0:
+        return "exchanged"
+    if first < 0 or second < 0:
+        return "axis-flipped"
+    return "height-flipped" if third < 0 and sheet == "bumps" else None
+
+
+@pytest.mark.parametrize("permutation", PERMUTATIONS, ids=str)
+@pytest.mark.parametrize("sheet", ["flat", "bumps"])
+@pytest.mark.parametrize("change", [with_places, with_displacements])
+def test_every_other_permutation_is_refused_or_doubted(sheets, sheet, change, permutation):
+    doubts = doubts_about([change(field, permutation) for field in sheets[sheet]])
+    name = expected_name(permutation, change, sheet)
+    if name is None:
+        assert permutation == IDENTITY or (permutation, change) == (Z_REVERSED, with_places)
+        assert not doubts
+    else:
+        (doubt,) = doubts
+        assert doubt.name == name and doubt.sure == (name != "height-flipped")
+
+
+@pytest.mark.parametrize("permutation", PERMUTATIONS, ids=str)
+def test_a_registration_hides_no_permutation(whole_sheet, permutation):
+    """With dz alone of the other sign the sheet is its mirror image, tilted the other way."""
+    camera = Rotation.from_euler("zx", (20.0, 3.0), degrees=True)
+    seen = [with_displacements(seen_by(camera, field), permutation) for field in whole_sheet]
+    try:
+        fields, _ = register_fields(seen, CIRCLE, RegistrationOptions(warp=20.0))
+    except InputError as error:
+        assert error.field == "centre" and permutation[0][2] != 2
+        return
+    doubts = doubts_of(View(tuple(fields), CIRCLE, THICKNESS, True, True), FABRIC)
+    assert bool(doubts) == (permutation != IDENTITY)
+    assert any(doubt.sure for doubt in doubts) == (permutation not in (IDENTITY, Z_REVERSED))
+
+
+@pytest.mark.parametrize(("number", "names"), [(1, []), (2, ["tilted", "turned"]), (3, [])])
+def test_measured_bubbles_raise_no_new_doubt(number, names):
+    """Their sheets were slack and not flat: strains are 0.96 to 1.4 times what the rises ask."""
+    path = ROOT / "examples" / "bubble-valmex7318" / f"test{number}-linear.toml"
+    project = read_project(path, measured_data() / "bubble")
+    setup = prepare_fit(project, project.chosen(None, fitted=True))
+    view = setup.tests[0].view
+    assert [doubt.name for doubt in setup.tests[0].doubts(expected_of(setup))] == names
+    first, last = view.centre_motions
+    smaller, larger = strain_of_rise(first, last, CIRCLE, ConsistencyLimits()).ratios
+    assert 0.9 < smaller < larger < 1.5
