@@ -65,7 +65,8 @@ class CardCertainty:
         if name in self.bands:
             strains, *ends = self.bands[name]
             return band_at(strains, ends, strain, law.modulus(name, strain))
-        modulus, off = law.modulus(name, strain), BAND * self.sigma(law, name, strain)
+        modulus = law.modulus(name, strain)
+        off = BAND * self.sigma(law, name, strain)
         return np.maximum(modulus - off, 0.0), modulus + off
 
     def shifted(self, law: HypoelasticLaw, along: ArrayLike) -> HypoelasticLaw:
@@ -100,12 +101,15 @@ def band_at(
 
 
 def certainty_of(
-    law: HypoelasticLaw, coefficients: base.Array, words: str = "",
+    law: HypoelasticLaw,
+    coefficients: base.Array,
+    words: str = "",
     bands: Mapping[str, base.Array] | None = None,
-) -> CardCertainty:  # fmt: skip
+) -> CardCertainty:
     """Return the certainty of draws of the free coefficients (draws, free) MPa about the law's."""
     spread = (coefficients - law.beta[list(law.form.free)]) / np.sqrt(len(coefficients))
-    crimp, free = base.crimp_map(law.form), list(law.form.free)
+    crimp = base.crimp_map(law.form)
+    free = list(law.form.free)
     relative = np.vstack(
         [
             law.modulus_rows(name, strain, ratio)[:, free]
@@ -219,29 +223,40 @@ def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
 
 def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> None:
     """Write a card with its moduli in `unit` ("GPa", "MPa" or "Pa")."""
-    law, scale = card.law, UNITS[unit]
+    law = card.law
+    scale = UNITS[unit]
     named = zip(base.STRAIN_NAMES, law.strain_range, strict=True)
-    sure, of_form = card.certainty, law.form.to_card()
+    sure = card.certainty
+    of_form = law.form.to_card()
     pieces = of_form.pop("pieces", {})
     content: dict[str, Any] = {
-        "format": FORMAT if sure is None else WITH_CERTAINTY, "name": card.name,
-        "source": card.source, "law": LAW, "form": law.form.name, "unit": unit,
-        "beta": [float(b) / scale for b in law.beta], "nu12": law.nu12,
-        "thickness_mm": card.thickness, "thickness_change": law.thickness_change,
+        "format": FORMAT if sure is None else WITH_CERTAINTY,
+        "name": card.name,
+        "source": card.source,
+        "law": LAW,
+        "form": law.form.name,
+        "unit": unit,
+        "beta": [float(b) / scale for b in law.beta],
+        "nu12": law.nu12,
+        "thickness_mm": card.thickness,
+        "thickness_change": law.thickness_change,
         "valid_strain": {name: [0.0, float(end)] for name, end in named if end < base.UNLIMITED},
-        **of_form
-    }  # fmt: skip
+        **of_form,
+    }
     if card.state or law.memory is not None:
-        content["format"], content["state"] = WITH_HISTORY, card.state
+        content["format"] = WITH_HISTORY
+        content["state"] = card.state
     if law.memory is not None:
         content["memory"] = {f: list(getattr(law.memory, f)) for f in FIELDS}
     if sure is not None:
         directions = (sure.directions / scale).tolist()
         content["certainty"] = {"of": sure.words, "directions": directions}
     words = [
-        "Tangent moduli of log strain; Cauchy stress.", law.form.describe(), HELD,
+        "Tangent moduli of log strain; Cauchy stress.",
+        law.form.describe(),
+        HELD,
         card.closed_path.words,
-    ]  # fmt: skip
+    ]
     header = "".join(f"# {line}\n" for line in words)
     bands = {
         name: [[float(f"{v:.7g}") for v in own] for own in (strain, *(end / scale for end in ends))]
@@ -394,7 +409,8 @@ def _bands(file: CardFile) -> dict[str, base.Array]:
 
 def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return the name of the form and its settings; unknown keys are not looked at."""
-    name, text = content.get("form"), content.get("law", "")
+    name = content.get("form")
+    text = content.get("law", "")
     if content.get("format", 1) == 1:
         if name is not None:
             problem = f"this key is missing; a card that names its form is of format = {FORMAT}"

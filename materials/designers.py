@@ -46,7 +46,8 @@ class DesignersConstants:
         if not (np.isfinite(c).all() and c[0, 0] > 0 and c[1, 1] > 0):
             problem = "a fabric would get shorter when it is pulled: these paths have no constants"
             raise InputError(None, "constants", problem)
-        warp, fill = 1 / c[0, 0], 1 / c[1, 1]
+        warp = 1 / c[0, 0]
+        fill = 1 / c[1, 1]
         return cls(float(warp), float(fill), float(-c[0, 1] * fill), float(-c[1, 0] * warp), shear)
 
     @classmethod
@@ -79,7 +80,8 @@ class DesignersConstants:
     @property
     def reciprocal(self) -> bool:
         """Return whether a strain energy belongs to them."""
-        one, other = self.nu_warp / self.fill, self.nu_fill / self.warp
+        one = self.nu_warp / self.fill
+        other = self.nu_fill / self.warp
         return abs(one - other) <= SAME * max(abs(one), abs(other), 1e-300)
 
     @property
@@ -119,7 +121,8 @@ class LinearPath:
 
 def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
     """Return the lines through the beginning of a path: loads (n, 2) kN/m, strains (n, 2)."""
-    n, eps = np.asarray(load, dtype=float), np.asarray(strain, dtype=float)
+    n = np.asarray(load, dtype=float)
+    eps = np.asarray(strain, dtype=float)
     larger = n.max(axis=1)
     s = larger - larger[0]
     if not float(s @ s) > 0:
@@ -178,7 +181,9 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
         constants = DesignersConstants.of_stiffness(whole)
     else:
         constants = DesignersConstants.of_compliance(whole)
-    squares, rms, count = 0.0, {}, 0
+    squares = 0.0
+    rms = {}
+    count = 0
     for path in paths:
         off = 100.0 * np.outer(SHARES, path.strain - constants.strain(path.load))
         which = np.array(options.counts(path))
@@ -214,17 +219,20 @@ def every_option(paths: Sequence[LinearPath]) -> list[Options]:
 
 
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
-    rows, right = [], []
+    rows = []
+    right = []
     # All points of a straight line say the same: one row with the root of their squares' sum.
     weight = float(np.sqrt((SHARES**2).sum()))
     for path in paths:
-        given, wanted = path.load, path.strain
+        given = path.load
+        wanted = path.strain
         if options.minimise == "load":
             given, wanted = wanted, given
         for yarn, counts in enumerate(options.counts(path)):
             if counts:
                 row = np.zeros(4)
-                row[yarn], row[2 + yarn] = given[yarn], given[1 - yarn]
+                row[yarn] = given[yarn]
+                row[2 + yarn] = given[1 - yarn]
                 rows.append(weight * row)
                 right.append(weight * wanted[yarn])
     return np.array(rows).reshape(-1, 4), np.array(right)
@@ -278,9 +286,14 @@ class LawConstants:
 
 
 def constants_of_law(
-    law: HypoelasticLaw, thickness: float, lowest: float, highest: float, shear_strain: float,
-    options: Options = USUAL, ratios: Sequence[str] = RATIOS
-) -> LawConstants:  # fmt: skip
+    law: HypoelasticLaw,
+    thickness: float,
+    lowest: float,
+    highest: float,
+    shear_strain: float,
+    options: Options = USUAL,
+    ratios: Sequence[str] = RATIOS,
+) -> LawConstants:
     """Evaluate a law by five ratios, of loads lowest to highest kN/m, G up to shear_strain."""
     if not 0 <= lowest < highest:
         problem = f"expected loads that increase from 0 kN/m or more, got {lowest:g} to {highest:g}"
@@ -293,7 +306,8 @@ def constants_of_law(
     asked = evaluate(lines, options)
     asked = replace(asked, constants=replace(asked.constants, shear=mean))
     others = tuple(evaluate_others(lines, options))
-    lost, largest = {}, {}
+    lost = {}
+    largest = {}
     for name, (load, strain) in curves.items():
         off = (strain - strain[0]) - asked.constants.strain(load - load[0])
         lost[name] = float(100 * np.sqrt(np.mean(off**2)))
@@ -305,9 +319,11 @@ def _curve(
     law: HypoelasticLaw, thickness: float, ratio: str, lowest: float, highest: float
 ) -> tuple[Array, Array]:
     larger = np.concatenate(
-        [np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
-         np.linspace(lowest, highest, STEPS + 1)]
-    )  # fmt: skip
+        [
+            np.linspace(0, lowest, STEPS)[1:-1] if lowest > 0 else [],
+            np.linspace(lowest, highest, STEPS + 1),
+        ]
+    )
     loads = np.outer(larger, shares(ratio))
     found = biaxial_response(law, loads, thickness)
     if found.reached < len(larger):
@@ -326,16 +342,25 @@ CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
 
 def row_of(one: Evaluation) -> dict[str, Any]:
     """Return options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
-    c, o = one.constants, one.options
+    c = one.constants
+    o = one.options
     direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
     return {
-        "minimise": o.minimise, "reciprocal": o.reciprocal, "unloaded_yarns": o.unloaded,
-        "ratios": " ".join(o.ratios) or "all", "paths": one.paths, "E_warp_kN_per_m": c.warp,
-        "E_fill_kN_per_m": c.fill, "nu_warp": c.nu_warp, "nu_fill": c.nu_fill,
-        "A_warp_kN_per_m": direct[0, 0], "A_fill_kN_per_m": direct[1, 1],
-        "A_warp_fill_kN_per_m": direct[0, 1], "A_fill_warp_kN_per_m": direct[1, 0],
-        "squares_percent2": one.squares
-    }  # fmt: skip
+        "minimise": o.minimise,
+        "reciprocal": o.reciprocal,
+        "unloaded_yarns": o.unloaded,
+        "ratios": " ".join(o.ratios) or "all",
+        "paths": one.paths,
+        "E_warp_kN_per_m": c.warp,
+        "E_fill_kN_per_m": c.fill,
+        "nu_warp": c.nu_warp,
+        "nu_fill": c.nu_fill,
+        "A_warp_kN_per_m": direct[0, 0],
+        "A_fill_kN_per_m": direct[1, 1],
+        "A_warp_fill_kN_per_m": direct[0, 1],
+        "A_fill_warp_kN_per_m": direct[1, 0],
+        "squares_percent2": one.squares,
+    }
 
 
 def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:

@@ -64,7 +64,8 @@ class HypoelasticLaw:
     pieces: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        beta, form = np.array(self.beta, dtype=float), self.form
+        beta = np.array(self.beta, dtype=float)
+        form = self.form
         if beta.shape != (form.size,) or not np.isfinite(beta).all():
             problem = f"expected {form.size} finite coefficients, got shape {beta.shape}"
             raise InputError(None, "beta", problem)
@@ -93,19 +94,28 @@ class HypoelasticLaw:
 
     @classmethod
     def linear(
-        cls, e1: float, e2: float, g12: float, nu12: float = 0.24,
-        thickness_change: ThicknessChange = "constant"
-    ) -> Self:  # fmt: skip
+        cls,
+        e1: float,
+        e2: float,
+        g12: float,
+        nu12: float = 0.24,
+        thickness_change: ThicknessChange = "constant",
+    ) -> Self:
         beta = np.zeros(12)
         beta[[3, 7, 11]] = g12, e2, e1
         return cls(beta, nu12, None, thickness_change, CONSTANT)  # type: ignore[arg-type]
 
     @classmethod
     def trilinear(
-        cls, e1: Sequence[float], e2: Sequence[float], g12: Sequence[float], breaks: ArrayLike,
-        nu12: float = 0.24, strain_range: ArrayLike | None = None,
-        thickness_change: ThicknessChange = "constant"
-    ) -> Self:  # fmt: skip
+        cls,
+        e1: Sequence[float],
+        e2: Sequence[float],
+        g12: Sequence[float],
+        breaks: ArrayLike,
+        nu12: float = 0.24,
+        strain_range: ArrayLike | None = None,
+        thickness_change: ThicknessChange = "constant",
+    ) -> Self:
         """Return the law of (3,) moduli (MPa) that are constant in three regions of their strain.
         breaks : (3, 2) two strains for each of (eps1, eps2, gamma12)."""
         for name, values in (("E1", e1), ("E2", e2), ("G12", g12)):
@@ -118,9 +128,12 @@ class HypoelasticLaw:
     @cached_property
     def jumps(self) -> bool:
         """Return whether a modulus jumps somewhere in the strain range."""
-        here, there, at = self.pieces[:, :-1, 1:], self.pieces[:, 1:, 1:], self.pieces[:, :-1, :1]
+        here = self.pieces[:, :-1, 1:]
+        there = self.pieces[:, 1:, 1:]
+        at = self.pieces[:, :-1, :1]
         powers = at ** [3, 2, 1, 0]
-        before, after = (here * powers).sum(axis=-1), (there * powers).sum(axis=-1)
+        before = (here * powers).sum(axis=-1)
+        after = (there * powers).sum(axis=-1)
         size = np.maximum(np.abs(before), np.abs(after))
         return bool((np.abs(after - before) > JUMP * size).any())
 
@@ -210,9 +223,11 @@ class HypoelasticLaw:
         return (*_increments(self.pieces, self.coupling, old, new, before), new)
 
     def second_piola_kirchhoff(
-        self, gradient: ArrayLike, strain_old: ArrayLike | None = None,
-        stress_old: ArrayLike | None = None
-    ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+        self,
+        gradient: ArrayLike,
+        strain_old: ArrayLike | None = None,
+        stress_old: ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array, Array]:
         """Return pk2 (n, 3), d(pk2)/dE (n, 3, 3), state (n, 3 or 9), corotated stress (n, 3).
         The state is log strain, then what a memory keeps; strain_old is that of the last call.
         gradient : (n, 2 or 3, 2): columns are the images of the unit warp and fill vectors."""
@@ -226,9 +241,11 @@ class HypoelasticLaw:
 
 
 def moduli_html(
-    law: HypoelasticLaw, caption: str,
-    band: Callable[[str, Array], tuple[Array, Array]] | None = None, level: str = "",
-) -> str:  # fmt: skip
+    law: HypoelasticLaw,
+    caption: str,
+    band: Callable[[str, Array], tuple[Array, Array]] | None = None,
+    level: str = "",
+) -> str:
     """Return a table of the moduli at rest, and halfway to and at the end of their range.
     band : of a modulus by its name, at strains (n,). level : its name."""
     rows: list[list[object]] = []
@@ -247,32 +264,57 @@ def moduli_html(
 @compiled()
 def _increments(pieces, coupling, old, new, stress_old):  # type: ignore[no-untyped-def]
     n = len(old)
-    stress, tangent = np.empty((n, 3)), np.empty((n, 3, 3))
+    stress = np.empty((n, 3))
+    tangent = np.empty((n, 3, 3))
     slopes = np.empty(SLOPES)
     for i in range(n):
         if not stress_update(
             pieces, coupling, new[i], old[i], stress_old[i], stress[i], tangent[i], slopes
         ):
-            stress[i], tangent[i] = np.nan, np.nan
+            stress[i] = np.nan
+            tangent[i] = np.nan
     return stress, tangent
 
 
 @compiled()
 def _pull_backs(pieces, coupling, power, right, old, stress_old):  # type: ignore[no-untyped-def]
     n = len(right)
-    pk2, stiffness = np.empty((n, 3)), np.empty((n, 3, 3))
-    strain, stress = np.empty((n, old.shape[1])), np.empty((n, 3))
-    p, law, pull, work = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    pk2 = np.empty((n, 3))
+    stiffness = np.empty((n, 3, 3))
+    strain = np.empty((n, old.shape[1]))
+    stress = np.empty((n, 3))
+    p = np.empty((3, 3))
+    law = np.empty((3, 3))
+    pull = np.empty((3, 3))
+    work = np.empty((3, 3))
     slopes = np.empty(SLOPES)
     for i in range(n):
         m = 0.5 * (right[i, 0, 0] + right[i, 1, 1])
         q = 0.5 * (right[i, 0, 0] - right[i, 1, 1])
         c = right[i, 0, 1]
         if not membrane_stress(
-            m, q, c, pieces, coupling, power, old[i], stress_old[i], strain[i], stress[i],
-            pk2[i], stiffness[i], p, law, slopes, pull, work,
-        ):  # fmt: skip
-            pk2[i], stiffness[i], strain[i], stress[i] = np.nan, np.nan, np.nan, np.nan
+            m,
+            q,
+            c,
+            pieces,
+            coupling,
+            power,
+            old[i],
+            stress_old[i],
+            strain[i],
+            stress[i],
+            pk2[i],
+            stiffness[i],
+            p,
+            law,
+            slopes,
+            pull,
+            work,
+        ):
+            pk2[i] = np.nan
+            stiffness[i] = np.nan
+            strain[i] = np.nan
+            stress[i] = np.nan
     return pk2, stiffness, strain, stress
 
 
@@ -291,7 +333,8 @@ def law_slopes(
     for j, name in enumerate(parameters):
         if name.startswith("beta_"):
             place = int(name.removeprefix("beta_"))
-            rows[..., j], coupling[own, j] = of_beta[..., place], gains[:, place]
+            rows[..., j] = of_beta[..., place]
+            coupling[own, j] = gains[:, place]
         elif name == "nu12":
             coupling[0, j] = 1.0
         elif name in NAMES and law.memory is not None:

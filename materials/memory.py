@@ -43,8 +43,20 @@ FIELDS = ("permanent_set", "unloading", "reloading", "saturation")
 #: What `recall` writes: f, m, d f / d (x, x_old, f_old, m, F, set, U, R, saturation), where F is
 #: taken, and 1 where that is the new strain.
 (
-    F_NEW, M_NEW, BY_X, BY_OLD, BY_F, BY_M, BY_TOP, BY_SET, BY_U, BY_R, BY_FADE, TOP, ON,
-) = range(13)  # fmt: skip
+    F_NEW,
+    M_NEW,
+    BY_X,
+    BY_OLD,
+    BY_F,
+    BY_M,
+    BY_TOP,
+    BY_SET,
+    BY_U,
+    BY_R,
+    BY_FADE,
+    TOP,
+    ON,
+) = range(13)
 RECALLED = 13
 
 
@@ -116,7 +128,8 @@ def _below(k: int, b: float, m: float, top: float, kept: float, up: float, out: 
         slope = (2.0 - up) * top / (m - p)
         by_set = slope / (1.0 - kept)
         out[BY_U] = -top / (m - p) * (b - p)
-    out[F_NEW], out[BY_X] = slope * (b - p), slope
+    out[F_NEW] = slope * (b - p)
+    out[BY_X] = slope
     out[BY_M] = -slope / m * (b - p) - slope * kept
     out[BY_SET] = by_set * (b - p) - slope * m
     out[BY_TOP] = (b - p) * slope / top
@@ -124,15 +137,24 @@ def _below(k: int, b: float, m: float, top: float, kept: float, up: float, out: 
 
 @compiled()
 def recall(
-    pieces: Array, coupling: Coupling, k: int, x: float, x_old: float, largest: float, own: float,
+    pieces: Array,
+    coupling: Coupling,
+    k: int,
+    x: float,
+    x_old: float,
+    largest: float,
+    own: float,
     out: Array,
-) -> bool:  # fmt: skip
+) -> bool:
     """Write own stress and largest strain after an increment, and derivatives; see `F_NEW`.
     Returns False where all of it is first loading; the derivatives are then those of F(x)."""
     out[:] = 0.0
-    out[M_NEW], out[BY_M] = largest, 0.0
-    m, side = abs(largest), -1.0 if largest < 0.0 else 1.0
-    a, b = side * x_old, side * x
+    out[M_NEW] = largest
+    out[BY_M] = 0.0
+    m = abs(largest)
+    side = -1.0 if largest < 0.0 else 1.0
+    a = side * x_old
+    b = side * x
     first = m == 0.0 or (a >= m and b >= a)
     if first or b > m or (k == 2 and b < -m):
         if k == 2 or x > 0.0:
@@ -141,34 +163,47 @@ def recall(
             out[F_NEW] = out[BY_TOP] * integral_of(pieces, k, 0.0, abs(x))
             out[BY_X] = point_modulus(pieces, k, x)
         return not first
-    up, back = coupling[4 + 4 * k], coupling[5 + 4 * k]
+    up = coupling[4 + 4 * k]
+    back = coupling[5 + 4 * k]
     fade = 1.0 / (1.0 + coupling[6 + 4 * k] * m)
     kept = coupling[3 + 4 * k] * fade
-    top, p = integral_of(pieces, k, 0.0, m), kept * m
-    length, f = m - p, side * own
+    top = integral_of(pieces, k, 0.0, m)
+    p = kept * m
+    length = m - p
+    f = side * own
     mean = top / length
     out[TOP] = m
     if b < p or (b <= p and b >= a):
         _below(k, b, m, top, kept, up, out)
     elif b < a:
-        s0, s1 = (a - p) / length, (b - p) / length
-        g0, g1 = ((2.0 - up) + (up - 1.0) * s0) * s0, ((2.0 - up) + (up - 1.0) * s1) * s1
-        slope0, slope1 = (2.0 - up) + 2.0 * (up - 1.0) * s0, (2.0 - up) + 2.0 * (up - 1.0) * s1
+        s0 = (a - p) / length
+        s1 = (b - p) / length
+        g0 = ((2.0 - up) + (up - 1.0) * s0) * s0
+        g1 = ((2.0 - up) + (up - 1.0) * s1) * s1
+        slope0 = (2.0 - up) + 2.0 * (up - 1.0) * s0
+        slope1 = (2.0 - up) + 2.0 * (up - 1.0) * s1
         share = f / g0
-        out[F_NEW], out[BY_F] = share * g1, g1 / g0
+        out[F_NEW] = share * g1
+        out[BY_F] = g1 / g0
         out[BY_X] = share * slope1 / length
         out[BY_OLD] = -share * g1 / g0 * slope0 / length
-        by0, by1 = slope0 * -a / (length * m), slope1 * -b / (length * m)
+        by0 = slope0 * -a / (length * m)
+        by1 = slope1 * -b / (length * m)
         out[BY_M] = share * (by1 - g1 / g0 * by0)
-        by0, by1 = slope0 * m * (s0 - 1.0) / length, slope1 * m * (s1 - 1.0) / length
+        by0 = slope0 * m * (s0 - 1.0) / length
+        by1 = slope1 * m * (s1 - 1.0) / length
         out[BY_SET] = share * (by1 - g1 / g0 * by0)
         out[BY_U] = share * (s1 * (s1 - 1.0) - g1 / g0 * s0 * (s0 - 1.0))
     else:
         from_set = a < p
         if from_set:
-            a, f = p, 0.0
-        ahead, left, steep = m - a, m - b, back * mean
-        q, rest = left / ahead, top - f - steep * ahead
+            a = p
+            f = 0.0
+        ahead = m - a
+        left = m - b
+        steep = back * mean
+        q = left / ahead
+        rest = top - f - steep * ahead
         out[F_NEW] = top - steep * left - rest * q * q
         out[BY_X] = steep + 2.0 * rest * q / ahead
         by_a = -steep * q * q - 2.0 * rest * q * q / ahead
@@ -176,12 +211,14 @@ def recall(
         out[BY_M] = steep * (q * q - 1.0) - 2.0 * rest * q * (b - a) / (ahead * ahead)
         out[BY_M] -= by_steep * steep / m
         out[BY_TOP] = 1.0 - q * q + by_steep * back / length
-        out[BY_SET], out[BY_R] = by_steep * steep / (1.0 - kept), by_steep * mean
+        out[BY_SET] = by_steep * steep / (1.0 - kept)
+        out[BY_R] = by_steep * mean
         if from_set:
             out[BY_M] += by_a * kept
             out[BY_SET] += by_a * m
         else:
-            out[BY_OLD], out[BY_F] = by_a, q * q
+            out[BY_OLD] = by_a
+            out[BY_F] = q * q
     # From the share that is kept to its parameters.
     out[BY_M] -= out[BY_SET] * kept * coupling[6 + 4 * k] * fade
     out[BY_FADE] = -out[BY_SET] * kept * m * fade
@@ -202,9 +239,12 @@ def recalled_modulus(
 ) -> tuple[float, float, float]:
     """Return as `increment_modulus`, of a law that remembers; write m and f of h (9,)."""
     out = np.empty(RECALLED)
-    x, x_old, own = h[k], h_old[k], h_old[6 + k]
+    x = h[k]
+    x_old = h_old[k]
+    own = h_old[6 + k]
     again = recall(pieces, coupling, k, x, x_old, h_old[3 + k], own, out)
-    h[3 + k], h[6 + k] = out[M_NEW], out[F_NEW]
+    h[3 + k] = out[M_NEW]
+    h[6 + k] = out[F_NEW]
     if not again:
         return increment_modulus(pieces, k, x, x_old)
     change = x - x_old
@@ -216,15 +256,25 @@ def recalled_modulus(
 
 @compiled()
 def remember(
-    pieces: Array, coupling: Coupling, k: int, h: Array, h_old: Array, rows: Array,
-    by_coupling: Array, dh_old: Array, weights: Array, mean: Array, out: Array,
-) -> None:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    k: int,
+    h: Array,
+    h_old: Array,
+    rows: Array,
+    by_coupling: Array,
+    dh_old: Array,
+    weights: Array,
+    mean: Array,
+    out: Array,
+) -> None:
     """Take derivatives by np parameters through the memory of component k, at a fixed strain h.
     rows (3, P, 4, np), by_coupling (15, np) of `law_slopes`. dh_old (9, np) : of h_old; those of m
     and f are replaced by theirs after the increment. mean (np,) : of the modulus; kept on a first
     loading. out : of `recall`."""
     again = recall(pieces, coupling, k, h[k], h_old[k], h_old[3 + k], h_old[6 + k], out)
-    change, by_m = h[k] - h_old[k], out[BY_M]
+    change = h[k] - h_old[k]
+    by_m = out[BY_M]
     if out[ON] == 0.0:  # F is that of the largest strain before
         steep = point_modulus(pieces, k, out[TOP])
         by_m += out[BY_TOP] * (-steep if h_old[3 + k] < 0.0 else steep)
@@ -252,12 +302,20 @@ def own_stress(
     k : 0 warp, 1 fill; the bar is pulled along it and free to contract. rows, by_coupling : of
     `law_slopes`."""
     count = by_coupling.shape[1]
-    stress, slopes, out = np.empty(len(strain)), np.empty((len(strain), count)), np.empty(RECALLED)
-    h, h_old, by = np.zeros(9), np.zeros(9), np.zeros((9, count))
-    weights, mean = np.empty((pieces.shape[1], 4)), np.empty(count)
+    stress = np.empty(len(strain))
+    slopes = np.empty((len(strain), count))
+    out = np.empty(RECALLED)
+    h = np.zeros(9)
+    h_old = np.zeros(9)
+    by = np.zeros((9, count))
+    weights = np.empty((pieces.shape[1], 4))
+    mean = np.empty(count)
     for i in range(len(strain)):
         h[k] = strain[i]
         remember(pieces, coupling, k, h, h_old, rows, by_coupling, by, weights, mean, out)
-        h_old[k], h_old[3 + k], h_old[6 + k] = strain[i], out[M_NEW], out[F_NEW]
-        stress[i], slopes[i] = out[F_NEW], by[6 + k]
+        h_old[k] = strain[i]
+        h_old[3 + k] = out[M_NEW]
+        h_old[6 + k] = out[F_NEW]
+        stress[i] = out[F_NEW]
+        slopes[i] = by[6 + k]
     return stress, slopes

@@ -19,7 +19,8 @@ WARP, FILL, SHEAR = (np.int64(k) for k in range(3))
 
 @compiled()
 def _place(pieces: Array, component: int, x: float) -> int:
-    k, last = 0, pieces.shape[1] - 1
+    k = 0
+    last = pieces.shape[1] - 1
     while k < last and x > pieces[component, k, 0]:
         k += 1
     return k
@@ -27,7 +28,8 @@ def _place(pieces: Array, component: int, x: float) -> int:
 
 @compiled()
 def _means(a: float, b: float) -> tuple[float, float, float]:
-    total, squares = a + b, a * a + b * b
+    total = a + b
+    squares = a * a + b * b
     return 0.25 * total * squares, (squares + a * b) * (1.0 / 3.0), 0.5 * total
 
 
@@ -50,12 +52,14 @@ def point_modulus(pieces: Array, component: int, x: float) -> float:
 @compiled()
 def integral_of(pieces: Array, component: int, low: float, high: float) -> float:
     """Return the integral of the modulus from low to high, summed over the pieces on the way."""
-    total, start = 0.0, 0.0
+    total = 0.0
+    start = 0.0
     if low < 0.0:
         total += (min(high, 0.0) - low) * pieces[component, 0, 4]
     for k in range(pieces.shape[1]):
         end = pieces[component, k, 0]
-        a, b = max(low, start), min(high, end)
+        a = max(low, start)
+        b = min(high, end)
         if b > a:
             total += (b - a) * _mean_of_piece(pieces, component, k, a, b)
         start = end
@@ -74,7 +78,8 @@ def _across(pieces: Array, component: int, x: float, x_old: float) -> tuple[floa
         whole = integral_of(pieces, component, 0.0, abs(x))
         whole += integral_of(pieces, component, 0.0, abs(x_old))
     elif component == 2:
-        a, b = abs(x), abs(x_old)
+        a = abs(x)
+        b = abs(x_old)
         whole = integral_of(pieces, component, min(a, b), max(a, b))
     else:
         whole = integral_of(pieces, component, min(x, x_old), max(x, x_old))
@@ -89,25 +94,32 @@ def increment_modulus(
     pieces: Array, component: int, x: float, x_old: float
 ) -> tuple[float, float, float]:
     """Return the mean modulus from x_old to x, and its derivatives by x and by x_old."""
-    a, b, sign = x_old, x, 1.0
+    a = x_old
+    b = x
+    sign = 1.0
     if component == 2 and x <= 0.0 and x_old <= 0.0:
-        a, b, sign = -x_old, -x, -1.0
+        a = -x_old
+        b = -x
+        sign = -1.0
     end = pieces[component, pieces.shape[1] - 1, 0]
     # A strain that is not a number fails these comparisons, and the mean is not a number.
     if component != 2 and a <= 0.0 and b <= 0.0:
         return pieces[component, 0, 4], 0.0, 0.0
     if a >= end and b >= end:
         return point_modulus(pieces, component, end), 0.0, 0.0
-    low, high = min(a, b), max(a, b)
+    low = min(a, b)
+    high = max(a, b)
     k = _place(pieces, component, high)
     start = pieces[component, k - 1, 0] if k > 0 else 0.0
     if not (low >= start and high <= pieces[component, k, 0]):
         return _across(pieces, component, x, x_old)
-    third, second, first = (
-        pieces[component, k, 1], pieces[component, k, 2], pieces[component, k, 3]
-    )  # fmt: skip
+    third = pieces[component, k, 1]
+    second = pieces[component, k, 2]
+    first = pieces[component, k, 3]
     mean = _mean_of_piece(pieces, component, k, a, b)
-    ab, aa, bb = 2.0 * a * b, a * a, b * b
+    ab = 2.0 * a * b
+    aa = a * a
+    bb = b * b
     ahead = third * (0.25 * (aa + ab + 3.0 * bb)) + second * ((a + 2.0 * b) * (1.0 / 3.0))
     behind = third * (0.25 * (3.0 * aa + ab + bb)) + second * ((2.0 * a + b) * (1.0 / 3.0))
     return mean, sign * (ahead + 0.5 * first), sign * (behind + 0.5 * first)
@@ -132,7 +144,8 @@ def _add_way(
         _add(weights, 0, (min(high, 0.0) - low) / whole, 0.0, 0.0)
     for k in range(_place(pieces, component, high) + 1):
         end = pieces[component, k, 0]
-        a, b = max(low, start), min(high, end)
+        a = max(low, start)
+        b = min(high, end)
         if b > a:
             _add(weights, k, (b - a) / whole, a, b)
         if high > end and k == pieces.shape[1] - 1:
@@ -145,12 +158,16 @@ def by_pieces(
     pieces: Array, component: int, x: float, x_old: float, weights: Array
 ) -> tuple[int, int]:
     """Write d mean modulus / d coefficients of each piece (P, 4); return the range of pieces."""
-    a, b, whole = x_old, x, abs(x - x_old)
+    a = x_old
+    b = x
+    whole = abs(x - x_old)
     if component == 2 and x * x_old >= 0.0:
-        a, b = abs(x_old), abs(x)
+        a = abs(x_old)
+        b = abs(x)
     if whole < TINY:
         a = b = 0.5 * (a + b)
-    low, high = min(a, b), max(a, b)
+    low = min(a, b)
+    high = max(a, b)
     k = _place(pieces, component, high)
     start = pieces[component, k - 1, 0] if k > 0 else 0.0
     if low >= start and high <= pieces[component, k, 0]:

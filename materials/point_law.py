@@ -22,9 +22,25 @@ from .pieces import FILL, SHEAR, WARP, increment_modulus
 #: from AHEAD and from BEHIND, a matrix each, and two by three from CRIMP.
 SLOPES = 31
 (
-    D11, D12, D22, G12, D11_E1, D11_E2, D22_E1, D22_E2, BEFORE1, BEFORE2, BEFORE3, D11_NU, D22_NU,
-    RATIO1, RATIO2, TAKEN1, TAKEN2, AHEAD,
-) = range(18)  # fmt: skip
+    D11,
+    D12,
+    D22,
+    G12,
+    D11_E1,
+    D11_E2,
+    D22_E1,
+    D22_E2,
+    BEFORE1,
+    BEFORE2,
+    BEFORE3,
+    D11_NU,
+    D22_NU,
+    RATIO1,
+    RATIO2,
+    TAKEN1,
+    TAKEN2,
+    AHEAD,
+) = range(18)
 BEHIND, CRIMP = AHEAD + 4, AHEAD + 8
 #: Entries of the coupling of a law with crimp: those of any law, then T1, T2 and S.
 CRIMPED = 6
@@ -67,9 +83,15 @@ def load_angle(warp: float, fill: float) -> tuple[float, float, float]:
 
 @compiled()
 def mean_ratio(
-    warp: float, fill: float, coupling: Coupling, old0: float, old1: float, dh0: float, dh1: float,
+    warp: float,
+    fill: float,
+    coupling: Coupling,
+    old0: float,
+    old1: float,
+    dh0: float,
+    dh1: float,
     slopes: Array,
-) -> bool:  # fmt: skip
+) -> bool:
     """Write the load ratio of an increment's mean stress, and how the stress depends on itself.
 
     warp, fill : E1, E2 at 1:1, MPa; old0, old1 : stress at the start; dh0, dh1 : strain increment.
@@ -79,21 +101,26 @@ def mean_ratio(
     """
     nu = coupling[0]
     angle = load_angle(old0, old1)[0]
-    low, high = 0.0, RIGHT
+    low = 0.0
+    high = RIGHT
     u0 = u1 = w0 = w1 = turn = cosine = sine = 0.0
     for _ in range(ROUNDS):
-        cosine, sine = math.cos(angle), math.sin(angle)
-        e1, e2 = warp + coupling[1] * (cosine - EVEN), fill + coupling[2] * (sine - EVEN)
+        cosine = math.cos(angle)
+        sine = math.sin(angle)
+        e1 = warp + coupling[1] * (cosine - EVEN)
+        e2 = fill + coupling[2] * (sine - EVEN)
         if not (e1 > 0.0 and e2 > 0.0):
             return False
         nu_nu = nu * nu * e2 / e1
         if not 1.0 - nu_nu > 1e-3:
             return False
         inv = 1.0 / (1.0 - nu_nu)
-        d11, d22 = e1 * inv, e2 * inv
+        d11 = e1 * inv
+        d22 = e2 * inv
         d12 = nu * d22
         # By the angle: E1 loses what its ratio loses, E2 gains what its ratio gains.
-        by1, by2 = -coupling[1] * sine, coupling[2] * cosine
+        by1 = -coupling[1] * sine
+        by2 = coupling[2] * cosine
         inv2 = inv * inv
         d11_by = (inv - nu_nu * inv2) * by1 + nu * nu * inv2 * by2
         d22_by = -nu_nu * inv2 * (e2 / e1) * by1 + inv2 * by2
@@ -119,9 +146,11 @@ def mean_ratio(
         angle = ahead
     if not turn > 0.0:
         return False
-    slopes[RATIO1], slopes[RATIO2] = cosine - EVEN, sine - EVEN
+    slopes[RATIO1] = cosine - EVEN
+    slopes[RATIO2] = sine - EVEN
     for i, by in ((0, w0 / turn), (1, w1 / turn)):
-        slopes[BEHIND + i], slopes[BEHIND + 2 + i] = u0 * by, u1 * by
+        slopes[BEHIND + i] = u0 * by
+        slopes[BEHIND + 2 + i] = u1 * by
         slopes[AHEAD + i] += slopes[BEHIND + i]
         slopes[AHEAD + 2 + i] += slopes[BEHIND + 2 + i]
     return True
@@ -160,9 +189,14 @@ def log_strain(m: float, q: float, c: float, h: Array, p: Array) -> bool:
     h[0] = 0.5 * (a + b * q)
     h[1] = 0.5 * (a - b * q)
     h[2] = b * c
-    a_m, a_q, a_c = m / det, -q / det, -c / det
-    b_q, b_c = 2.0 * q * b_r, 2.0 * c * b_r
-    u_m, u_q, u_c = b_m * q, b + q * b_q, q * b_c
+    a_m = m / det
+    a_q = -q / det
+    a_c = -c / det
+    b_q = 2.0 * q * b_r
+    b_c = 2.0 * c * b_r
+    u_m = b_m * q
+    u_q = b + q * b_q
+    u_c = q * b_c
     p[0, 0] = 0.5 * (a_m + u_m + a_q + u_q)
     p[0, 1] = 0.5 * (a_m + u_m - a_q - u_q)
     p[0, 2] = 0.5 * (a_c + u_c)
@@ -185,11 +219,20 @@ def pull_back(m: float, q: float, c: float, t: Array, s: Array, w: Array, g: Arr
     j = math.sqrt(m * m - q * q - c * c)
     root = math.sqrt(2.0 * (m + j))
     k = 1.0 / (root * j)
-    a, b = m - q + j, m + q + j
-    w1, w2, w3 = k * a, k * b, -k * c
-    w[0, 0], w[0, 1], w[0, 2] = w1 * w1, w3 * w3, 2.0 * w1 * w3
-    w[1, 0], w[1, 1], w[1, 2] = w3 * w3, w2 * w2, 2.0 * w3 * w2
-    w[2, 0], w[2, 1], w[2, 2] = w1 * w3, w3 * w2, w1 * w2 + w3 * w3
+    a = m - q + j
+    b = m + q + j
+    w1 = k * a
+    w2 = k * b
+    w3 = -k * c
+    w[0, 0] = w1 * w1
+    w[0, 1] = w3 * w3
+    w[0, 2] = 2.0 * w1 * w3
+    w[1, 0] = w3 * w3
+    w[1, 1] = w2 * w2
+    w[1, 2] = 2.0 * w3 * w2
+    w[2, 0] = w1 * w3
+    w[2, 1] = w3 * w2
+    w[2, 2] = w1 * w2 + w3 * w3
     for i in range(3):
         s[i] = w[i, 0] * t[0] + w[i, 1] * t[1] + w[i, 2] * t[2]
     for i in range(3):
@@ -227,16 +270,27 @@ def _exchanged(
     whole = bed + s0 + s1
     held = whole < 0.5 * bed
     pull = 0.5 * bed if held else whole
-    w, free = (first * s0 - second * s1) / pull, 0.0 if held else 1.0
-    by0, by1 = (first - free * w) / pull, -(second + free * w) / pull
-    by_first, by_second, by_bed = s0 / pull, -s1 / pull, -w / (bed if held else pull)
+    w = (first * s0 - second * s1) / pull
+    free = 0.0 if held else 1.0
+    by0 = (first - free * w) / pull
+    by1 = -(second + free * w) / pull
+    by_first = s0 / pull
+    by_second = -s1 / pull
+    by_bed = -w / (bed if held else pull)
     if w >= first or w <= -second:
-        by0, by1, by_first, by_second, by_bed = 0.0, 0.0, 0.0, 0.0, 0.0
+        by0 = 0.0
+        by1 = 0.0
+        by_first = 0.0
+        by_second = 0.0
+        by_bed = 0.0
         if w >= first:
-            w, by_first = first, 1.0
+            w = first
+            by_first = 1.0
         else:
-            w, by_second = -second, -1.0
-    slopes[CRIMP], slopes[CRIMP + 1] = by_first / bed, by_second / bed
+            w = -second
+            by_second = -1.0
+    slopes[CRIMP] = by_first / bed
+    slopes[CRIMP + 1] = by_second / bed
     slopes[CRIMP + 2] = by_bed - (first * by_first + second * by_second) / bed
     return w, by0, by1
 
@@ -259,11 +313,15 @@ def exchange(
     bed = coupling[5]
     if not bed > 0.0:
         return False
-    first, second = coupling[3] / bed, coupling[4] / bed
-    dh0, dh1 = slopes[TAKEN1], slopes[TAKEN2]
+    first = coupling[3] / bed
+    second = coupling[4] / bed
+    dh0 = slopes[TAKEN1]
+    dh1 = slopes[TAKEN2]
     w_old, old0, old1 = _exchanged(s_old[0], s_old[1], first, second, bed, slopes)
     by_old = slopes[CRIMP], slopes[CRIMP + 1], slopes[CRIMP + 2]
-    w, low, high = w_old, -second, first
+    w = w_old
+    low = -second
+    high = first
     e0 = e1 = off = 0.0
     for _ in range(ROUNDS):
         e0 = dh0 - (2.0 * first - w) * w + (2.0 * first - w_old) * w_old
@@ -293,23 +351,31 @@ def exchange(
         if abs(ahead - w) <= ROUNDING:
             break
         w = ahead
-    slopes[TAKEN1], slopes[TAKEN2] = e0, e1
+    slopes[TAKEN1] = e0
+    slopes[TAKEN2] = e1
     _, by0, by1 = _exchanged(s_new[0], s_new[1], first, second, bed, slopes)
     if w == first or w == -second:
         by0 = by1 = 0.0
-    g0, g1 = 2.0 * (first - w), -2.0 * (second + w)
-    dg0, dg1 = d11 * g0 + d12 * g1, d12 * g0 + d22 * g1
+    g0 = 2.0 * (first - w)
+    g1 = -2.0 * (second + w)
+    dg0 = d11 * g0 + d12 * g1
+    dg1 = d12 * g0 + d22 * g1
     whole = 1.0 + by0 * dg0 + by1 * dg1
     if not whole > 0.0:
         return False
     # A = 1 - D g v' / (1 + v' D g), v the derivative of w by the stress; B = A D g_old v_old'.
-    slopes[AHEAD], slopes[AHEAD + 1] = 1.0 - dg0 * by0 / whole, -dg0 * by1 / whole
-    slopes[AHEAD + 2], slopes[AHEAD + 3] = -dg1 * by0 / whole, 1.0 - dg1 * by1 / whole
-    g0_old, g1_old = 2.0 * (first - w_old), -2.0 * (second + w_old)
-    was0, was1 = d11 * g0_old + d12 * g1_old, d12 * g0_old + d22 * g1_old
+    slopes[AHEAD] = 1.0 - dg0 * by0 / whole
+    slopes[AHEAD + 1] = -dg0 * by1 / whole
+    slopes[AHEAD + 2] = -dg1 * by0 / whole
+    slopes[AHEAD + 3] = 1.0 - dg1 * by1 / whole
+    g0_old = 2.0 * (first - w_old)
+    g1_old = -2.0 * (second + w_old)
+    was0 = d11 * g0_old + d12 * g1_old
+    was1 = d12 * g0_old + d22 * g1_old
     for i in range(2):
         turned = slopes[AHEAD + 2 * i] * was0 + slopes[AHEAD + 2 * i + 1] * was1
-        slopes[BEHIND + 2 * i], slopes[BEHIND + 2 * i + 1] = turned * old0, turned * old1
+        slopes[BEHIND + 2 * i] = turned * old0
+        slopes[BEHIND + 2 * i + 1] = turned * old1
     # - D dc/d(T1, T2, S) at a fixed stress, of the end less that of the start.
     by_r1 = (2.0 / bed, 0.0, -2.0 * first / bed)
     by_r2 = (0.0, -2.0 / bed, 2.0 * second / bed)
@@ -323,9 +389,15 @@ def exchange(
 
 @compiled()
 def stress_update(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array, s_new: Array,
-    tangent: Array, slopes: Array,
-) -> bool:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    s_new: Array,
+    tangent: Array,
+    slopes: Array,
+) -> bool:
     """Integrate one increment of d sigma = D(eps) d eps with the moduli of `increment_modulus`.
 
     pieces (3, P, 5) MPa; coupling (3,): nu12, and what E1 and E2 gain (MPa) by their normalised
@@ -345,9 +417,14 @@ def stress_update(
         warp, warp_slope, warp_before = recalled_modulus(pieces, coupling, WARP, h, h_old)
         fill, fill_slope, fill_before = recalled_modulus(pieces, coupling, FILL, h, h_old)
         shear, shear_slope, shear_before = recalled_modulus(pieces, coupling, SHEAR, h, h_old)
-    dh0, dh1, dh2 = h[0] - h_old[0], h[1] - h_old[1], h[2] - h_old[2]
+    dh0 = h[0] - h_old[0]
+    dh1 = h[1] - h_old[1]
+    dh2 = h[2] - h_old[2]
     slopes[RATIO1:] = 0.0
-    slopes[TAKEN1], slopes[TAKEN2], slopes[AHEAD], slopes[AHEAD + 3] = dh0, dh1, 1.0, 1.0
+    slopes[TAKEN1] = dh0
+    slopes[TAKEN2] = dh1
+    slopes[AHEAD] = 1.0
+    slopes[AHEAD + 3] = 1.0
     if coupling[1] != 0.0 or coupling[2] != 0.0:
         if not mean_ratio(warp, fill, coupling, s_old[0], s_old[1], dh0, dh1, slopes):
             return False
@@ -361,10 +438,12 @@ def stress_update(
     if not den > 1e-3:
         return False
     inv = 1.0 / den
-    d11, d22 = warp * inv, fill * inv
+    d11 = warp * inv
+    d22 = fill * inv
     d12 = nu * d22
     inv2 = inv * inv
-    den_warp, den_fill = nu_nu / warp, -nu * nu / warp
+    den_warp = nu_nu / warp
+    den_fill = -nu * nu / warp
     d11_e1 = inv - warp * den_warp * inv2
     d11_e2 = -warp * den_fill * inv2
     d22_e1 = -fill * den_warp * inv2
@@ -374,7 +453,8 @@ def stress_update(
         turned = True
         if not exchange(d11, d12, d22, coupling, s_old, s_new, slopes):
             return False
-        dh0, dh1 = slopes[TAKEN1], slopes[TAKEN2]
+        dh0 = slopes[TAKEN1]
+        dh1 = slopes[TAKEN2]
     else:
         s_new[0] = s_old[0] + d11 * dh0 + d12 * dh1
         s_new[1] = s_old[1] + d12 * dh0 + d22 * dh1
@@ -386,36 +466,56 @@ def stress_update(
     tangent[2, 2] = shear + shear_slope * dh2
     if turned:
         for j in range(2):
-            first, second = tangent[0, j], tangent[1, j]
+            first = tangent[0, j]
+            second = tangent[1, j]
             tangent[0, j] = slopes[AHEAD] * first + slopes[AHEAD + 1] * second
             tangent[1, j] = slopes[AHEAD + 2] * first + slopes[AHEAD + 3] * second
     tangent[0, 2] = tangent[1, 2] = tangent[2, 0] = tangent[2, 1] = 0.0
-    slopes[D11], slopes[D12], slopes[D22], slopes[G12] = d11, d12, d22, shear
-    slopes[D11_E1], slopes[D11_E2] = d11_e1, d11_e2
-    slopes[D22_E1], slopes[D22_E2] = d22_e1, d22_e2
-    slopes[BEFORE1], slopes[BEFORE2], slopes[BEFORE3] = warp_before, fill_before, shear_before
+    slopes[D11] = d11
+    slopes[D12] = d12
+    slopes[D22] = d22
+    slopes[G12] = shear
+    slopes[D11_E1] = d11_e1
+    slopes[D11_E2] = d11_e2
+    slopes[D22_E1] = d22_e1
+    slopes[D22_E2] = d22_e2
+    slopes[BEFORE1] = warp_before
+    slopes[BEFORE2] = fill_before
+    slopes[BEFORE3] = shear_before
     den_nu = 2.0 * nu * fill / warp * inv2
-    slopes[D11_NU], slopes[D22_NU] = warp * den_nu, fill * den_nu
+    slopes[D11_NU] = warp * den_nu
+    slopes[D22_NU] = fill * den_nu
     return True
 
 
 @compiled(inline="always")
 def stress_rate(
-    slopes: Array, nu: float, own: Array, by_coupling: Array, j: int, old: Array, before: Array,
+    slopes: Array,
+    nu: float,
+    own: Array,
+    by_coupling: Array,
+    j: int,
+    old: Array,
+    before: Array,
     after: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Write after[:2, j], the rate of the stress along the yarns by parameter j at fixed strain.
 
     slopes : of `stress_update`. own (3, np) : of the moduli at 1:1 by themselves; by_coupling of
     `law_slopes`; old, before (3, np) : rates of strain and stress at the start.
     """
-    o0, o1, by_nu = old[0, j], old[1, j], by_coupling[0, j]
+    o0 = old[0, j]
+    o1 = old[1, j]
+    by_nu = by_coupling[0, j]
     warp = own[0, j] + o0 * slopes[BEFORE1] + by_coupling[1, j] * slopes[RATIO1]
     fill = own[1, j] + o1 * slopes[BEFORE2] + by_coupling[2, j] * slopes[RATIO2]
     d11 = slopes[D11_E1] * warp + slopes[D11_E2] * fill + by_nu * slopes[D11_NU]
     d22 = slopes[D22_E1] * warp + slopes[D22_E2] * fill + by_nu * slopes[D22_NU]
     d12 = nu * d22 + by_nu * slopes[D22]
-    dh0, dh1, b0, b1 = slopes[TAKEN1], slopes[TAKEN2], before[0, j], before[1, j]
+    dh0 = slopes[TAKEN1]
+    dh1 = slopes[TAKEN2]
+    b0 = before[0, j]
+    b1 = before[1, j]
     a0 = b0 + d11 * dh0 + d12 * dh1 - slopes[D11] * o0 - slopes[D12] * o1
     a1 = b1 + d12 * dh0 + d22 * dh1 - slopes[D12] * o0 - slopes[D22] * o1
     for k in range(CRIMPED - 3 if by_coupling.shape[0] == CRIMPED else 0):
@@ -429,20 +529,34 @@ def stress_rate(
 
 @compiled()
 def referred_stress(
-    m: float, q: float, c: float, ratio: float, growth: tuple[float, float, float], s: Array,
-    pk2: Array, stiffness: Array, p: Array, law_tangent: Array, pull: Array, work: Array,
-) -> None:  # fmt: skip
+    m: float,
+    q: float,
+    c: float,
+    ratio: float,
+    growth: tuple[float, float, float],
+    s: Array,
+    pk2: Array,
+    stiffness: Array,
+    p: Array,
+    law_tangent: Array,
+    pull: Array,
+    work: Array,
+) -> None:
     """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy stress s, law_tangent = ds/dh.
 
     ratio: the stress resultant over s t0; growth (3,): the derivative of its logarithm by h. The
     rest is as in `membrane_stress`.
     """
-    t0, t1, t2 = s[0], s[1], s[2]
+    t0 = s[0]
+    t1 = s[1]
+    t2 = s[2]
     s[0] *= ratio
     s[1] *= ratio
     s[2] *= ratio
     pull_back(m, q, c, s, pk2, pull, stiffness)
-    s[0], s[1], s[2] = t0, t1, t2
+    s[0] = t0
+    s[1] = t1
+    s[2] = t2
     for i in range(3):
         for j in range(3):
             pull[i, j] *= ratio
@@ -461,10 +575,24 @@ def referred_stress(
 
 @compiled()
 def membrane_stress(
-    m: float, q: float, c: float, pieces: Array, coupling: Coupling, area_power: float,
-    h_old: Array, s_old: Array, h: Array, s_new: Array, pk2: Array, stiffness: Array, p: Array,
-    law_tangent: Array, slopes: Array, pull: Array, work: Array,
-) -> bool:  # fmt: skip
+    m: float,
+    q: float,
+    c: float,
+    pieces: Array,
+    coupling: Coupling,
+    area_power: float,
+    h_old: Array,
+    s_old: Array,
+    h: Array,
+    s_new: Array,
+    pk2: Array,
+    stiffness: Array,
+    p: Array,
+    law_tangent: Array,
+    slopes: Array,
+    pull: Array,
+    work: Array,
+) -> bool:
     """Write 2nd Piola-Kirchhoff stress and d(pk2)/dE of Cauchy-Green components.
 
     `area_power` is 1 for constant thickness and 0 for incompressible thickness (the resultant is

@@ -37,8 +37,10 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
     """Return log strain and Cauchy stress (n, 3), MPa, of a bar; pulled : 0 warp, 1 fill."""
     free = 1 - pulled
     ends = np.asarray(log_strain, dtype=float)
-    strains, stresses = np.empty((len(ends), 3)), np.empty((len(ends), 3))
-    state, stress = np.zeros((1, 3)), np.zeros((1, 3))
+    strains = np.empty((len(ends), 3))
+    stresses = np.empty((len(ends), 3))
+    state = np.zeros((1, 3))
+    stress = np.zeros((1, 3))
     for i, end in enumerate(ends):
         new = state[0, :3].copy()
         new[pulled] = end
@@ -52,8 +54,10 @@ def bar(law: HypoelasticLaw, pulled: int, log_strain: ArrayLike) -> tuple[Array,
             what = f"at {100 * end:.4g} % of log strain of a bar"
             problem = f"a modulus or 1 - nu12 nu21 is not positive {what}"
             raise InputError(None, "beta", problem)
-        state, stress = after, trial
-        strains[i], stresses[i] = new, trial[0]
+        state = after
+        stress = trial
+        strains[i] = new
+        stresses[i] = trial[0]
     return strains, stresses
 
 
@@ -64,7 +68,8 @@ def uniaxial_curve(
     ends = np.asarray(log_strain, dtype=float)
     fine = _refined(ends)
     h, s = bar(law, pulled, fine)
-    h, s = _at(ends, h), _at(ends, s)
+    h = _at(ends, h)
+    s = _at(ends, s)
     # Force per reference area: sigma t0 J2^(p - 1) on the width exp(eps across) (law.area_power).
     area = np.exp(law.area_power * (h[:, 0] + h[:, 1]))
     stretch = np.exp(h[:, pulled])
@@ -86,7 +91,8 @@ def trellis_curve(
     ends = np.asarray(angle, dtype=float)
     fine = _refined(ends)
     rows = np.empty((len(fine), 9))
-    strain, stress = np.zeros((1, 3)), np.zeros((1, 3))
+    strain = np.zeros((1, 3))
+    stress = np.zeros((1, 3))
     for i, turn in enumerate(fine):
         gradient = np.array([[[1.0, np.sin(turn)], [0.0, np.cos(turn)]]])
         pk2, _, strain, stress = law.second_piola_kirchhoff(gradient, strain, stress)
@@ -96,7 +102,9 @@ def trellis_curve(
             None, "beta", "a modulus or 1 - nu12 nu21 is not positive in a trellis shear"
         )
     rows = _at(ends, rows)
-    yarns, s12, area = rows[:, :2], rows[:, 2], np.exp(rows[:, 3] + rows[:, 4])
+    yarns = rows[:, :2]
+    s12 = rows[:, 2]
+    area = np.exp(rows[:, 3] + rows[:, 4])
     if measure == "nominal":
         # S12 dC12 = T d(angle) with C12 = sin(angle).
         return ends, s12 * np.cos(ends), yarns
@@ -157,9 +165,18 @@ def biaxial_response(
     slope = np.full((len(asked), 2, len(parameters)), np.nan)
     stable = np.zeros(len(asked), dtype=bool)
     reached = _path(
-        law.pieces, law.coupling, law.area_power, thickness, asked, rows, by_coupling, strain,
-        stress, slope, stable,
-    )  # fmt: skip
+        law.pieces,
+        law.coupling,
+        law.area_power,
+        thickness,
+        asked,
+        rows,
+        by_coupling,
+        strain,
+        stress,
+        slope,
+        stable,
+    )
     return BiaxialResponse(strain, stress, slope, int(reached), stable)
 
 
@@ -189,12 +206,22 @@ def _path(  # type: ignore[no-untyped-def]
     pieces, coupling, power, thickness, loads, rows, by_coupling, strain, stress, slope, stable
 ):
     """Solve load by load; return how many have an equilibrium."""
-    nu, count = coupling[0], by_coupling.shape[1]
-    h, h_old, trial, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    tangent, slopes = np.empty((3, 3)), np.empty(SLOPES)
-    rest, k, step = np.empty(2), np.empty((2, 2)), np.empty(2)
+    nu = coupling[0]
+    count = by_coupling.shape[1]
+    h = np.zeros(3)
+    h_old = np.zeros(3)
+    trial = np.zeros(3)
+    s = np.zeros(3)
+    s_old = np.zeros(3)
+    tangent = np.empty((3, 3))
+    slopes = np.empty(SLOPES)
+    rest = np.empty(2)
+    k = np.empty((2, 2))
+    step = np.empty(2)
     weights = np.empty((pieces.shape[1], 4))
-    dh, ds, own = np.zeros((2, count)), np.zeros((2, count)), np.zeros((2, count))
+    dh = np.zeros((2, count))
+    ds = np.zeros((2, count))
+    own = np.zeros((2, count))
     largest = 1e-12
     for n in range(len(loads)):
         load = loads[n]
@@ -212,11 +239,23 @@ def _path(  # type: ignore[no-untyped-def]
             step[1] = (k[1, 0] * rest[0] - k[0, 0] * rest[1]) / det
             share = 1.0
             for _ in range(HALVINGS):
-                trial[0], trial[1] = h[0] + share * step[0], h[1] + share * step[1]
+                trial[0] = h[0] + share * step[0]
+                trial[1] = h[1] + share * step[1]
                 good = _forces(
-                    pieces, coupling, power, thickness, load, h_old, s_old, trial, s, tangent,
-                    slopes, rest, k,
-                )  # fmt: skip
+                    pieces,
+                    coupling,
+                    power,
+                    thickness,
+                    load,
+                    h_old,
+                    s_old,
+                    trial,
+                    s,
+                    tangent,
+                    slopes,
+                    rest,
+                    k,
+                )
                 if good and (_size(rest) < before or before < 1e-9 * largest):
                     break
                 share *= 0.5
@@ -226,7 +265,8 @@ def _path(  # type: ignore[no-untyped-def]
         if not good or not _size(rest) <= 1e-9 * largest:
             return n
         det = k[0, 0] * k[1, 1] - k[0, 1] * k[1, 0]
-        a, b = k[0, 0] * math.exp(-h[0]), k[1, 1] * math.exp(-h[1])
+        a = k[0, 0] * math.exp(-h[0])
+        b = k[1, 1] * math.exp(-h[1])
         across = 0.5 * (k[0, 1] * math.exp(-h[1]) + k[1, 0] * math.exp(-h[0]))
         stable[n] = a > 0.0 and a * b > across * across
         if count > 0:
@@ -241,16 +281,21 @@ def _path(  # type: ignore[no-untyped-def]
             arm1 = thickness * math.exp(power * (h[0] + h[1]) - h[1])
             for j in range(count):
                 stress_rate(slopes, nu, own, by_coupling, j, dh, ds, ds)
-                a0, a1 = ds[0, j], ds[1, j]
-                r0, r1 = arm0 * a0, arm1 * a1
+                a0 = ds[0, j]
+                a1 = ds[1, j]
+                r0 = arm0 * a0
+                r1 = arm1 * a1
                 dh[0, j] = (k[0, 1] * r1 - k[1, 1] * r0) / det
                 dh[1, j] = (k[1, 0] * r0 - k[0, 0] * r1) / det
                 ds[0, j] = a0 + tangent[0, 0] * dh[0, j] + tangent[0, 1] * dh[1, j]
                 ds[1, j] = a1 + tangent[1, 0] * dh[0, j] + tangent[1, 1] * dh[1, j]
-                slope[n, 0, j], slope[n, 1, j] = dh[0, j], dh[1, j]
+                slope[n, 0, j] = dh[0, j]
+                slope[n, 1, j] = dh[1, j]
         for i in range(2):
-            strain[n, i], stress[n, i] = h[i], s[i]
-        h_old, s_old = h.copy(), s.copy()
+            strain[n, i] = h[i]
+            stress[n, i] = s[i]
+        h_old = h.copy()
+        s_old = s.copy()
     return len(loads)
 
 
@@ -298,13 +343,18 @@ def closed_path(
 @compiled()
 def _work(pieces, coupling, path):  # type: ignore[no-untyped-def]
     """Return (n,) MPa, the work of each increment of strain from rest to path (n, 3), or NaN."""
-    work, tangent, slopes = np.full(len(path), np.nan), np.empty((3, 3)), np.empty(SLOPES)
-    h, s, s_old = np.zeros(3), np.zeros(3), np.zeros(3)
+    work = np.full(len(path), np.nan)
+    tangent = np.empty((3, 3))
+    slopes = np.empty(SLOPES)
+    h = np.zeros(3)
+    s = np.zeros(3)
+    s_old = np.zeros(3)
     for n in range(len(path)):
         if not stress_update(pieces, coupling, path[n], h, s_old, s, tangent, slopes):
             break
         work[n] = 0.5 * ((s + s_old) * (path[n] - h)).sum()
-        h, s_old = path[n], s.copy()
+        h = path[n]
+        s_old = s.copy()
     return work
 
 
@@ -326,7 +376,8 @@ def largest_load(
                 return False
         return True
 
-    low, high = 0.0, MOST
+    low = 0.0
+    high = MOST
     for _ in range(HALVINGS_BIAXIAL_REACH):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if within(middle) else (low, middle)
@@ -432,7 +483,8 @@ def _meetings(law: HypoelasticLaw, name: str, end: float) -> tuple[Array, Array]
 
 
 def _error(law: HypoelasticLaw, name: str, strain: Array, modulus: Array, jumps: Array) -> float:
-    starts, widths = strain[:-1], np.diff(strain)
+    starts = strain[:-1]
+    widths = np.diff(strain)
     smooth = ~np.isin(starts, jumps)
     shares = np.arange(1, BETWEEN) / BETWEEN
     x = (starts[smooth, None] + widths[smooth, None] * shares).ravel()

@@ -36,16 +36,30 @@ def least_principal(a: float, b: float, c: float) -> float:
 @compiled()
 def _normal(angle: float, n: Array, m: Array) -> None:
     """Write strain n n' of a wrinkle, which takes the stress across it, and m, that along it."""
-    c, s = math.cos(angle), math.sin(angle)
-    n[0], n[1], n[2] = c * c, s * s, 2.0 * c * s
-    m[0], m[1], m[2] = -c * s, c * s, c * c - s * s
+    c = math.cos(angle)
+    s = math.sin(angle)
+    n[0] = c * c
+    n[1] = s * s
+    n[2] = 2.0 * c * s
+    m[0] = -c * s
+    m[1] = c * s
+    m[2] = c * c - s * s
 
 
 @compiled()
 def _across(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
-    n: Array, size: float, he: Array, s: Array, tangent: Array, slopes: Array,
-) -> float:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    n: Array,
+    size: float,
+    he: Array,
+    s: Array,
+    tangent: Array,
+    slopes: Array,
+) -> float:
     """Return the size of a wrinkle strain along n without stress across it; NaN if not found."""
     scale = abs(size) + 1e-3
     for _ in range(ITERATIONS):
@@ -53,7 +67,8 @@ def _across(
             he[i] = h[i] + size * n[i]
         if not stress_update(pieces, coupling, he, h_old, s_old, s, tangent, slopes):
             return math.nan
-        across, slope = 0.0, 0.0
+        across = 0.0
+        slope = 0.0
         for i in range(3):
             across += n[i] * s[i]
             for j in range(3):
@@ -74,17 +89,26 @@ def _along(s: Array, m: Array) -> float:
 
 @compiled()
 def _start(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
-    n: Array, m: Array, he: Array, s: Array, tangent: Array, slopes: Array,
-) -> tuple[float, float]:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    n: Array,
+    m: Array,
+    he: Array,
+    s: Array,
+    tangent: Array,
+    slopes: Array,
+) -> tuple[float, float]:
     """Return angle and size between the two normals where the shear along changes its sign."""
-    before, size_before, angle_before = math.nan, 0.0, 0.0
+    before = math.nan
+    size_before = 0.0
+    angle_before = 0.0
     for k in range(NORMALS + 1):
         angle = k * math.pi / NORMALS
         _normal(angle, n, m)
-        size = _across(
-            pieces, coupling, h, h_old, s_old, n, 0.0, he, s, tangent, slopes
-        )  # fmt: skip
+        size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s, tangent, slopes)
         if math.isnan(size) or size <= 0.0 or s[0] + s[1] < 0.0:
             before = math.nan
             continue
@@ -93,16 +117,29 @@ def _start(
         if before <= 0.0 <= shear:
             part = 0.5 if before == shear else before / (before - shear)
             return angle_before + part * (angle - angle_before), size_before
-        before, size_before, angle_before = shear, size, angle
+        before = shear
+        size_before = size
+        angle_before = angle
     return math.nan, math.nan
 
 
 @compiled()
 def _wrinkle(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
-    angle: float, size: float, n: Array, m: Array,
-    he: Array, s: Array, tangent: Array, slopes: Array, inverse: Array,
-) -> tuple[float, float]:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    angle: float,
+    size: float,
+    n: Array,
+    m: Array,
+    he: Array,
+    s: Array,
+    tangent: Array,
+    slopes: Array,
+    inverse: Array,
+) -> tuple[float, float]:
     """Return angle and size of the wrinkle strain by Newton; inverse (2, 2) of its slope."""
     scale = abs(s[0]) + abs(s[1]) + abs(s[2])
     for _ in range(ITERATIONS):
@@ -113,8 +150,10 @@ def _wrinkle(
             return math.nan, math.nan
         across = n[0] * s[0] + n[1] * s[1] + n[2] * s[2]
         shear = _along(s, m)
-        a, b = 0.0, 2.0 * shear
-        c, d = 0.0, s[0] + s[1] - 2.0 * across
+        a = 0.0
+        b = 2.0 * shear
+        c = 0.0
+        d = s[0] + s[1] - 2.0 * across
         for i in range(3):
             for j in range(3):
                 a += n[i] * tangent[i, j] * n[j]
@@ -124,8 +163,10 @@ def _wrinkle(
         det = a * d - b * c
         if not (a > 0.0 and det > 0.0):
             return math.nan, math.nan
-        inverse[0, 0], inverse[0, 1] = d / det, -b / det
-        inverse[1, 0], inverse[1, 1] = -c / det, a / det
+        inverse[0, 0] = d / det
+        inverse[0, 1] = -b / det
+        inverse[1, 0] = -c / det
+        inverse[1, 1] = a / det
         if abs(across) + abs(shear) < 1e-12 * (scale + abs(s[0]) + abs(s[1]) + abs(a) * 1e-3):
             if size < 0.0 or s[0] + s[1] < 0.0:
                 return math.nan, math.nan
@@ -138,9 +179,15 @@ def _wrinkle(
 
 @compiled()
 def slack(
-    pieces: Array, coupling: Coupling, h_old: Array, s_old: Array,
-    he: Array, s: Array, tangent: Array, slopes: Array,
-) -> bool:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    h_old: Array,
+    s_old: Array,
+    he: Array,
+    s: Array,
+    tangent: Array,
+    slopes: Array,
+) -> bool:
     """Write the strain of the fabric without any stress to he."""
     for i in range(3):
         he[i] = h_old[i]
@@ -164,40 +211,87 @@ def slack(
 
 @compiled()
 def wrinkled(
-    pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array,
-    away: tuple[float, float], he: Array, s_new: Array, tangent: Array, slopes: Array,
+    pieces: Array,
+    coupling: Coupling,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    away: tuple[float, float],
+    he: Array,
+    s_new: Array,
+    tangent: Array,
+    slopes: Array,
     strain_slope: Array,
-) -> bool:  # fmt: skip
+) -> bool:
     """Find a wrinkle between the `away` angles: he, s_new, and the derivative of he by h."""
-    n, m, inverse = np.empty(3), np.empty(3), np.empty((2, 2))
+    n = np.empty(3)
+    m = np.empty(3)
+    inverse = np.empty((2, 2))
     # First the normal of the smaller principal stress that the taut fabric would have.
     angle = 0.5 * math.atan2(-s_new[2], -0.5 * (s_new[0] - s_new[1]))
     _normal(angle, n, m)
     size = _across(pieces, coupling, h, h_old, s_old, n, 0.0, he, s_new, tangent, slopes)
     if not math.isnan(size):
         angle, size = _wrinkle(
-            pieces, coupling, h, h_old, s_old, angle, size, n, m,
-            he, s_new, tangent, slopes, inverse,
-        )  # fmt: skip
+            pieces,
+            coupling,
+            h,
+            h_old,
+            s_old,
+            angle,
+            size,
+            n,
+            m,
+            he,
+            s_new,
+            tangent,
+            slopes,
+            inverse,
+        )
     if math.isnan(size):
         # Hardly taut along the wrinkle: the normal is nearly that of the slack state.
         s_new[:] = 0.0
         angle, size = _wrinkle(
-            pieces, coupling, h, h_old, s_old, away[0], away[1], n, m,
-            he, s_new, tangent, slopes, inverse,
-        )  # fmt: skip
+            pieces,
+            coupling,
+            h,
+            h_old,
+            s_old,
+            away[0],
+            away[1],
+            n,
+            m,
+            he,
+            s_new,
+            tangent,
+            slopes,
+            inverse,
+        )
     if math.isnan(size):
         angle, size = _start(pieces, coupling, h, h_old, s_old, n, m, he, s_new, tangent, slopes)
         if not math.isnan(size):
             angle, size = _wrinkle(
-                pieces, coupling, h, h_old, s_old, angle, size, n, m,
-                he, s_new, tangent, slopes, inverse,
-            )  # fmt: skip
+                pieces,
+                coupling,
+                h,
+                h_old,
+                s_old,
+                angle,
+                size,
+                n,
+                m,
+                he,
+                s_new,
+                tangent,
+                slopes,
+                inverse,
+            )
     if math.isnan(size):
         return False
     # d(size, angle) = -inverse [n; m] T dh, and he changes by n d(size) + 2 size m d(angle) + dh.
     for j in range(3):
-        across, shear = 0.0, 0.0
+        across = 0.0
+        shear = 0.0
         for i in range(3):
             across += n[i] * tangent[i, j]
             shear += m[i] * tangent[i, j]
@@ -210,9 +304,19 @@ def wrinkled(
 
 @compiled()
 def relaxed_update(
-    pieces: Array, coupling: Coupling, share: float, h: Array, h_old: Array, s_old: Array,
-    he: Array, s_new: Array, carried: Array, tangent: Array, slopes: Array, strain_slope: Array,
-) -> int:  # fmt: skip
+    pieces: Array,
+    coupling: Coupling,
+    share: float,
+    h: Array,
+    h_old: Array,
+    s_old: Array,
+    he: Array,
+    s_new: Array,
+    carried: Array,
+    tangent: Array,
+    slopes: Array,
+    strain_slope: Array,
+) -> int:
     """Integrate as `stress_update`, for a membrane that wrinkles.
 
     h (3,) total strain at the end; h_old, s_old (3,) strain and stress OF THE FABRIC at the start.
@@ -232,10 +336,15 @@ def relaxed_update(
         for i in range(3):
             carried[i] = s_new[i]
         return 0
-    t0, t1, t2 = s_new[0], s_new[1], s_new[2]
-    state, away = 1, (0.0, 0.0)
+    t0 = s_new[0]
+    t1 = s_new[1]
+    t2 = s_new[2]
+    state = 1
+    away = (0.0, 0.0)
     if slack(pieces, coupling, h_old, s_old, he, s_new, tangent, slopes):
-        w0, w1, w2 = he[0] - h[0], he[1] - h[1], 0.5 * (he[2] - h[2])
+        w0 = he[0] - h[0]
+        w1 = he[1] - h[1]
+        w2 = 0.5 * (he[2] - h[2])
         if least_principal(w0, w1, w2) >= -ROUNDING:
             state = 2
             strain_slope[:] = 0.0
@@ -244,10 +353,12 @@ def relaxed_update(
             0.5 * (w0 + w1) + math.hypot(0.5 * (w0 - w1), w2),
         )
     if state == 1:
-        s_new[0], s_new[1], s_new[2] = t0, t1, t2
+        s_new[0] = t0
+        s_new[1] = t1
+        s_new[2] = t2
         if not wrinkled(
             pieces, coupling, h, h_old, s_old, away, he, s_new, tangent, slopes, strain_slope
-        ):  # fmt: skip
+        ):
             return -1
     nu = coupling[0]
     warp = increment_modulus(pieces, WARP, 0.0, 0.0)[0]
@@ -273,14 +384,31 @@ def relaxed_update(
 
 @compiled()
 def relaxed_membrane_stress(
-    m: float, q: float, c: float, pieces: Array, coupling: Coupling, area_power: float,
-    share: float, h_old: Array, s_old: Array, h: Array, he: Array, s_new: Array, pk2: Array,
-    stiffness: Array, p: Array, law_tangent: Array, slopes: Array, pull: Array, work: Array,
-) -> int:  # fmt: skip
+    m: float,
+    q: float,
+    c: float,
+    pieces: Array,
+    coupling: Coupling,
+    area_power: float,
+    share: float,
+    h_old: Array,
+    s_old: Array,
+    h: Array,
+    he: Array,
+    s_new: Array,
+    pk2: Array,
+    stiffness: Array,
+    p: Array,
+    law_tangent: Array,
+    slopes: Array,
+    pull: Array,
+    work: Array,
+) -> int:
     """Return as `membrane_stress`, of a membrane that wrinkles; or -1."""
     if not log_strain(m, q, c, h, p):
         return -1
-    carried, slope = np.empty(3), np.empty((3, 3))
+    carried = np.empty(3)
+    slope = np.empty((3, 3))
     state = relaxed_update(
         pieces, coupling, share, h, h_old, s_old, he, s_new, carried, law_tangent, slopes, slope
     )
@@ -301,13 +429,30 @@ def relaxed_increments(
     pieces: Array, coupling: Coupling, h: Array, h_old: Array, s_old: Array
 ) -> tuple[Array, Array]:
     """Return strain and stress (n, 3) of the fabric at total strains h, or NaN; see above."""
-    he, s = np.empty(h.shape), np.empty(h.shape)
-    carried, slopes = np.empty(3), np.empty(SLOPES)
-    tangent, strain_slope = np.empty((3, 3)), np.empty((3, 3))
+    he = np.empty(h.shape)
+    s = np.empty(h.shape)
+    carried = np.empty(3)
+    slopes = np.empty(SLOPES)
+    tangent = np.empty((3, 3))
+    strain_slope = np.empty((3, 3))
     for i in range(len(h)):
-        if relaxed_update(
-            pieces, coupling, 0.0, h[i], h_old[i], s_old[i], he[i], s[i], carried, tangent,
-            slopes, strain_slope,
-        ) < 0:  # fmt: skip
-            he[i], s[i] = np.nan, np.nan
+        if (
+            relaxed_update(
+                pieces,
+                coupling,
+                0.0,
+                h[i],
+                h_old[i],
+                s_old[i],
+                he[i],
+                s[i],
+                carried,
+                tangent,
+                slopes,
+                strain_slope,
+            )
+            < 0
+        ):
+            he[i] = np.nan
+            s[i] = np.nan
     return he, s

@@ -56,22 +56,27 @@ class PlainWall:
     def pull(self, strain: Array, pressure: float, radius: float) -> tuple[Array, Array]:
         """Return the force along the tube per width (N/mm) and its derivative by the strain."""
         by_hoop = self.poisson * self.hoop / self.axial * pressure * radius
-        force, slope = by_hoop + self.axial * strain, np.full_like(strain, self.axial)
+        force = by_hoop + self.axial * strain
+        slope = np.full_like(strain, self.axial)
         if self.wrinkles:
             left = np.where(force < 0, LEFT, 1.0)
-            force, slope = left * force, left * slope
+            force = left * force
+            slope = left * slope
         return force, slope
 
     def at_rest(self, pressure: float, radius: float, cords: Sequence[Cord]) -> float:
         """Return the strain along the inflated tube, at which wall and cords hold the thrust."""
-        low, high = -1.0, 1.0
+        low = -1.0
+        high = 1.0
         for _ in range(60):
             strain = 0.5 * (low + high)
             held = 2 * math.pi * radius * self.pull(np.array([strain]), pressure, radius)[0][0]
             held += sum(
                 float(c.table.pull(strain + c.prestrain, c.tension_only)[0])
-                if c.initial_force is None else c.initial_force for c in cords
-            )  # fmt: skip
+                if c.initial_force is None
+                else c.initial_force
+                for c in cords
+            )
             low, high = (strain, high) if held < pressure * math.pi * radius**2 else (low, strain)
         return 0.5 * (low + high)
 
@@ -102,7 +107,8 @@ class BraidedWall:
     @cached_property
     def laminate(self) -> Array:
         """Return the stiffness (3, 3) N/mm of yarns and bladder: along, around, shear."""
-        c, s = math.cos(math.radians(self.angle)), math.sin(math.radians(self.angle))
+        c = math.cos(math.radians(self.angle))
+        s = math.sin(math.radians(self.angle))
         to_yarn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s],
                             [-2 * c * s, 2 * c * s, c * c - s * s]])  # fmt: skip
         one = to_yarn.T @ np.diag([self.yarn, self.across, self.yarn_shear]) @ to_yarn
@@ -169,7 +175,8 @@ class TubeSection:
     @property
     def starts(self) -> list[float]:
         """Return the forces (N) of the cords in the inflated tube."""
-        wall, held = self.wall, self.wall.at_rest(self.pressure, self.radius, self.cords)
+        wall = self.wall
+        held = self.wall.at_rest(self.pressure, self.radius, self.cords)
         free = [c for c in self.cords if c.initial_force is None]
         given = sum(c.initial_force or 0.0 for c in self.cords)
         forces = []
@@ -189,10 +196,11 @@ class TubeSection:
         own = zip(self.cords, self.starts, strict=True)
         braided = isinstance(self.wall, BraidedWall)
         return rest, [
-            c.table.strain_at(force) if braided or c.initial_force is not None
+            c.table.strain_at(force)
+            if braided or c.initial_force is not None
             else rest + c.prestrain
             for c, force in own
-        ]  # fmt: skip
+        ]
 
     @property
     def shear(self) -> float:
@@ -208,14 +216,18 @@ class TubeSection:
             rest + strain[:, None] - curvature[:, None] * heights, self.pressure, self.radius
         )
         width = 2 * math.pi * self.radius / AROUND
-        fibres, pulls, slopes = [heights], [width * force], [width * slope]
+        fibres = [heights]
+        pulls = [width * force]
+        slopes = [width * slope]
         for cord, start in zip(self.cords, starts, strict=True):
             height = self.radius * math.cos(math.radians(cord.angle))
             own = cord.table.pull(start + strain - curvature * height, cord.tension_only)
             fibres.append(np.array([height]))
             pulls.append(own[0][:, None])
             slopes.append(own[1][:, None])
-        y, f, k = np.concatenate(fibres), np.hstack(pulls), np.hstack(slopes)
+        y = np.concatenate(fibres)
+        f = np.hstack(pulls)
+        k = np.hstack(slopes)
         normal = f.sum(axis=1) - math.pi * self.pressure * self.radius**2
         mixed = -(k @ y)
         rows = [[k.sum(axis=1), mixed], [mixed, k @ y**2]]

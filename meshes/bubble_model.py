@@ -44,8 +44,10 @@ class OfThickness:
 
 #: Pinned rim; symmetry lines where the mesh has them.
 RIM_AND_SYMMETRY: Mapping[str, tuple[int, ...]] = {
-    "rim": (0, 1, 2), "symmetry_x": (0,), "symmetry_y": (1,)
-}  # fmt: skip
+    "rim": (0, 1, 2),
+    "symmetry_x": (0,),
+    "symmetry_y": (1,),
+}
 #: Parameters of the stress-free sheet beside its modes.
 SLACK = ("slack_warp", "slack_fill")
 #: The angle, in radians, by which the yarns are turned in the plane, from x to y.
@@ -141,7 +143,8 @@ class BubbleModel:
         """Return the step of each wanted level: the nearest, or of a history the last in turn."""
         if not self.unloaded:
             return places_of(wanted.tolist(), steps.tolist())
-        found, end = list[int](), len(steps)
+        found = list[int]()
+        end = len(steps)
         for level in wanted[::-1]:
             same = np.flatnonzero(np.isclose(steps[:end], level, rtol=1e-9, atol=0.0))
             end = int(same[-1]) if len(same) else 0
@@ -180,12 +183,14 @@ class BubbleModel:
             turned = [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
             yarns = np.array(np.broadcast_to(np.stack(turned, axis=-1), (len(self.mesh.quads), 3)))
         return replace(
-            self, mesh=replace(self.mesh, points=points, warp=yarns),
+            self,
+            mesh=replace(self.mesh, points=points, warp=yarns),
             thickness=self.thickness + values.get(THICKNESS, 0.0),
             pressures=[p + offset for p in self.pressures],
-            increments=[p + offset for p in self.increments], slack=(warp, fill),
+            increments=[p + offset for p in self.increments],
+            slack=(warp, fill),
             strain=strain,
-        )  # fmt: skip
+        )
 
     @property
     def stress_free(self) -> Array:
@@ -211,7 +216,8 @@ class BubbleModel:
     def sheet_slope(self, name: str) -> tuple[Array, Array, Array, Array]:
         """Return derivatives by one of reference surface and `stress_free` (nodes, 3), `yarn` and
         `stretch`."""
-        surface, sheet = np.zeros_like(self.mesh.points), np.zeros_like(self.mesh.points)
+        surface = np.zeros_like(self.mesh.points)
+        sheet = np.zeros_like(self.mesh.points)
         yarn = np.cross([0.0, 0.0, float(name == TURN)], self.yarn)
         if name in self.modes:
             surface[:, 2] = sheet[:, 2] = self.modes[name]
@@ -259,10 +265,21 @@ class MeasuredShape(BubbleModel):
     def of(cls, model: BubbleModel, moved: Array, fields: Array) -> Self:
         """Return the shape of a model; its pressures are the steps of the law."""
         return cls(
-            model.mesh, model.thickness, model.pressures, (), model.supports, model.modes,
-            model.slack, model.strain, model.strains, moved[:, model.mesh.node_sets["rim"]], moved,
-            fields, unloaded=model.unloaded, cords=model.cords,
-        )  # fmt: skip
+            model.mesh,
+            model.thickness,
+            model.pressures,
+            (),
+            model.supports,
+            model.modes,
+            model.slack,
+            model.strain,
+            model.strains,
+            moved[:, model.mesh.node_sets["rim"]],
+            moved,
+            fields,
+            unloaded=model.unloaded,
+            cords=model.cords,
+        )
 
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:

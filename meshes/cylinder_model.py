@@ -129,7 +129,8 @@ class ForceTable:
         force = self.force[i] + slope * (e - self.strain[i])
         if tension_only:
             slack = force < 0
-            force, slope = np.where(slack, 0.0, force), np.where(slack, 0.0, slope)
+            force = np.where(slack, 0.0, force)
+            slope = np.where(slack, 0.0, slope)
         return force, slope
 
     def strain_at(self, force: float) -> float:
@@ -250,7 +251,8 @@ class CylinderModel:
 
     def _check_bodies(self) -> None:
         p = self.mesh.points
-        half, diameter = np.abs(p[:, 2]).max(), self.diameter
+        half = np.abs(p[:, 2]).max()
+        diameter = self.diameter
         row = np.abs(p[self.mesh.node_sets["support"], 2])
         if not np.allclose(row, 0.5 * self.supports.span, rtol=NEAR):
             problem = f"{self.supports.span:g} mm, but the mesh has its row at {row[0]:g} mm"
@@ -388,13 +390,22 @@ FINER, BESIDE_COLLAR, BESIDE_SUPPORT = 0.25, 15.0, 40.0
 
 
 def inflated_cylinder(
-    diameter: float, pressure: float, thickness: float, size: float, length: float = LENGTH,
-    seam_width: float = SEAM_WIDTH, supports: RigidSupports | None = None,
-    collar: Collar | None = None, deflections: Sequence[float] | None = None,
-    symmetry: Literal["quarter", "full"] = "quarter", cap_warp: Literal["x", "y"] = "x",
-    gas: Gas | None = None, reading: CurveReading | None = None, cords: Sequence[Cord] = (),
+    diameter: float,
+    pressure: float,
+    thickness: float,
+    size: float,
+    length: float = LENGTH,
+    seam_width: float = SEAM_WIDTH,
+    supports: RigidSupports | None = None,
+    collar: Collar | None = None,
+    deflections: Sequence[float] | None = None,
+    symmetry: Literal["quarter", "full"] = "quarter",
+    cap_warp: Literal["x", "y"] = "x",
+    gas: Gas | None = None,
+    reading: CurveReading | None = None,
+    cords: Sequence[Cord] = (),
     weight: float = 0.0,
-) -> CylinderModel:  # fmt: skip
+) -> CylinderModel:
     """Return a cylinder that is inflated and bent; lengths in mm before inflation, pressure in MPa.
 
     thickness : of one layer; the seam has three. size : of an element; around the tube 0.4 of that,
@@ -407,7 +418,8 @@ def inflated_cylinder(
     if not supports.span + supports.width < length:
         problem = f"{supports.span:g} mm does not fit under {length:g} mm of cylinder"
         raise InputError(None, "supports.span", problem)
-    fine, beside = FINER * size, BESIDE_SUPPORT
+    fine = FINER * size
+    beside = BESIDE_SUPPORT
     if supports.saddle is not None:
         beside = 0.5 * supports.saddle.length + BESIDE_COLLAR
     zones = (
@@ -422,6 +434,14 @@ def inflated_cylinder(
         deflections = np.linspace(0.0, DEFLECTION, FRAMES + 1)[1:].tolist()
     steps = np.linspace(0.0, pressure, INFLATION + 1)[1:].tolist()
     return CylinderModel(
-        mesh, thickness * layers, steps, deflections, collar, supports, gas or Gas(),
-        reading=reading or curve_reading(diameter), cords=cords, weight=weight
-    )  # fmt: skip
+        mesh,
+        thickness * layers,
+        steps,
+        deflections,
+        collar,
+        supports,
+        gas or Gas(),
+        reading=reading or curve_reading(diameter),
+        cords=cords,
+        weight=weight,
+    )

@@ -65,7 +65,8 @@ def _arc(start: Array, end: Array, turn: float, t: Array) -> Array:
     chord = end - start
     length = np.sin(turn * t / 2) / math.sin(turn / 2)
     lean = -turn * (1 - t) / 2
-    c, s = np.cos(lean), np.sin(lean)
+    c = np.cos(lean)
+    s = np.sin(lean)
     direction = np.stack([c * chord[0] - s * chord[1], s * chord[0] + c * chord[1]], axis=1)
     return np.asarray(start + length[:, None] * direction)
 
@@ -91,9 +92,11 @@ NEAR = 1e-9
 
 
 def disk_mesh(
-    radius: float, elements: int, symmetry: Literal["full", "quarter"] = "full",
-    generator: Literal["blocks", "gmsh"] = "blocks"
-) -> Mesh:  # fmt: skip
+    radius: float,
+    elements: int,
+    symmetry: Literal["full", "quarter"] = "full",
+    generator: Literal["blocks", "gmsh"] = "blocks",
+) -> Mesh:
     """Mesh a disk of `radius` mm in the xy plane around the origin, or its quarter x, y >= 0.
 
     elements : wanted on the FULL disk, 8 or more; the number made is within 16 below 200 and 7 %
@@ -138,7 +141,8 @@ def monomials(count: int) -> list[tuple[int, int]]:
 
 def disk_modes(points: Array, radius: float, count: int) -> dict[str, Array]:
     """Return `count` modes (1 - r^2) x^a y^b at points (n, 2) mm over the radius: z0_1, z0_x ..."""
-    x, y = points[:, 0] / radius, points[:, 1] / radius
+    x = points[:, 0] / radius
+    y = points[:, 1] / radius
     dome = 1.0 - x**2 - y**2
     return {
         f"z0_{'x' * a}{'y' * b}" if a + b else "z0_1": dome * x**a * y**b
@@ -232,9 +236,11 @@ MOST_SLENDER = 4.0
 
 
 def elliptic_disk_mesh(
-    outline: Outline, elements: int, symmetry: Literal["full", "quarter"] = "full",
-    generator: Literal["blocks", "gmsh"] = "blocks"
-) -> Mesh:  # fmt: skip
+    outline: Outline,
+    elements: int,
+    symmetry: Literal["full", "quarter"] = "full",
+    generator: Literal["blocks", "gmsh"] = "blocks",
+) -> Mesh:
     """Mesh the sheet within an outline, in the xy plane; a circle has the mesh of `disk_mesh`."""
     disk = disk_mesh(outline.major, elements, symmetry, generator)
     if outline.round:

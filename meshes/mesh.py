@@ -44,9 +44,11 @@ class Mesh:
 
 
 def meshio_of(
-    mesh: Mesh, displacement: ArrayLike, point_data: Mapping[str, ArrayLike],
+    mesh: Mesh,
+    displacement: ArrayLike,
+    point_data: Mapping[str, ArrayLike],
     cell_data: Mapping[str, ArrayLike],
-) -> meshio.Mesh:  # fmt: skip
+) -> meshio.Mesh:
     """Return the mesh displaced by (n, 3) mm with its data; ValueError : not one row a node."""
     import meshio
 
@@ -107,7 +109,8 @@ def sampling_matrix(mesh: Mesh, points: Array) -> tuple[scipy.sparse.csr_matrix,
         owner[open_[hit]] = candidate[open_[hit], k]
         where[open_[hit]] = natural[hit]
     inside = owner >= 0
-    s, t = where[inside, 0], where[inside, 1]
+    s = where[inside, 0]
+    t = where[inside, 1]
     weights = 0.25 * np.stack(
         [(1 - s) * (1 - t), (1 + s) * (1 - t), (1 + s) * (1 + t), (1 - s) * (1 + t)], axis=1
     )
@@ -123,10 +126,12 @@ def _natural(corner: Array, point: Array) -> Array:
     b = 0.25 * (-corner[:, 0] + corner[:, 1] + corner[:, 2] - corner[:, 3])
     c = 0.25 * (-corner[:, 0] - corner[:, 1] + corner[:, 2] + corner[:, 3])
     d = 0.25 * (corner[:, 0] - corner[:, 1] + corner[:, 2] - corner[:, 3])
-    s, t = np.zeros(len(point)), np.zeros(len(point))
+    s = np.zeros(len(point))
+    t = np.zeros(len(point))
     for _ in range(12):
         gap = a + b * s[:, None] + c * t[:, None] + d * (s * t)[:, None] - point
-        by_s, by_t = b + d * t[:, None], c + d * s[:, None]
+        by_s = b + d * t[:, None]
+        by_t = c + d * s[:, None]
         det = by_s[:, 0] * by_t[:, 1] - by_s[:, 1] * by_t[:, 0]
         det = np.where(np.abs(det) < 1e-12, 1e-12, det)
         # A point far outside may have no answer: keep it bounded, it is then outside.
@@ -213,7 +218,9 @@ def volume_and_gradient(
 def _enclosed(points, quads, values, slopes, weight, origin, gradient):  # type: ignore[no-untyped-def]
     """Return the volume; add its derivative to `gradient` (n, 3). All Gauss weights are one."""
     volume = 0.0
-    x, a, normal = np.empty((4, 3)), np.empty((2, 3)), np.empty(3)
+    x = np.empty((4, 3))
+    a = np.empty((2, 3))
+    normal = np.empty(3)
     for e in range(quads.shape[0]):
         for n in range(4):
             for k in range(3):
@@ -285,7 +292,9 @@ def _terms(away: Array) -> Array:
 def _quadratics(mesh: Mesh) -> scipy.sparse.csr_matrix:
     nodes = mesh.points[:, :2]
     count = len(nodes)
-    rows, columns, values = [], [], []
+    rows = []
+    columns = []
+    values = []
     for node, near in enumerate(_neighbours(mesh)):
         away = nodes[near] - nodes[node]
         distance = np.hypot(*away.T)
@@ -304,7 +313,8 @@ def _quadratics(mesh: Mesh) -> scipy.sparse.csr_matrix:
 
 
 def _neighbours(mesh: Mesh) -> list[NDArray[np.intp]]:
-    count, each = len(mesh.points), mesh.quads.shape[1]
+    count = len(mesh.points)
+    each = mesh.quads.shape[1]
     of_quad = np.repeat(np.arange(len(mesh.quads)), each)
     ones = np.ones(mesh.quads.size, dtype=np.int64)
     belongs = scipy.sparse.csr_matrix(

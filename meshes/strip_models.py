@@ -15,9 +15,13 @@ from .mesh import Array, Mesh, keep_levels
 
 
 def strip_mesh(
-    width: float, length: float, across: int, along: int, gauge_length: float | None = None,
-    symmetry: Literal["full", "half"] = "full"
-) -> Mesh:  # fmt: skip
+    width: float,
+    length: float,
+    across: int,
+    along: int,
+    gauge_length: float | None = None,
+    symmetry: Literal["full", "half"] = "full",
+) -> Mesh:
     """Mesh a rectangle in the xy plane, the middle of the width at x = 0, y from 0 to length.
 
     width, length : mm, of the WHOLE strip. across, along : quads of what is meshed; even across on
@@ -33,14 +37,17 @@ def strip_mesh(
     x[middle] = 0.0
     row = across + 1
     points = np.zeros((row * (along + 1), 3))
-    points[:, 0], points[:, 1] = np.tile(x, along + 1), np.repeat(y, row)
+    points[:, 0] = np.tile(x, along + 1)
+    points[:, 1] = np.repeat(y, row)
     first = (row * np.arange(along)[:, None] + np.arange(across)).ravel()
     quads = np.stack([first, first + 1, first + row + 1, first + row], axis=1).astype(np.intp)
     nodes = np.arange(len(points)).reshape(along + 1, row)
     sets = {
-        "bottom": nodes[0], "top": nodes[-1], "gauge": nodes[[lower, along - lower], middle],
-        "free_edges": nodes[:, -1] if symmetry == "half" else np.sort(nodes[:, [0, -1]].ravel())
-    }  # fmt: skip
+        "bottom": nodes[0],
+        "top": nodes[-1],
+        "gauge": nodes[[lower, along - lower], middle],
+        "free_edges": nodes[:, -1] if symmetry == "half" else np.sort(nodes[:, [0, -1]].ravel()),
+    }
     if symmetry == "half":
         sets["symmetry_x"] = nodes[:, 0]
     return Mesh(points, quads, sets)
@@ -55,10 +62,8 @@ def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
     rows = int(inside[np.argmin(np.abs(inside / along - gauge / length))])
     outside = (along - rows) // 2
     ends = 0.5 * (length - gauge), 0.5 * (length + gauge)
-    before, after = (
-        np.linspace(0.0, ends[0], outside + 1),
-        np.linspace(ends[1], length, outside + 1),
-    )
+    before = np.linspace(0.0, ends[0], outside + 1)
+    after = np.linspace(ends[1], length, outside + 1)
     between = np.linspace(*ends, rows + 1)[1:-1]
     return np.concatenate([before, between, after]), outside
 
@@ -118,10 +123,15 @@ class UniaxialModel(OfThickness):
 
 
 def straight_strip(
-    direction: Literal["warp", "fill"], gauge_length: float, final_length: float, thickness: float,
-    width: float = WIDTH, increments: int = INCREMENTS, across: int = QUADS["straight"][0],
-    along: int = QUADS["straight"][1]
-) -> UniaxialModel:  # fmt: skip
+    direction: Literal["warp", "fill"],
+    gauge_length: float,
+    final_length: float,
+    thickness: float,
+    width: float = WIDTH,
+    increments: int = INCREMENTS,
+    across: int = QUADS["straight"][0],
+    along: int = QUADS["straight"][1],
+) -> UniaxialModel:
     """Return half of a warp or fill test over the gauge (mm; Fig. 3.5, Table 3.1; 40 quads)."""
     mesh = strip_mesh(width, gauge_length, across, along, symmetry="half")
     levels = _equal(gauge_length, final_length, increments)
@@ -131,10 +141,16 @@ def straight_strip(
 
 
 def bias_strip(
-    gauge_length: float, final_length: float, thickness: float, width: float = WIDTH,
-    length: float = GRIP_DISTANCE, angle: float = 45.0, increments: int = INCREMENTS,
-    across: int = QUADS["bias"][0], along: int = QUADS["bias"][1]
-) -> UniaxialModel:  # fmt: skip
+    gauge_length: float,
+    final_length: float,
+    thickness: float,
+    width: float = WIDTH,
+    length: float = GRIP_DISTANCE,
+    angle: float = 45.0,
+    increments: int = INCREMENTS,
+    across: int = QUADS["bias"][0],
+    along: int = QUADS["bias"][1],
+) -> UniaxialModel:
     """Return a whole bias test, `length` mm; angle : degrees from pull to warp (Fig. 3.6)."""
     mesh = strip_mesh(width, length, across, along, gauge_length)
     levels = _equal(gauge_length, final_length, increments)

@@ -49,11 +49,13 @@ def with_cap(
     """Return the tube with the half disk that closes it; and how many quads are the tube's."""
     quarter, pattern = divided_quarter_disk(n, max(1, round(n / 2)))
     disk, pattern, _ = with_mirror_image(snapped(quarter, NEAR), pattern, 1)
-    at, far = np.arctan2(disk[:, 0], -disk[:, 1]), np.hypot(disk[:, 0], disk[:, 1])
+    at = np.arctan2(disk[:, 0], -disk[:, 1])
+    far = np.hypot(disk[:, 0], disk[:, 1])
     even = np.linspace(0.0, math.pi, len(angle))
     # Turned with the square of the radius, so that the rim meets the tube's rows of nodes.
     at += far**2 * (np.interp(at, even, angle) - at)
-    end, radius = points[grid[-1, 0], 2], -points[grid[0, 0], 1]
+    end = points[grid[-1, 0], 2]
+    radius = -points[grid[0, 0], 1]
     flat = radius * snapped(np.stack([far * np.sin(at), -far * np.cos(at)], axis=1), NEAR)
     rim = far > 1 - NEAR
     number = np.empty(len(disk), dtype=np.intp)
@@ -125,10 +127,15 @@ CAP_WARP = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
 
 
 def cylinder_mesh(
-    length: float, diameter: float, size: float, seam_width: float = 0.0,
-    symmetry: Literal["quarter", "full"] = "quarter", refinements: Sequence[Refinement] = (),
-    cap_warp: Literal["x", "y"] = "x", around: float = 1.0
-) -> Mesh:  # fmt: skip
+    length: float,
+    diameter: float,
+    size: float,
+    seam_width: float = 0.0,
+    symmetry: Literal["quarter", "full"] = "quarter",
+    refinements: Sequence[Refinement] = (),
+    cap_warp: Literal["x", "y"] = "x",
+    around: float = 1.0,
+) -> Mesh:
     """Mesh the middle surface of a cylinder with flat caps.
 
     Nodes of the tube lie further out than the radius, so that polygons have the area of the circle.
@@ -168,9 +175,12 @@ def cylinder_mesh(
         nodes |= {"symmetry_x": points[:, 0] == 0, "symmetry_z": points[:, 2] == 0}
     warp = np.where(elements["caps"][:, None], CAP_WARP[cap_warp], (0.0, 0.0, 1.0))
     return Mesh(
-        points, quads, {name: np.flatnonzero(mask) for name, mask in nodes.items()},
-        {name: np.flatnonzero(mask) for name, mask in elements.items()}, warp
-    )  # fmt: skip
+        points,
+        quads,
+        {name: np.flatnonzero(mask) for name, mask in nodes.items()},
+        {name: np.flatnonzero(mask) for name, mask in elements.items()},
+        warp,
+    )
 
 
 def _check(length: float, diameter: float, size: float, seam_width: float, around: float) -> None:
@@ -193,10 +203,13 @@ def _lines(
 ) -> Masks:
     middle = grid.shape[1] // 2
     members = {
-        "ends": grid[-1], "mid_span": grid[0], "bottom_line": grid[:, 0],
-        "side_line": grid[:, middle], "top_line": grid[:, -1],
-        "cap_centres": np.flatnonzero((points[:, :2] == 0).all(axis=1))
-    }  # fmt: skip
+        "ends": grid[-1],
+        "mid_span": grid[0],
+        "bottom_line": grid[:, 0],
+        "side_line": grid[:, middle],
+        "top_line": grid[:, -1],
+        "cap_centres": np.flatnonzero((points[:, :2] == 0).all(axis=1)),
+    }
     for r in refinements:
         row = grid[int(np.argmin(np.abs(z - r.position)))]
         fresh = {r.name: row, f"{r.name}_bottom": row[:1]}
@@ -212,7 +225,8 @@ def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
     quads = np.concatenate([grid_quads(own.reshape(b.shape[:2])) for own, b in nodes])
     rounded = np.round(points, 6)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-    points, quads = points[first], inverse.ravel()[quads]
+    points = points[first]
+    quads = inverse.ravel()[quads]
     p = points[quads]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     inward = np.einsum("mk,mk->m", normal, p.mean(axis=1)) < 0
@@ -242,10 +256,12 @@ def half_tube(across: int, along: int, radius: float, length: float, caps: bool 
     circle[[0, -1], 0] = 0.0
     z = np.linspace(0, length, along + 1)
     side = np.empty((across + 1, along + 1, 3))
-    side[..., :2], side[..., 2] = circle[:, None], z
+    side[..., :2] = circle[:, None]
+    side[..., 2] = z
     blocks = [side]
     if caps:
-        quarter, c = across // 4, 0.5 * radius
+        quarter = across // 4
+        c = 0.5 * radius
         up = np.linspace(-c, c, across - 2 * quarter + 1)
         out = np.linspace(0, c, quarter + 1)
         core = np.concatenate(

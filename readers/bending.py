@@ -87,7 +87,8 @@ def _start(way: Array, force: Array, zero: Zero, path: Path, at: str, name: str)
     """Return the deflection that counts as zero, mm."""
     if zero != "line":
         return float(way[0]) if zero == "first" else 0.0
-    x, y = way[:FIRST_READINGS], force[:FIRST_READINGS]
+    x = way[:FIRST_READINGS]
+    y = force[:FIRST_READINGS]
     slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
     if not slope * np.ptp(x) > RISES * np.abs(y).max():
         problem = f"the first readings of {name!r} do not rise: no zero to be found"
@@ -145,7 +146,8 @@ def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
     """Return the load of a model (frames,) N less that read; None where it reaches no load."""
-    x, y = np.asarray(deflection, dtype=float), np.asarray(load, dtype=float)
+    x = np.asarray(deflection, dtype=float)
+    y = np.asarray(load, dtype=float)
     way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
     read = np.concatenate([c.load for c in curves]) if curves else np.empty(0)
     inside = (way >= x[0]) & (way <= x[-1])

@@ -55,8 +55,11 @@ class LoadCurve:
 
     def part(self, rows: slice, **changes: Any) -> LoadCurve:
         """Return the curve of these rows, with other values of its fields."""
-        kept = {n: v[rows] for n in ("elongation", "load", "time", "frame")
-                if (v := getattr(self, n)) is not None}  # fmt: skip
+        kept = {
+            n: v[rows]
+            for n in ("elongation", "load", "time", "frame")
+            if (v := getattr(self, n)) is not None
+        }
         return replace(self, **kept, **changes)
 
 
@@ -90,7 +93,8 @@ def read_load_curves(
     gauge_length : mm, by direction, for engineering strains. direction : of a file without such a
     column; else the rows to keep. decimal : where 1,234 is in doubt. sheet : of a workbook.
     """
-    path, named = Path(path), dict(columns or {})
+    path = Path(path)
+    named = dict(columns or {})
     for name in named:
         check_one_of(name, QUANTITIES, "columns")
     check_one_of(decimal, (".", ","), "decimal")
@@ -98,9 +102,11 @@ def read_load_curves(
     options = TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
     found = read_machine_table(path, options, format)
     column = {quantity: found.column(quantity) for quantity in QUANTITIES}
-    said, units = column["elongation"], tables.LENGTH_UNITS | tables.STRAIN_UNITS
+    said = column["elongation"]
+    units = tables.LENGTH_UNITS | tables.STRAIN_UNITS
     elongation = found.values(said, units, Channel(unit=length_unit), "length_unit")
-    units, own = dict(tables.LOAD_UNITS), found.units[column["load"]]
+    units = dict(tables.LOAD_UNITS)
+    own = found.units[column["load"]]
     if own in tables.WIDTH_LOAD_UNITS or load_unit in tables.WIDTH_LOAD_UNITS:
         if width is None:
             problem = f"{own or load_unit} is a load per width; say the strip's width"
@@ -143,7 +149,9 @@ def read_load_curves(
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     """Return specimens listed without names: one starts where the elongation halves."""
-    u, starts, reached = curve.elongation, [0], 0.0
+    u = curve.elongation
+    starts = [0]
+    reached = 0.0
     for i, value in enumerate(u):
         if 0 < reached and value < 0.5 * reached:
             starts.append(i)
@@ -240,7 +248,8 @@ def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
     """Return the points as arrays (n,) mm and (n,) N, after checks of counts and values."""
-    u, f = np.asarray(elongation, dtype=float), np.asarray(load, dtype=float)
+    u = np.asarray(elongation, dtype=float)
+    f = np.asarray(load, dtype=float)
     if u.ndim != 1 or u.shape != f.shape:
         problem = f"expected as many elongations as loads, got {u.size} and {f.size}"
         raise InputError(None, "elongation", problem)
@@ -257,7 +266,8 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
     """Return powers (n, terms) of u / scale, the scale, and the lowest power."""
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
-    lowest, scale = int(through_origin), float(np.abs(u).max())
+    lowest = int(through_origin)
+    scale = float(np.abs(u).max())
     count = order + 1 - lowest
     if len(u) < count:
         problem = f"{count} coefficients need as many points, there are {len(u)}; lower it"

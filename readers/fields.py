@@ -71,17 +71,23 @@ def _field_of(frame: Frame, pressure: float) -> DisplacementField:
     # A height that no row has was not measured; one that some rows lack was lost there.
     measured = bool(np.isfinite(z).any())
     values = np.concatenate([frame.points[:, : 2 + measured], frame.displacement], axis=1)
-    whole, dropped = np.isfinite(values).all(axis=1), dict(frame.dropped)
+    whole = np.isfinite(values).all(axis=1)
+    dropped = dict(frame.dropped)
     if not whole.all():
         dropped[LOST] = dropped.get(LOST, 0) + int((~whole).sum())
     if not whole.any():
         why = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
         raise InputError(frame.path, "", f"no row is left to use: {why or 'there are none'}")
     return DisplacementField(
-        pressure, frame.points[whole, :2], frame.displacement[whole], dropped,
-        z[whole] if measured else None, None if frame.sigma is None else frame.sigma[whole],
-        frame.path, frame.source,
-    )  # fmt: skip
+        pressure,
+        frame.points[whole, :2],
+        frame.displacement[whole],
+        dropped,
+        z[whole] if measured else None,
+        None if frame.sigma is None else frame.sigma[whole],
+        frame.path,
+        frame.source,
+    )
 
 
 def powers(points: Array, degree: int) -> Array:
@@ -123,7 +129,8 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
     """Fit Eq. 4.4, of any degree, to a displacement field by least squares."""
     if not 0 <= degree <= MAX_DEGREE:
         raise InputError(None, "degree", f"expected 0 to {MAX_DEGREE}, got {degree}")
-    terms, count = (degree + 1) ** 2, len(field.points)
+    terms = (degree + 1) ** 2
+    count = len(field.points)
     at = f"surface of degree {degree} at {field.pressure * 1e3:g} kPa"
     if count < terms:
         problem = f"{terms} coefficients need as many points, there are {count}; lower the degree"
@@ -138,7 +145,8 @@ def fit_surface(field: DisplacementField, degree: int) -> DisplacementSurface:
         lie = f"the {count} points lie so that they settle only {rank} of {terms} coefficients"
         raise InputError(None, at, f"{lie} (on too few lines?); lower the degree")
     coefficients = (solution / length[:, None]).T
-    value, left = field.displacement, field.displacement - term @ coefficients.T
+    value = field.displacement
+    left = field.displacement - term @ coefficients.T
     about_mean = ((value - value.mean(axis=0)) ** 2).sum(axis=0)
     remaining = (left**2).sum(axis=0)
     # A constant direction (a clamped one, all zeros) has nothing to explain.
@@ -263,7 +271,8 @@ def _distances_least(
     for _ in range(100):
         off = np.linalg.norm(points - centre, axis=1) - radius
         step = np.linalg.lstsq(_slopes(points, centre), -off, rcond=None)[0]
-        centre, radius = centre + step[:3], radius + float(step[3])
+        centre = centre + step[:3]
+        radius = radius + float(step[3])
         if np.linalg.norm(step) <= 1e-12 * max(abs(radius), 1.0):
             break
     if not 0 < radius < LARGEST * float(np.ptp(points, axis=0).max()):

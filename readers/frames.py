@@ -126,7 +126,8 @@ def _less(frame: Frame, rest: Frame) -> Frame:
     if np.isfinite(frame.displacement).any():
         problem = "holds displacements, and a reference is for files of places alone; leave it out"
         raise InputError(frame.path, "", problem)
-    a, b = np.arange(len(frame.points)), np.arange(len(rest.points))
+    a = np.arange(len(frame.points))
+    b = np.arange(len(rest.points))
     if frame.ids is not None and rest.ids is not None:
         _, a, b = np.intersect1d(frame.ids, rest.ids, return_indices=True)
     if len(a) != len(b) or not len(a):
@@ -200,7 +201,8 @@ def heading_of(name: str, unit: str = "") -> Heading:
     plain, own = split_unit(name)
     at_the_end = _UNIT_AT_THE_END.match(name)
     if not own and at_the_end:
-        plain, own = at_the_end[1], at_the_end[2]
+        plain = at_the_end[1]
+        own = at_the_end[2]
     unit = own or unit
     words = [word for word in re.split(r"[\W_]+", plain.casefold()) if word]
     whole = " ".join(words)

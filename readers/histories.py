@@ -44,25 +44,35 @@ class LoadHistory:
 
 
 def read_history(
-    path: Path | str, *, columns: Mapping[str, str] | None = None, length: float | None = None,
-    load_unit: str | None = None, strain_unit: str | None = None, length_unit: str | None = None,
-    decimal: Literal[".", ","] | None = None, sheet: str | None = None, format: str | None = None,
-) -> LoadHistory:  # fmt: skip
+    path: Path | str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    length: float | None = None,
+    load_unit: str | None = None,
+    strain_unit: str | None = None,
+    length_unit: str | None = None,
+    decimal: Literal[".", ","] | None = None,
+    sheet: str | None = None,
+    format: str | None = None,
+) -> LoadHistory:
     """Read a whole load history: a plain table, or the export of an Instron, Zwick or MTS machine.
 
     columns : the file's own names of `QUANTITIES`. The strain is that of the column nearest to the
     specimen; length : mm between the points an elongation is of. units : where the file names none.
     """
-    path, named = Path(path), dict(columns or {})
+    path = Path(path)
+    named = dict(columns or {})
     for name in named:
         check_one_of(name, QUANTITIES, "columns")
     if length is not None and not length > 0:
         raise InputError(None, "length", f"expected a length above 0 mm, got {length:g}")
     along = {**named, **({"elongation": named["strain"]} if "strain" in named else {})}
     found = read_machine_table(path, TableOptions(along, decimal=decimal, sheet=sheet), format)
-    force, way = Channel(unit=load_unit), Channel(unit=length_unit)
+    force = Channel(unit=load_unit)
+    way = Channel(unit=length_unit)
     load = found.values(found.column("load"), tables.LOAD_UNITS, force, "load_unit")
-    names, notes = found.names, found.notes
+    names = found.names
+    notes = found.notes
     # A strain that is computed from the travel is the travel's.
     strains = [] if "elongation" in named else tables.strain_columns(names, found.units, named)
     strains = [n for n in strains if "strain" in named or not tables.is_between_grips(n, False)]
@@ -83,10 +93,14 @@ def read_history(
             strain = found.values(column, tables.LENGTH_UNITS, way, "length_unit") / length
         grips = tables.is_between_grips(column, "elongation" in named)
     machine = [
-        n for n in names
-        if n and n != column and tables.means(n, "elongation") and tables.distance_to_strip(n)
+        n
+        for n in names
+        if n
+        and n != column
+        and tables.means(n, "elongation")
+        and tables.distance_to_strip(n)
         and found.units[n] in tables.LENGTH_UNITS
-    ]  # fmt: skip
+    ]
     moved = named.get("travel") or (machine[0] if machine else "")
     travel = found.values(moved, tables.LENGTH_UNITS, way, "length_unit") if moved else None
     if len(load) < 2 or not np.ptp(strain) > 0:
@@ -118,7 +132,8 @@ class Cycle:
 
 def find_cycles(load: Array) -> list[Cycle]:
     """Return the cycles of loads (n,); those whose unloading has fewer than 5 rows have none."""
-    rows, least = turns(load), len(load) - 1
+    rows = turns(load)
+    least = len(load) - 1
     cycles = []
     for k in range(0, len(rows) - 1, 2):
         end = rows[k + 2] if k + 2 < len(rows) else least
@@ -141,7 +156,8 @@ def turns(load: Array, back: float = BACK, again: float = AGAIN, floor: float = 
         before = abs(load[far] - load[found[-1]]) if found else 0.0
         if sign * (load[far] - value) > max(least, (back if sign > 0 else again) * before):
             found.append(far)
-            far, sign = i, -sign
+            far = i
+            sign = -sign
     return [*found, far]
 
 
@@ -189,7 +205,8 @@ class Pace:
 
 def pace_of(histories: Iterable[LoadHistory]) -> Pace:
     """Return the median of the mean rates of all loadings, and the longest hold at a top."""
-    rates, holds = [], [0.0]
+    rates = []
+    holds = [0.0]
     for h in histories:
         if h.time is None:
             continue
@@ -270,7 +287,8 @@ class Inflations:
         Number, kPa; mm of the first inflation, of the release before this one (NaN beyond its
         pressures), of this one; mm and % that this one is higher than the first.
         """
-        curves, found = self.curves, []
+        curves = self.curves
+        found = []
         for k in range(2, len(curves), 2):
             pressures = curves[0][0]
             most, least = (f(curves[k][0]) for f in (np.max, np.min))

@@ -66,7 +66,8 @@ class MachineTable:
 
     def column(self, quantity: str) -> str:
         """Return the column of a quantity, the nearest to the strip; "" where it may be absent."""
-        names, named = self.names, self.options.columns
+        names = self.names
+        named = self.options.columns
         may_lack = quantity not in (*named, *self.options.quantities)
         if quantity == "time" and may_lack:
             return ""
@@ -89,7 +90,8 @@ class MachineTable:
 
     def choice(self, quantity: str) -> tuple[str, ...]:
         """Return a note where `column` chose one of several columns, else nothing."""
-        names, named = self.names, self.options.columns
+        names = self.names
+        named = self.options.columns
         which = [] if quantity in named else tables.columns_of(names, quantity, named)
         if len(which) < 2:
             return ()
@@ -126,7 +128,8 @@ class MachineTable:
             at_the_end = re.search(rf"[_\s]({'|'.join(units)})$", column)
             own = own or (at_the_end[1] if at_the_end else "")
             channel = channel if own or channel.unit else replace(channel, unit="s")
-        readings, at = self.table.numbers(column), f"line {self.header}, column {column!r}"
+        readings = self.table.numbers(column)
+        at = f"line {self.header}, column {column!r}"
         return in_unit(readings, own, channel, units, self.table.path, at, key)
 
     def times(self) -> Array | None:
@@ -182,14 +185,20 @@ def read_times(
 
 
 def in_unit(
-    readings: Array, own: str, channel: Channel, units: Mapping[str, float], path: Path, at: str,
+    readings: Array,
+    own: str,
+    channel: Channel,
+    units: Mapping[str, float],
+    path: Path,
+    at: str,
     key: str = "",
-) -> Array:  # fmt: skip
+) -> Array:
     """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units.
 
     key : the caller's name of the channel's unit.
     """
-    known, said = ", ".join(units), tables.scale_of(own, units) if own else None
+    known = ", ".join(units)
+    said = tables.scale_of(own, units) if own else None
     raw = channel.scale is not None
     factor = 1.0 if channel.scale is None else channel.scale
     if factor != 1.0 and said is not None:

@@ -105,7 +105,8 @@ def _plain(value: Any, depth: int) -> Any:
         return None
     if isinstance(value, (own.MatlabObject, own.MatlabFunction, own.MatlabOpaque)):
         return None
-    flat, names = value.ravel(order="F"), value.dtype.names
+    flat = value.ravel(order="F")
+    names = value.dtype.names
     if names:
         return [{name: _plain(one[name], depth + 1) for name in names} for one in flat]
     if value.dtype == object:
@@ -138,9 +139,11 @@ def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int])
         }
         # The elements of a struct array: each field is a list of references.
         listed = [
-            isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype
-            and "MATLAB_class" not in field.attrs for field in fields.values()
-        ]  # fmt: skip
+            isinstance(field, h5py.Dataset)
+            and field.dtype == h5py.ref_dtype
+            and "MATLAB_class" not in field.attrs
+            for field in fields.values()
+        ]
         if not (values and all(listed)):
             return [values]
         count = min(len(value) for value in values.values())

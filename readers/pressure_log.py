@@ -31,9 +31,13 @@ APEX = 0.98
 
 
 def read_pressure_log(
-    path: Path, of_pressure: Channel = AS_FOUND, of_time: Channel = AS_FOUND,
-    format: str | None = None, comment: str = "#", decimal: str | None = None,
-) -> tuple[Array, Array]:  # fmt: skip
+    path: Path,
+    of_pressure: Channel = AS_FOUND,
+    of_time: Channel = AS_FOUND,
+    format: str | None = None,
+    comment: str = "#",
+    decimal: str | None = None,
+) -> tuple[Array, Array]:
     """Return times (k,) s, rising, and pressures (k,) MPa of a log: a machine's table, or volts."""
     channels = {"time": of_time, "pressure": of_pressure}
     named = {key: c.column for key, c in channels.items() if c.column is not None}
@@ -69,10 +73,12 @@ def straightest(h: Array, pressures: Sequence[Array]) -> int:
     """Return the power of the heights that correlates best with the pressures at any offset."""
     best = {}
     for power in POWERS:
-        raised, best[power] = h**power, 0.0
+        raised = h**power
+        best[power] = 0.0
         for p in pressures:
             inside = np.isfinite(p)
-            x, y = raised[inside] - raised[inside].mean(), p[inside] - p[inside].mean()
+            x = raised[inside] - raised[inside].mean()
+            y = p[inside] - p[inside].mean()
             size = float(np.sqrt((x @ x) * (y @ y)))
             if inside.sum() >= max(LEAST_FRAMES, WITHIN * len(h) - 1) and size > 0:
                 best[power] = max(best[power], float(x @ y) / size)
@@ -84,7 +90,8 @@ def misfit_of(p: Array, h: Array, rest: float) -> float:
     inside = np.isfinite(p)
     if inside.sum() < max(LEAST_FRAMES, WITHIN * len(h) - 1):
         return 1.0
-    p, h = p[inside], h[inside]
+    p = p[inside]
+    h = h[inside]
     # The state of rest weighs as much as all frames together, in the functions only.
     anchored = (p, h, rest, 0.0), (h, p, 0.0, rest)
     return sum(_left_over(*one) for one in anchored) / 2
@@ -96,7 +103,8 @@ def _left_over(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
     if not total > 0:
         return 1.0
     weight = np.append(np.ones(len(x)), float(len(x)))
-    all_x, all_y = np.append(x, x_rest), np.append(y, y_rest)
+    all_x = np.append(x, x_rest)
+    all_y = np.append(y, y_rest)
     # A function has one value where x has one: readings of one pressure are put together.
     which = np.unique(all_x, return_inverse=True)[1]
     sums = np.bincount(which, weight)
@@ -122,7 +130,8 @@ def offset_misfits(
 ) -> tuple[Array, Array]:
     """Return offsets (s), rising, closer together about the best; and the misfit at each."""
     order = np.argsort(times, kind="stable")
-    t, h = times[order], heights[order]
+    t = times[order]
+    h = heights[order]
     h = np.where(h > _rest_height(h), h, 0.0)
     rest = float(np.quantile(pressures, BELOW))
     coarse = _offsets(t, log_times)
@@ -136,7 +145,8 @@ def offset_misfits(
     step = coarse[1] - coarse[0]
     fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * FINE + 1)
     fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
-    offsets, misfits = np.concatenate([coarse, fine]), np.append(misfits, misfits_at(fine))
+    offsets = np.concatenate([coarse, fine])
+    misfits = np.append(misfits, misfits_at(fine))
     order = np.argsort(offsets, kind="stable")
     return offsets[order], misfits[order]
 
@@ -144,7 +154,8 @@ def offset_misfits(
 def _offsets(t: Array, log_times: Array) -> Array:
     """Return the offsets at which enough frames lie within the log, half a frame apart."""
     enough = int(np.ceil(WITHIN * len(t)))
-    least, most = log_times[0] - t[len(t) - enough], log_times[-1] - t[enough - 1]
+    least = log_times[0] - t[len(t) - enough]
+    most = log_times[-1] - t[enough - 1]
     if least > most:
         lasts = f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s"
         raise InputError(None, "", f"{lasts}; are the units of time and the rate right?")
@@ -226,8 +237,10 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
     each = np.array([log_at(s, times, log_times, pressures) for s in some])
     there = log_at(offset, times, log_times, pressures)
     inside = np.isfinite(each)
-    most, least = np.where(inside, each, -np.inf), np.where(inside, each, np.inf)
-    some, doubt = inside.any(axis=0), np.full(each.shape[1], np.nan)
+    most = np.where(inside, each, -np.inf)
+    least = np.where(inside, each, np.inf)
+    some = inside.any(axis=0)
+    doubt = np.full(each.shape[1], np.nan)
     doubt[some] = (most.max(axis=0) - least.min(axis=0))[some] / 2
     mean = float(np.nanmean(doubt))
     if mean > MOST_DOUBT * float(np.ptp(there[np.isfinite(there)])):
@@ -238,7 +251,8 @@ def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array
             " frames were taken, it can be found"
         )
         raise InputError(None, "offset", problem)
-    lower, upper = float(may_be[0]), float(may_be[-1])
+    lower = float(may_be[0])
+    upper = float(may_be[-1])
     return ClockOffset(offset, lower, upper, float(misfits[best]), there, doubt, times, heights)
 
 
@@ -252,16 +266,20 @@ SAME, TOLERANCE = 1e-6, 0.02
 
 
 def choose_frames(
-    pressures: Array, asked: Sequence[float] | None = None, count: int | None = None,
-    tolerance: float | None = None, inflation: Which | None = None,
-) -> tuple[tuple[int, ...], dict[str, int]]:  # fmt: skip
+    pressures: Array,
+    asked: Sequence[float] | None = None,
+    count: int | None = None,
+    tolerance: float | None = None,
+    inflation: Which | None = None,
+) -> tuple[tuple[int, ...], dict[str, int]]:
     """Choose the frame nearest to each pressure, or `count` evenly spread ones, or all.
 
     Returns their numbers, by rising pressure, and counts of the others by reason.
     asked, tolerance (2 % of the largest asked unless given) : MPa. inflation : of frames in order
     of time, without releases; "all": every inflation and release, `count` of each.
     """
-    known, left_out = np.isfinite(pressures), {}
+    known = np.isfinite(pressures)
+    left_out = {}
     able = known & (np.nan_to_num(pressures) > 0)
     left_out[BEYOND] = int((~known).sum())
     left_out[AT_REST_FRAME_CHOICE] = int((known & ~able).sum())
@@ -277,7 +295,8 @@ def choose_frames(
         branches = branches[2 * inflation - 2 : 2 * inflation - 1]
         left_out[RELEASED] = sum(map(len, release))
         left_out[OTHER] = int(able.sum()) - len(branches[0]) - left_out[RELEASED]
-    frames, left_out[REPEATED] = list[int](), 0
+    frames = list[int]()
+    left_out[REPEATED] = 0
     for k, branch in enumerate(branches):
         order = branch[np.argsort(pressures[branch], kind="stable")]
         if asked is not None:
@@ -344,9 +363,12 @@ def _searched(pattern: str, path: Path) -> re.Match[str] | None:
 
 
 def number_in_name(
-    path: Path, units: Mapping[str, float], pattern: str | None = None, unit: str | None = None,
+    path: Path,
+    units: Mapping[str, float],
+    pattern: str | None = None,
+    unit: str | None = None,
     field: str = "",
-) -> float:  # fmt: skip
+) -> float:
     """Return the number in a file's name (by `pattern`, else before a unit) by its unit."""
     if pattern is not None:
         hard = len(_REPEATS.findall(pattern)) > 1
@@ -401,7 +423,8 @@ def picture_numbers(
         return np.arange(len(own), dtype=float), []
     # Of several, those that rise at every frame, and by least: a counter, no time of the day.
     numbers = min(rising, key=lambda one: ((np.diff(one) <= 0).sum(), one[-1] - one[0]))
-    steps, said = np.diff(numbers), []
+    steps = np.diff(numbers)
+    said = []
     usual = float(np.median(steps[steps > 0]))
     missing = np.setdiff1d(np.arange(numbers[0], numbers[-1], usual), numbers)
     seen = f"the frames' numbers, {numbers[0]:.10g} to {numbers[-1]:.10g},"
@@ -478,11 +501,13 @@ def _constants(
     path: Path, lines: Lines, separator: str | None, name: str, column: int, frame: int | None
 ) -> tuple[list[float], str, str]:
     """Return a column's value in each frame (`frame`: column of its number), its unit and place."""
-    unit, head = tables.split_unit(name)[1], lines[0][0]
+    unit = tables.split_unit(name)[1]
+    head = lines[0][0]
     found: dict[float, tuple[float, int]] = {}
     for number, text in lines[1:]:
         row = cells_of(text, separator) or []
-        cell, at = row[column] if column < len(row) else "", f"line {number}, column {name!r}"
+        cell = row[column] if column < len(row) else ""
+        at = f"line {number}, column {name!r}"
         key = "0" if frame is None or frame >= len(row) else row[frame]
         first = found.get(_float(key)) if tables.is_number(key) else None
         if not tables.is_number(cell):
@@ -515,7 +540,8 @@ def _above(
         return None
     values = {_float(found[3]) for found, _ in every}
     if len(values) > 1:
-        first, second = every[0][1], every[1][1]
+        first = every[0][1]
+        second = every[1][1]
         raise InputError(path, f"line {second}", f"says another {name!r} than line {first}")
     found, line = every[0]
     own = found[1] or found[2] or found[4] or tables.split_unit(name)[1]

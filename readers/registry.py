@@ -74,7 +74,9 @@ def format_named(content: Content, name: str) -> Format:
 
 def format_of(content: Content, path: Path | str) -> Format:
     """Return the format of a file by its content: ours first, then those of plug-ins that work."""
-    path, head, ours = Path(path), b"", formats(content)
+    path = Path(path)
+    head = b""
+    ours = formats(content)
     with suppress(OSError), path.open("rb") as file:
         head = file.read(HEAD)
     for group in (ours, _working(content)):

@@ -82,7 +82,9 @@ def first_error(
 
 
 def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
-    kind, location, given = error["type"], error["loc"], error.get("input")
+    kind = error["type"]
+    location = error["loc"]
+    given = error.get("input")
     if kind == "missing":
         field = file.model_fields.get(str(location[0])) if len(location) == 1 else None
         table = field is not None and next(_sections(field.annotation), None) is not None

@@ -53,7 +53,8 @@ class TextTable:
             # Only of the rows in question: text costs more than numbers.
             bad[bad] = ~text[bad].str.strip().str.lower().isin(HOLES).to_numpy(dtype=bool)
         if bad.any():
-            first, more = int(np.argmax(bad)), int(bad.sum()) - 1
+            first = int(np.argmax(bad))
+            more = int(bad.sum()) - 1
             cell = text.iloc[first].strip()
             problem = f"expected a number, found {repr(cell[:40]) if cell else 'nothing'}"
             if _GROUPED.fullmatch(cell):
@@ -74,7 +75,8 @@ class TextTable:
             problem = f"expected a time as {text[0]!r}, found {text[row][:40]!r}"
             raise InputError(self.path, f"line {self.lines[row]}, column {column!r}", problem)
         known = [one for one in found if one is not None]
-        clock, dates = np.array([_of_day(one) for one in known]), [one["date"] for one in known]
+        clock = np.array([_of_day(one) for one in known])
+        dates = [one["date"] for one in known]
         day = np.cumsum(np.diff(clock, prepend=clock[0]) < -HALF_A_DAY, dtype=np.intp)
         if any(dates):
             try:
@@ -111,9 +113,14 @@ def check_width(path: Path, line: int, width: int, rows: int, letters: int) -> N
 
 
 def check_row(
-    path: Path, line: int, row: Sequence[str], width: int, separator: str | None, names: str,
+    path: Path,
+    line: int,
+    row: Sequence[str],
+    width: int,
+    separator: str | None,
+    names: str,
     short: bool = False,
-) -> None:  # fmt: skip
+) -> None:
     """Refuse a row with more cells than names; with `short`, one of blanks that has fewer."""
     if any(row[width:]) or (short and separator is None and len(row) < width):
         problem = f"expected {width} cells as in {names}, found {len(row)}"
@@ -136,7 +143,8 @@ def read_table(path: Path) -> TextTable:
             problem = f"a quotation mark that is not closed, or too long a cell ({error})"
             raise InputError(path, f"line {number}", problem) from None
         check_row(path, number, rows[-1], len(rows[0]), ",", "the header")
-    lines, header = np.array([number for number, _ in numbered]), [name.strip() for name in rows[0]]
+    lines = np.array([number for number, _ in numbered])
+    header = [name.strip() for name in rows[0]]
     width = len(header)
     check_width(path, lines[0], width, len(rows), sum(len(text) for _, text in numbered))
     whole = [(row + [""] * width)[:width] for row in rows[1:]]
@@ -201,7 +209,8 @@ def are_thousands(cells: Sequence[str], decimal: str) -> bool:
 
 def _ungrouped(cell: str, decimal: str) -> str:
     """Return a number without marks of thousands and with a decimal point; else no number."""
-    cell, other = _BLANKS.sub("", cell), "," if decimal == "." else "."
+    cell = _BLANKS.sub("", cell)
+    other = "," if decimal == "." else "."
     if not re.fullmatch(rf"[+-]?([1-9]\d{{0,2}}(\{other}\d{{3}})+(\{decimal}\d*)?)", cell):
         return cell.replace(other, "?").replace(decimal, ".")
     return cell.replace(other, "").replace(decimal, ".")
@@ -228,14 +237,16 @@ def is_stamp(cell: str) -> bool:
 
 def _of_day(stamp: re.Match[str]) -> float:
     """Return seconds since midnight."""
-    hour, half = int(stamp["h"]), stamp["half"]
+    hour = int(stamp["h"])
+    half = stamp["half"]
     hour = hour % 12 + 12 * (half in "Pp") if half else hour
     return 3600.0 * hour + 60.0 * int(stamp["m"]) + float(stamp["s"].replace(",", "."))
 
 
 def _day_numbers(dates: Sequence[str]) -> NDArray[np.intp]:
     """Return days since the first; of the orders of day and month that of the shorter time."""
-    parts, found = [[int(part) for part in re.split("[./-]", one)] for one in dates], []
+    parts = [[int(part) for part in re.split("[./-]", one)] for one in dates]
+    found = []
     for order in ((0, 1, 2), (2, 1, 0), (2, 0, 1)):
         with suppress(ValueError):
             days = [date(*(one[i] for i in order)).toordinal() for one in parts]
@@ -293,7 +304,7 @@ WORDS = {
         "pressure": "pressure druck überdruck innendruck p",
         "deflection": "deflection displacement durchbiegung weg",
     }.items()
-}  # fmt: skip
+}
 #: Words of what a biaxial test measures along each yarn, and of the yarns: "n_w", "eps fill".
 LOADS = frozenset("n f force load kraft stress spannung tension".split())
 STRAINS = frozenset("eps epsilon strain dehnung".split())
@@ -348,31 +359,72 @@ DIRECTION_ALIASES: Mapping[str, str] = {
 }
 #: mm in one of each unit of length, N in one of each unit of load.
 LENGTH_UNITS = {
-    "mm": 1.0, "cm": 10.0, "m": 1e3, "µm": 1e-3, "μm": 1e-3, "um": 1e-3, "in": 25.4, "ft": 304.8,
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1e3,
+    "µm": 1e-3,
+    "μm": 1e-3,
+    "um": 1e-3,
+    "in": 25.4,
+    "ft": 304.8,
     "mil": 0.0254,
-}  # fmt: skip
+}
 LOAD_UNITS = {
-    "N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "kgf": 9.80665, "kp": 9.80665,
-    "gf": 9.80665e-3, "lbf": 4.4482216152605, "kip": 4448.2216152605, "ozf": 0.27801385095378,
-}  # fmt: skip
+    "N": 1.0,
+    "kN": 1e3,
+    "daN": 10.0,
+    "mN": 1e-3,
+    "kgf": 9.80665,
+    "kp": 9.80665,
+    "gf": 9.80665e-3,
+    "lbf": 4.4482216152605,
+    "kip": 4448.2216152605,
+    "ozf": 0.27801385095378,
+}
 #: Other names of units, in small letters; a weight is that of its mass.
 OTHER_NAMES = {
-    "n": "N", "kn": "kN", "lb": "lbf", "lbs": "lbf", "lbf": "lbf", "g": "gf", "kg": "kgf",
-    "in": "in", "inch": "in", "inches": "in", "zoll": "in", '"': "in", "″": "in", "mils": "mil",
-    "thou": "mil", "kips": "kip", "kipf": "kip", "oz": "ozf",
-}  # fmt: skip
+    "n": "N",
+    "kn": "kN",
+    "lb": "lbf",
+    "lbs": "lbf",
+    "lbf": "lbf",
+    "g": "gf",
+    "kg": "kgf",
+    "in": "in",
+    "inch": "in",
+    "inches": "in",
+    "zoll": "in",
+    '"': "in",
+    "″": "in",
+    "mils": "mil",
+    "thou": "mil",
+    "kips": "kip",
+    "kipf": "kip",
+    "oz": "ozf",
+}
 #: N/mm in one of each unit of load per width of the strip.
 WIDTH_LOAD_UNITS = {
-    "kN/m": 1.0, "N/mm": 1.0, "N/m": 1e-3, "N/cm": 0.1, "N/50mm": 0.02, "N/5cm": 0.02,
-    "daN/5cm": 0.2, "lbf/in": 4.4482216152605 / 25.4,
-}  # fmt: skip
+    "kN/m": 1.0,
+    "N/mm": 1.0,
+    "N/m": 1e-3,
+    "N/cm": 0.1,
+    "N/50mm": 0.02,
+    "N/5cm": 0.02,
+    "daN/5cm": 0.2,
+    "lbf/in": 4.4482216152605 / 25.4,
+}
 #: One in each unit of strain.
 STRAIN_UNITS = {"%": 0.01, "‰": 1e-3, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "-": 1.0, "1": 1.0}
 #: MPa in one of each unit of pressure.
 PRESSURE_UNITS = {
-    "Pa": 1e-6, "hPa": 1e-4, "mbar": 1e-4, "kPa": 1e-3, "psi": 6.894757293168e-3, "bar": 0.1,
+    "Pa": 1e-6,
+    "hPa": 1e-4,
+    "mbar": 1e-4,
+    "kPa": 1e-3,
+    "psi": 6.894757293168e-3,
+    "bar": 0.1,
     "MPa": 1.0,
-}  # fmt: skip
+}
 #: Seconds in one of each unit of time.
 TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 #: Letters of a name, and names of a table: what is longer is none, and would take its time.

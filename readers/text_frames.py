@@ -59,9 +59,13 @@ def cells_of(text: str, separator: str | None) -> list[str] | None:
 
 
 def find_layout(
-    path: Path, quantities: Sequence[str], named: Mapping[str, str], comment: str,
-    decimal: str | None = None, upper: bool = False,
-) -> TextLayout:  # fmt: skip
+    path: Path,
+    quantities: Sequence[str],
+    named: Mapping[str, str],
+    comment: str,
+    decimal: str | None = None,
+    upper: bool = False,
+) -> TextLayout:
     """Find the layout of a file, by its own names of some quantities; names may be a comment."""
     lines = tables.read_lines(path, comment, any_encoding=True)
     found = _best_header(lines, quantities, named, upper)
@@ -78,7 +82,8 @@ def find_layout(
     if found is None:
         raise InputError(path, "", _nothing_found(lines))
     index, separator, names = found
-    header, body = lines[index][0], lines[index + 1 :]
+    header = lines[index][0]
+    body = lines[index + 1 :]
     units = [""] * len(names)
     # A row of units, some of them lengths, among rows below the names that have no number.
     for k, (_, text) in enumerate(body[:MOST_BELOW]):
@@ -159,9 +164,12 @@ Flag = tuple[int, Sequence[int] | None]
 
 
 def flag_columns(
-    path: Path, layout: TextLayout, columns: Mapping[str, int], options: frames.FrameOptions,
+    path: Path,
+    layout: TextLayout,
+    columns: Mapping[str, int],
+    options: frames.FrameOptions,
     status: tuple[str, Sequence[int]] | None,
-) -> list[Flag]:  # fmt: skip
+) -> list[Flag]:
     """Return the flags that are named, else those of `status` and the headings."""
     names = [heading.name for heading in layout.headings]
     asked: list[tuple[str | None, Sequence[int] | None]]
@@ -249,7 +257,8 @@ def _quick(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
     """Read all rows by pandas; None where they have to be read one by one."""
-    separator, width = layout.separator, len(layout.headings)
+    separator = layout.separator
+    width = len(layout.headings)
     texts = [text for _, text in layout.body]
     if separator is None and {len(text.split()) for text in texts} != {width}:
         return None
@@ -267,11 +276,16 @@ def _quick(
     ]
     try:
         table = pd.read_csv(
-            StringIO("\n".join(texts)), header=None, sep=separator or r"\s+",
-            decimal=layout.decimal, usecols=None if separator is None else wanted,
-            dtype=dict.fromkeys(wanted, float), na_values=holes, keep_default_na=False,
+            StringIO("\n".join(texts)),
+            header=None,
+            sep=separator or r"\s+",
+            decimal=layout.decimal,
+            usecols=None if separator is None else wanted,
+            dtype=dict.fromkeys(wanted, float),
+            na_values=holes,
+            keep_default_na=False,
             skipinitialspace=True,
-        )  # fmt: skip
+        )
     except (ValueError, OverflowError, KeyError):
         return None
     if len(table) != len(texts) or (separator is None and table.shape[1] != width):
@@ -294,7 +308,8 @@ def _slow(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Read row by row, flags first: a doubtful row may hold anything."""
-    width, rows = len(layout.headings), []
+    width = len(layout.headings)
+    rows = []
     for number, text in layout.body:
         row = cells_of(text, layout.separator)
         if row is None:
@@ -337,10 +352,15 @@ def read_text(
 
 
 def read_text_rows(
-    path: Path, options: frames.FrameOptions, *, comment: str | None = None, upper: bool = False,
-    camera_axes: bool = False, names: Mapping[str, str] | None = None,
+    path: Path,
+    options: frames.FrameOptions,
+    *,
+    comment: str | None = None,
+    upper: bool = False,
+    camera_axes: bool = False,
+    names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
-) -> list[frames.FrameRows]:  # fmt: skip
+) -> list[frames.FrameRows]:
     """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
     names : the format's names, after the user's. status : a column of states, its good values.
@@ -372,10 +392,12 @@ def read_text_rows(
         return [whole]
     return [
         replace(
-            whole, values={key: value[frame == number] for key, value in values.items()},
-            sigma=None if sigma is None else sigma[frame == number], number=float(number),
+            whole,
+            values={key: value[frame == number] for key, value in values.items()},
+            sigma=None if sigma is None else sigma[frame == number],
+            number=float(number),
             ids=None if ids is None else ids[frame == number],
             dropped=lost if number == every[0] else {},
         )
         for number in every
-    ]  # fmt: skip
+    ]

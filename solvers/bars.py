@@ -59,10 +59,15 @@ def checked_stresses(stresses: tuple[float, ...], who: str, solver: str) -> tupl
 def bar_model(bar: Bar) -> UniaxialModel:
     """Return a strip of one element (half of its width), free to contract; thickness 1 mm."""
     return straight_strip(
-        "warp" if bar.direction == "warp" else "fill", gauge_length=SIZE,
-        final_length=SIZE * (1.0 + bar.elongation), thickness=1.0, width=2.0 * SIZE,
-        increments=INCREMENTS, across=1, along=1,
-    )  # fmt: skip
+        "warp" if bar.direction == "warp" else "fill",
+        gauge_length=SIZE,
+        final_length=SIZE * (1.0 + bar.elongation),
+        thickness=1.0,
+        width=2.0 * SIZE,
+        increments=INCREMENTS,
+        across=1,
+        along=1,
+    )
 
 
 def stress_of(model: UniaxialModel, history: History) -> float:
@@ -89,12 +94,14 @@ def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> Hi
 
     strain : (n, 3) log strain; force : (n,) N, of the whole strip.
     """
-    points, sets = model.mesh.points, model.mesh.node_sets
+    points = model.mesh.points
+    sets = model.mesh.node_sets
     along = 0 if abs(model.warp[1]) > 0.999 else 1
     middle = points[sets["symmetry_x"], 0].mean(), points[sets["top"], 1].mean()
     grown = np.expm1(strain[:, [1 - along, along]])
     moved = np.zeros((len(strain), len(points), 3))
     moved[..., :2] = grown[:, None] * (points[:, :2] - middle)
-    whole, up = np.vstack([np.zeros(3), strain]), np.outer(force / model.load_factor, [0, 1, 0])
+    whole = np.vstack([np.zeros(3), strain])
+    up = np.outer(force / model.load_factor, [0, 1, 0])
     reactions = {"top": up, model.pulled: -up}
     return History(force, moved, whole.min(axis=0), whole.max(axis=0), reactions)

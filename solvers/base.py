@@ -112,7 +112,8 @@ class History:
 
     def stress(self, at: Places = "elements") -> Array:
         """Return Cauchy stress (MPa) along turned warp and fill, and shear, shaped as `strain`."""
-        mesh, law = self.mesh, self.law
+        mesh = self.mesh
+        law = self.law
         if law is None:
             raise InputError(None, "law", "is not known here: simulate(...) and fit.history() do")
         path, reported = self._steps()
@@ -143,7 +144,8 @@ class History:
         stretch = getattr(self.model, "stretch", None)
         if at not in ("elements", "points"):
             raise InputError(None, "at", f"expected 'elements' or 'points', got {at!r}")
-        sheet, moved = replace(mesh, points=rest), mesh.points + u - rest
+        sheet = replace(mesh, points=rest)
+        moved = mesh.points + u - rest
         if at == "elements":
             middle = None if stretch is None else stretch.mean(axis=1)
             return surface_strain(sheet, moved, warp, middle)
@@ -228,9 +230,12 @@ class Solver(Protocol):
         ...
 
     def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:  # fmt: skip
+    ) -> History:
         """Run the model; SolverFailure when it does not end well."""
         ...
 
@@ -263,16 +268,23 @@ class DifferentiatingSolver(Solver, Protocol):
     """A solver that also differentiates its displacements, and takes a start for its path."""
 
     def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
-        timeout: float | None = None, guess: Array | None = None,
-    ) -> History:  # fmt: skip
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+        guess: Array | None = None,
+    ) -> History:
         """Run from `guess` where given."""
         ...
 
     def run_with_sensitivity(
-        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        parameters: Sequence[str] | None = None,
         guess: Array | None = None,
-    ) -> tuple[History, Array]:  # fmt: skip
+    ) -> tuple[History, Array]:
         """Run; return d displacement / d parameters too, (frames, nodes, 3, parameters)."""
         ...
 
@@ -344,12 +356,15 @@ def pass_on(said: Announcement) -> None:
 
 
 def log_strain(
-    mesh: Mesh, displacements: Iterable[Array], warp: Array | None = None,
+    mesh: Mesh,
+    displacements: Iterable[Array],
+    warp: Array | None = None,
     stretch: Array | None = None,
-) -> Array:  # fmt: skip
+) -> Array:
     """Return (frames, quads, 4, 3) log strain at Gauss points; warp : (3,), else the mesh's;
     stretch : as of `reference_elements`."""
-    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    points = np.asarray(mesh.points, float)
+    quads = np.asarray(mesh.quads)
     warp = mesh.warp if warp is None else warp
     yarn = None if warp is None else np.broadcast_to(warp, (len(quads), 3))
     slopes = reference_elements(points, quads, yarn, stretch).slopes

@@ -32,9 +32,12 @@ file_mark = checksum  #: documented for plug-ins
 
 
 def render(
-    solver: str, name: str, context: Mapping[str, Any], folder: Path | None = None,
+    solver: str,
+    name: str,
+    context: Mapping[str, Any],
+    folder: Path | None = None,
     instead: Mapping[str, Path] | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Return the deck that template `name` of `solver` makes of `context`.
 
     folder : the user's own templates; `name` must be there. instead : files in place of templates
@@ -173,8 +176,11 @@ def _program_mark(path: Path, *_: int) -> str:
 @functools.cache
 def code_mark(module: str) -> str:
     """Return the SHA-256 of `FOLDERS` and of a plug-in's package or `module`."""
-    files = {path.relative_to(ROOT).as_posix(): path for name in FOLDERS
-             for path in (ROOT / name).rglob("*")}  # fmt: skip
+    files = {
+        path.relative_to(ROOT).as_posix(): path
+        for name in FOLDERS
+        for path in (ROOT / name).rglob("*")
+    }
     top = module.partition(".")[0]
     if top != __package__.partition(".")[0]:
         package = sys.modules.get(top)

@@ -9,7 +9,14 @@ from .calculix.library import FORMAT
 FORMATS: Mapping[str, Format] = {
     each.name: each
     for each in (
-        subroutines.NLELAST, subroutines.HYPELA2, subroutines.UMAT, curves.FABRIC, curves.MAT34,
-        curves.LAW58, *designers.FORMATS, CSV, FORMAT,
+        subroutines.NLELAST,
+        subroutines.HYPELA2,
+        subroutines.UMAT,
+        curves.FABRIC,
+        curves.MAT34,
+        curves.LAW58,
+        *designers.FORMATS,
+        CSV,
+        FORMAT,
     )
-}  # fmt: skip
+}

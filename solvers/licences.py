@@ -93,7 +93,9 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
 
 def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
     """Run; where a licence was denied, try again in time, after longer and random pauses."""
-    begun, pause, tries = time.monotonic(), settings.licence_retry, 1
+    begun = time.monotonic()
+    pause = settings.licence_retry
+    tries = 1
     while True:
         try:
             return run()
@@ -110,7 +112,8 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
                 raise LicenceDenied(
                     reason, name, failure.exit_number, failure.log_tail, failure.scratch
                 ) from None
-            said, scratch = failure.reason, failure.scratch
+            said = failure.reason
+            scratch = failure.scratch
         if scratch is not None:
             remove(scratch)  # only that of the last try is kept
         seconds = min(pause * random.uniform(0.5, 1.5), left)  # noqa: S311 (no secret)
@@ -118,7 +121,8 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
             f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
         )
         time.sleep(seconds)
-        pause, tries = min(GROWTH * pause, MOST * settings.licence_retry), tries + 1
+        pause = min(GROWTH * pause, MOST * settings.licence_retry)
+        tries = tries + 1
 
 
 # On one machine

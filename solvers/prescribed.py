@@ -81,7 +81,9 @@ def as_the_membrane(model: UniaxialModel, law: HypoelasticLaw) -> Array | None:
 def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) -> Array:
     """Return pulls (increments + 1,) mm, as steep beyond the end, at which the gauge is right."""
     spline = _over_gauge(opened, pulls, solver)
-    gauge, pull, levels = spline.x, np.insert(pulls, 0, 0.0), np.array(model.elongations)
+    gauge = spline.x
+    pull = np.insert(pulls, 0, 0.0)
+    levels = np.array(model.elongations)
     steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
     inside = spline(np.minimum(levels, gauge[-1]))
     return _onward(inside + steep * np.maximum(levels - gauge[-1], 0.0))
@@ -122,9 +124,14 @@ def gauge_opened(model: UniaxialModel, u: Array) -> Array:
 
 
 def strip_history(
-    model: UniaxialModel, u: Array, forces: Array, sets: Mapping[str, Numbers], solver: str,
-    iterations: int, driven: bool = False,
-) -> History:  # fmt: skip
+    model: UniaxialModel,
+    u: Array,
+    forces: Array,
+    sets: Mapping[str, Numbers],
+    solver: str,
+    iterations: int,
+    driven: bool = False,
+) -> History:
     """Return load, displacement, reactions at the gauge's elongations; else SolverFailure.
 
     u : (increments, nodes of the mesh, 3) mm; forces : (increments, nodes, 3) N of the supports, by
@@ -144,9 +151,13 @@ def strip_history(
 
 
 def inflated_history(
-    model: BubbleModel, u: Array, forces: Array | None, sets: Mapping[str, Numbers],
-    iterations: int, remarks: tuple[Note, ...] = (),
-) -> History:  # fmt: skip
+    model: BubbleModel,
+    u: Array,
+    forces: Array | None,
+    sets: Mapping[str, Numbers],
+    iterations: int,
+    remarks: tuple[Note, ...] = (),
+) -> History:
     """Return displacements, support forces and strains in the reported frames of a bubble.
 
     u : (increments, nodes, 3) mm from the sheet without stress. forces : (frames, nodes, 3) N of
@@ -157,10 +168,12 @@ def inflated_history(
         held = [name for name in model.supports if name in sets]
         sums = {name: forces[:, sets[name]].sum(axis=1) for name in held}
     low, high = extremes(log_strain(replace(model.mesh, points=model.stress_free), u))
-    path, keep = u + (model.stress_free - model.mesh.points), model.reported
+    path = u + (model.stress_free - model.mesh.points)
+    keep = model.reported
     levels = np.array(model.increments)[keep]
-    return History(levels, path[keep], low, high, sums, iterations=iterations, path=path,
-                   remarks=remarks)  # fmt: skip
+    return History(
+        levels, path[keep], low, high, sums, iterations=iterations, path=path, remarks=remarks
+    )
 
 
 def _onward(pulls: Array) -> Array:
@@ -222,8 +235,12 @@ def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
     if isinstance(model, BubbleModel):
         return
     pumped = model.gas.constant == "pressure"
-    own = {"saddle": model.supports.saddle, "collar.spacing": model.collar.spacing,
-           "mass_per_area": model.weight, "gas.constant": pumped}  # fmt: skip
+    own = {
+        "saddle": model.supports.saddle,
+        "collar.spacing": model.collar.spacing,
+        "mass_per_area": model.weight,
+        "gas.constant": pumped,
+    }
     for key, said in own.items():
         if said:
             raise InputError(None, key, f"is for the solver membrane, {program}'s deck has none")
@@ -231,7 +248,8 @@ def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
 
 def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return which places (n, 3) of the tube at rest support and collar may touch."""
-    radius, z = float(np.abs(model.mesh.points[:, 1]).max()), np.abs(places[:, 2])
+    radius = float(np.abs(model.mesh.points[:, 1]).max())
+    z = np.abs(places[:, 2])
     support = np.abs(z - 0.5 * model.supports.span) < BESIDE_SUPPORT
     collar = z < 0.5 * model.collar.length + BESIDE_COLLAR
     return support & (places[:, 1] < LOW * radius), collar & (places[:, 1] > HIGH * radius)
@@ -250,7 +268,8 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
 
     def place(turn: Array, x: Array, face: int) -> Array:
         at = r - THICK * (1 - face)
-        y, z = top - r + at * np.sin(turn), 0.5 * supports.span + at * np.cos(turn)
+        y = top - r + at * np.sin(turn)
+        z = 0.5 * supports.span + at * np.cos(turn)
         return np.stack([x, y, z], axis=-1)
 
     around = np.radians(np.linspace(*SUPPORT_ARC, SUPPORT_COUNTS[0] + 1))
@@ -283,7 +302,8 @@ def way_down(faces: Array, points: Array) -> float:
 
 def _ring(collar: Collar) -> RigidBody:
     """Return the collar with its axis at height 0."""
-    radius, half = 0.5 * collar.inner_diameter, 0.5 * collar.length
+    radius = 0.5 * collar.inner_diameter
+    half = 0.5 * collar.length
     straight = np.linspace(-OVER, half - collar.fillet, COLLAR_COUNTS[1] + 1)
     turn = np.radians(np.linspace(0.0, FILLET_TURN, FILLET_COUNT + 1)[1:])
     along = np.concatenate([straight, half - collar.fillet * (1 - np.sin(turn))])
@@ -308,7 +328,8 @@ def _body(u: Array, v: Array, place: Callable[[Array, Array, int], Array]) -> Ri
     points = np.concatenate([place(*grid, face).reshape(-1, 3) for face in (0, 1)])
     nodes = np.arange(len(u) * len(v)).reshape(len(u), len(v))
     quads = grid_quads(nodes)
-    behind, front = points[quads[0]], points[quads[0] + nodes.size]
+    behind = points[quads[0]]
+    front = points[quads[0] + nodes.size]
     normal = np.cross(behind[1] - behind[0], behind[3] - behind[0])
     if normal @ (front[0] - behind[0]) < 0:
         quads = quads[:, ::-1]

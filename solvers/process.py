@@ -84,24 +84,34 @@ def check_wanted() -> None:
 
 
 def run_process(
-    command: Sequence[str | Path], folder: Path, log: Path, timeout: float | None = None,
-    environment: Mapping[str, str] | None = None, watch: Callable[[], None] | None = None,
-) -> Outcome:  # fmt: skip
+    command: Sequence[str | Path],
+    folder: Path,
+    log: Path,
+    timeout: float | None = None,
+    environment: Mapping[str, str] | None = None,
+    watch: Callable[[], None] | None = None,
+) -> Outcome:
     """Run `command` in `folder` to its end, its output (both streams) going to `log`.
 
     timeout : s; then all that it started is killed. environment : added to ours. watch : called
     about twenty times a second. InputError : it cannot be started. Unwanted : see `unless`. An
     interruption kills the program as well, and where this process is killed outright, a shell does.
     """
-    begun, timed_out = time.monotonic(), False
+    begun = time.monotonic()
+    timed_out = False
     kept: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
     with log.open("wb") as output, _watched() as watch_group:
         try:
             process = subprocess.Popen(
-                [str(part) for part in command], cwd=folder, stdin=subprocess.DEVNULL,
-                stdout=output, stderr=subprocess.STDOUT, env={**os.environ, **(environment or {})},
-                start_new_session=True, **kept,
-            )  # fmt: skip
+                [str(part) for part in command],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **(environment or {})},
+                start_new_session=True,
+                **kept,
+            )
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
             raise InputError(Path(command[0]), "", problem) from None
@@ -131,7 +141,9 @@ class Watch(Generic[T]):
     """Reporter of every increment once, as it appears: `look` finds all there are so far."""
 
     def __init__(self, look: Callable[[], list[T]], report: Callable[[T], None]) -> None:
-        self.look, self.report, self.reported = look, report, 0
+        self.look = look
+        self.report = report
+        self.reported = 0
 
     def __call__(self) -> None:
         """Look once."""

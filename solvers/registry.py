@@ -29,13 +29,15 @@ from .settings import (
     check_programs,
     licence_settings,
     split,
-)  # fmt: skip
+)
 
 GROUP: Group = "bubblefit.solvers"
 #: What makes each of our own solvers from its options.
 SOLVERS: dict[str, Callable[..., Solver]] = {
-    "calculix": CALCULIX, "marc": MARC, "membrane": MEMBRANE
-}  # fmt: skip
+    "calculix": CALCULIX,
+    "marc": MARC,
+    "membrane": MEMBRANE,
+}
 #: Attributes of a solver.
 NEEDED = ("name", "external", "progress", "identity", "run", "check")
 #: Option for any setting of any solver, those of plug-ins among them, as KEY=VALUE.
@@ -160,9 +162,12 @@ def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def usable_solver(
-    name: str, options: Mapping[str, Any] | None = None, path: Path | None = None,
-    key: str = "fit.solver", cache: RunCache | None = None,
-) -> Solver:  # fmt: skip
+    name: str,
+    options: Mapping[str, Any] | None = None,
+    path: Path | None = None,
+    key: str = "fit.solver",
+    cache: RunCache | None = None,
+) -> Solver:
     """Return a solver that is installed and carries the law; path, key : where it is named."""
     try:
         solver = solver_named(name, cache, **(options or {}))
@@ -207,8 +212,11 @@ def command_line() -> list[Override]:
 
 
 def overridden(
-    name: str, options: Mapping[str, Any], given: Mapping[str, Any], settings: Sequence[str] = (),
-) -> dict[str, Any]:  # fmt: skip
+    name: str,
+    options: Mapping[str, Any],
+    given: Mapping[str, Any],
+    settings: Sequence[str] = (),
+) -> dict[str, Any]:
     """Return the options of the solver `name`, overridden by the command line; InputError.
 
     given : by the name of an option of `command_line`. settings : each "KEY=VALUE", the value as in
@@ -256,8 +264,9 @@ def _plug_in(plug_in: PlugIn) -> Diagnosis:
         version: str, advice: str, usable: bool = False, stresses: tuple[float, ...] | None = None
     ) -> Diagnosis:
         off = None if stresses is None else difference(stresses)
-        return Diagnosis(plug_in.name, version, None, origin, False, None, usable,
-                         stresses, off, advice)  # fmt: skip
+        return Diagnosis(
+            plug_in.name, version, None, origin, False, None, usable, stresses, off, advice
+        )
 
     if plug_in.name in SOLVERS:
         advice = f"{plug_in.name} is bubblefit's own: the plug-in needs another name"

@@ -51,7 +51,8 @@ def last_frame(file: Any, types: Cells) -> meshio.Mesh:
     """Return mesh and last increment of a result file; InputError: an unknown type or node."""
     import meshio
 
-    mesh, cells = file.mesh, list[tuple[str, list[Any]]]()
+    mesh = file.mesh
+    cells = list[tuple[str, list[Any]]]()
     for kind, nodes in mesh.elements:
         if kind not in types:
             raise InputError(file.path, "elements", f"of type {kind} are not known here")
@@ -74,7 +75,8 @@ class _MeshioReader(MetaPathFinder):
     """Gives meshio a reader of a file's suffix, now or right after it is imported."""
 
     def __init__(self, suffix: str, read: Callable[..., Any]) -> None:
-        self.suffix, self.read = suffix, read
+        self.suffix = suffix
+        self.read = read
         if "meshio" in sys.modules:
             self._register(sys.modules["meshio"])
         else:

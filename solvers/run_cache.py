@@ -99,7 +99,8 @@ class RunCache:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._held: int | None = None
-        self._written, self._warned = 0, False
+        self._written = 0
+        self._warned = False
 
     @property
     def limit(self) -> int:
@@ -170,8 +171,10 @@ class RunCache:
 
     def prune(self, size: int | None = None, older: float | None = None) -> list[Entry]:
         """Drop the least recently used runs to `size` bytes, those `older` (s) too; OutputError."""
-        entries, now = self.entries(), time.time()
-        left, gone = sum(entry.size for entry in entries), []
+        entries = self.entries()
+        now = time.time()
+        left = sum(entry.size for entry in entries)
+        gone = []
         for entry in entries:
             if (size is not None and left > size) or (
                 older is not None and now - entry.used > older
@@ -249,10 +252,14 @@ def to_bytes(history: base.History, key: str, seconds: float) -> bytes:
     remarks = [(note.kind, str(note), note.of) for note in map(as_note, history.remarks)]
     unstable = None if history.unstable is None else list(map(str, history.unstable))
     words = {
-        "key": key, "seconds": float(seconds), "iterations": int(history.iterations),
-        "unstable": unstable, "remarks": remarks, "early": str(history.early),
+        "key": key,
+        "seconds": float(seconds),
+        "iterations": int(history.iterations),
+        "unstable": unstable,
+        "remarks": remarks,
+        "early": str(history.early),
         "relaxed": bool(history.relaxed),
-    }  # fmt: skip
+    }
     content = io.BytesIO()
     np.savez_compressed(content, words=np.array(json.dumps(words)), **arrays)
     whole = content.getvalue()
@@ -281,12 +288,16 @@ def from_bytes(content: bytes, key: str) -> base.History:
             if name.startswith("reactions of ")
         }
         return base.History(
-            **there, reactions=reactions, iterations=int(words["iterations"]),
+            **there,
+            reactions=reactions,
+            iterations=int(words["iterations"]),
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
             remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
-            early=str(words["early"]), seconds=float(words["seconds"]), from_cache=True,
+            early=str(words["early"]),
+            seconds=float(words["seconds"]),
+            from_cache=True,
             relaxed=bool(words.get("relaxed", False)),
-        )  # fmt: skip
+        )
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         if isinstance(error, Damaged):
             raise

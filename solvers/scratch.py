@@ -100,7 +100,9 @@ def default_parent() -> Path:
 
 def put_aside(folder: Path) -> Path:
     """Move a failed run out of memory onto the disk, unless that is full; return its place."""
-    lock, own, kept = _under_way.pop(folder, None), None, folder
+    lock = _under_way.pop(folder, None)
+    own = None
+    kept = folder
     if folder.parent == MEMORY:
         target = Path(tempfile.gettempdir()) / folder.name
         try:

@@ -126,7 +126,8 @@ def _ascii(text: str) -> str:
 
 
 def band_lines(card: MaterialCard) -> list[str]:
-    sure, law = card.certainty, card.law
+    sure = card.certainty
+    law = card.law
     if sure is None:
         return ["band of the moduli: not known, the card says nothing of it"]
     lines = textwrap.wrap(
@@ -146,7 +147,8 @@ def band_lines(card: MaterialCard) -> list[str]:
 
 def band_table(card: MaterialCard) -> str:
     """Return every modulus over the card's strains, with the ends of its band, as CSV."""
-    sure, law = card.certainty, card.law
+    sure = card.certainty
+    law = card.law
     assert sure is not None
     rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
     for name, strain in strains_of(law).items():
@@ -191,9 +193,11 @@ class NoOptions:
 class TableOptions:
     points: int = option(POINTS, f"Points of a table or curve [{POINTS}].", int, least=2)
     reach: float = option(
-        REACH, f"Log strain where a table ends if the card has no range [{REACH}].", above=0,
-        most=10
-    )  # fmt: skip
+        REACH,
+        f"Log strain where a table ends if the card has no range [{REACH}].",
+        above=0,
+        most=10,
+    )
 
 
 @dataclass(frozen=True)
@@ -339,7 +343,8 @@ def unloading_curves(
 
     Empty where the law has no memory. The fabric was loaded to that end for the first time.
     """
-    law, found = card.law, {}
+    law = card.law
+    found = {}
     if law.memory is None:
         return {}
     for k, (name, modulus) in enumerate(zip(STRAIN_NAMES, COMPONENTS, strict=True)):
@@ -407,7 +412,8 @@ def csv(card: MaterialCard, options: TableOptions) -> Export:
 
 def _csv_rows(card: MaterialCard, table: ModulusTable) -> list[str]:
     keep = table.strain >= 0
-    strain, modulus = table.strain[keep], table.modulus[keep]
+    strain = table.strain[keep]
+    modulus = table.modulus[keep]
     direction = STRAIN_NAMES[COMPONENTS[table.name]]
     columns = np.column_stack([strain, modulus, curve_of(card.law, table.name, strain, "nominal")])
     return [f"{direction}," + ",".join(f"{v:.12g}" for v in row) for row in columns]

@@ -63,7 +63,8 @@ def yarn_of(strain: Array, stress: Array) -> Yarn:
     modulus, softening = np.linalg.lstsq(both, stress, rcond=None)[0].tolist()
     stiffens = not (softening > 0 and modulus > 0)
     if stiffens:
-        modulus, softening = float(strain @ stress / (strain @ strain)), 0.0
+        modulus = float(strain @ stress / (strain @ strain))
+        softening = 0.0
     off = stress - both @ [modulus, softening]
     rms = float(np.sqrt(np.mean(off**2)) / np.abs(stress).max())
     return Yarn(modulus, softening, rms, stiffens)
@@ -169,9 +170,11 @@ class Mat34Options(base.CurveOptions):
         MEASURE, f"Measure of LS-DYNA's curves [{MEASURE}].", str, choices=MEASURES
     )
     compression: Literal["law", "none"] = base.option(
-        "law", "What a pushed yarn carries: as the law (CSE = 0), or none (CSE = 1) [law].", str,
+        "law",
+        "What a pushed yarn carries: as the law (CSE = 0), or none (CSE = 1) [law].",
+        str,
         choices=("law", "none"),
-    )  # fmt: skip
+    )
 
 
 #: By the choice of what a pushed yarn carries.
@@ -186,11 +189,15 @@ PUSHED = {
 
 def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
     """Write *MAT_FABRIC and three *DEFINE_CURVE, fixed columns of 10 and 20."""
-    measure, slack = options.measure, options.compression == "none"
-    curves, law = base.fabric_curves(card, options, measure), card.law
+    measure = options.measure
+    slack = options.compression == "none"
+    curves = base.fabric_curves(card, options, measure)
+    law = card.law
     strips = {"warp": curves.warp[slack:], "fill": curves.fill[slack:]}
-    unload = {f"{n} unloading": from_zero(rows) for n, rows in
-              base.unloading_curves(card, options, measure).items()}  # fmt: skip
+    unload = {
+        f"{n} unloading": from_zero(rows)
+        for n, rows in base.unloading_curves(card, options, measure).items()
+    }
     if unload:
         unload["shear unloading"] = _odd(unload["shear unloading"])
     lost = ("the stiffness of the law in compression",) if slack else ()
@@ -221,15 +228,24 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
             "that LCAB is taken as odd in the shear strain, and that CSE acts on curves of FORM 14",
         ),
     )
-    e1, e2 = float(law.E1(0.0)), float(law.E2(0.0))
+    e1 = float(law.E1(0.0))
+    e2 = float(law.E2(0.0))
     text = render(
-        "ls-dyna/mat34.k.j2", head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
-        title=base.title_of(card, 80), material=MATERIAL,
-        density=base.DENSITY if options.density is None else options.density, ea=e1, eb=e2,
-        gab=float(law.G12(0.0)), prab=law.nu12, prba=law.nu12 * e2 / e1,
+        "ls-dyna/mat34.k.j2",
+        head=base.heading(card, "LS-DYNA *MAT_FABRIC", says, "$"),
+        title=base.title_of(card, 80),
+        material=MATERIAL,
+        density=base.DENSITY if options.density is None else options.density,
+        ea=e1,
+        eb=e2,
+        gab=float(law.G12(0.0)),
+        prab=law.nu12,
+        prba=law.nu12 * e2 / e1,
         ids={**CURVES, **dict.fromkeys(UNLOADING, 0), **(UNLOADING if unload else {})},
-        curves={**strips, "shear": _odd(curves.shear), **unload}, cse=float(slack), f10=_f10
-    )  # fmt: skip
+        curves={**strips, "shear": _odd(curves.shear), **unload},
+        cse=float(slack),
+        f10=_f10,
+    )
     return base.Export({".k": text}, says)
 
 
@@ -285,12 +301,14 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
         ),
     )
     text = render(
-        "abaqus/fabric.inp.j2", head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
+        "abaqus/fabric.inp.j2",
+        head=base.heading(card, "Abaqus/Explicit *FABRIC", says, "**"),
         name=material_name(card),
         density=base.DENSITY if options.density is None else options.density,
-        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())], shear=curves.shear.tolist(),
-        unload={name: rows.tolist() for name, rows in unload.items()}
-    )  # fmt: skip
+        tests=[(1, curves.warp.tolist()), (2, curves.fill.tolist())],
+        shear=curves.shear.tolist(),
+        unload={name: rows.tolist() for name, rows in unload.items()},
+    )
     return base.Export({".inp": text}, says)
 
 

@@ -29,15 +29,19 @@ class ConstantsOptions:
         None,
         "kN/m, of the larger load of each ratio, where they end [the end of the card's range].",
         above=0,
-    )  # fmt: skip
+    )
     shear: float | None = option(
-        None, "Shear strain up to which G is averaged [the end of the card's range].",
-        above=0, most=1,
-    )  # fmt: skip
+        None,
+        "Shear strain up to which G is averaged [the end of the card's range].",
+        above=0,
+        most=1,
+    )
     paths: Literal["8", "10"] = option(
-        "8", "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].", str,
+        "8",
+        "Strain paths of five ratios: 10 with unloaded yarns, 8 without [8].",
+        str,
         choices=("8", "10"),
-    )  # fmt: skip
+    )
     minimise: Literal["strain", "load"] = option(
         "strain", "Whose squares are least [strain].", str, choices=("strain", "load")
     )
@@ -80,8 +84,9 @@ class Linear:
             f"{NAMES[name]} {low:.4g} to {high:.4g}"
             for name, (low, high) in designers.spread_of(evaluations(self)).items()
         )
-        lost = ", ".join(f"{name} {rms:.3g} of {found.largest[name]:.3g} %"
-                         for name, rms in found.lost.items())  # fmt: skip
+        lost = ", ".join(
+            f"{name} {rms:.3g} of {found.largest[name]:.3g} %" for name, rms in found.lost.items()
+        )
         return Says(
             carries=(
                 f"straight lines of load over strain from {self.lowest:g} to {self.highest:.4g} "
@@ -105,7 +110,8 @@ class Linear:
 
 def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
     """Return the constants of a card; InputError for loads that it does not carry."""
-    law, thickness = card.law, card.thickness
+    law = card.law
+    thickness = card.thickness
     highest = options.highest
     if highest is None:
         highest = _end_of_range(card)
@@ -149,11 +155,16 @@ Row = tuple[str, Sequence[float | None], str]
 
 
 def _sheet(
-    linear: Linear, what: str, stiffness: Sequence[tuple[str, float | None, str]],
-    options: SheetOptions, *confirm: str,
-) -> Export:  # fmt: skip
+    linear: Linear,
+    what: str,
+    stiffness: Sequence[tuple[str, float | None, str]],
+    options: SheetOptions,
+    *confirm: str,
+) -> Export:
     """Return the stiffness, then prestress and compensation, each row with its unit."""
-    card, says, missing = linear.card, linear.says, "not given"
+    card = linear.card
+    says = linear.says
+    missing = "not given"
     loads = options.prestress_warp, options.prestress_fill
     kept = options.kept_warp, options.kept_fill
     strain: Sequence[float | None] = (None, None)
@@ -161,7 +172,8 @@ def _sheet(
         if sum(value is None for value in both) == 1:
             field = f"--{words}-warp, --{words}-fill"
             raise InputError(None, field, "expected both yarns, got one")
-    carries, loses = says.carries, says.loses
+    carries = says.carries
+    loses = says.loses
     if None in loads:
         loses += ("prestress: a card has none (--prestress-warp, --prestress-fill)",)
     else:
@@ -197,32 +209,49 @@ def gsa(card: MaterialCard, options: SheetOptions) -> Export:
     linear = linear_card(card, options)
     c = linear.found.constants
     rows = [
-        ("Warp modulus", c.warp, "kN/m"), ("Weft modulus", c.fill, "kN/m"),
-        ("Poisson's ratio (warp-weft)", c.nu_fill, "no unit"), ("Shear modulus", c.shear, "kN/m"),
-    ]  # fmt: skip
+        ("Warp modulus", c.warp, "kN/m"),
+        ("Weft modulus", c.fill, "kN/m"),
+        ("Poisson's ratio (warp-weft)", c.nu_fill, "no unit"),
+        ("Shear modulus", c.shear, "kN/m"),
+    ]
     return _sheet(linear, "Fabric of Oasys GSA", rows, options)
 
 
 def rfem(card: MaterialCard, options: SheetOptions) -> Export:
     """Write an orthotropic 2D material of Dlubal RFEM and the thickness of its surface."""
     linear = linear_card(card, options)
-    c, t = linear.found.constants, card.thickness
+    c = linear.found.constants
+    t = card.thickness
     assert c.shear is not None
     rows = [
-        ("E_x (warp)", c.warp / t, "N/mm^2"), ("E_y (fill)", c.fill / t, "N/mm^2"),
+        ("E_x (warp)", c.warp / t, "N/mm^2"),
+        ("E_y (fill)", c.fill / t, "N/mm^2"),
         ("nu_xy (fill contracts)", c.nu_fill, "no unit"),
-        ("nu_yx (warp contracts)", c.nu_warp, "no unit"), ("G_xy", c.shear / t, "N/mm^2"),
+        ("nu_yx (warp contracts)", c.nu_warp, "no unit"),
+        ("G_xy", c.shear / t, "N/mm^2"),
         ("thickness d of the surface", t, "mm"),
-    ]  # fmt: skip
+    ]
     surface = "that the surface is a membrane, x along the warp"
     return _sheet(linear, "Orthotropic membrane of Dlubal RFEM", rows, options, surface)
 
 
 COLUMNS = (
-    "chosen", "minimise", "reciprocal", "unloaded_yarns", "ratios", "paths", "E_warp_kN_per_m",
-    "E_fill_kN_per_m", "nu_warp", "nu_fill", "A_warp_kN_per_m", "A_fill_kN_per_m",
-    "A_warp_fill_kN_per_m", "G_kN_per_m", "squares_percent2",
-)  # fmt: skip
+    "chosen",
+    "minimise",
+    "reciprocal",
+    "unloaded_yarns",
+    "ratios",
+    "paths",
+    "E_warp_kN_per_m",
+    "E_fill_kN_per_m",
+    "nu_warp",
+    "nu_fill",
+    "A_warp_kN_per_m",
+    "A_fill_kN_per_m",
+    "A_warp_fill_kN_per_m",
+    "G_kN_per_m",
+    "squares_percent2",
+)
 
 
 def constants(card: MaterialCard, options: ConstantsOptions) -> Export:

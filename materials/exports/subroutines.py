@@ -37,9 +37,11 @@ def hypela2(card: MaterialCard, options: base.NoOptions) -> base.Export:
 
 
 def hypela2_source(
-    laws: Mapping[int, HypoelasticLaw], head: str = "! MSC Marc user subroutine HYPELA2",
-    own_state: bool = True, symmetric: bool = True
-) -> str:  # fmt: skip
+    laws: Mapping[int, HypoelasticLaw],
+    head: str = "! MSC Marc user subroutine HYPELA2",
+    own_state: bool = True,
+    symmetric: bool = True,
+) -> str:
     """Return Fortran source, fixed and free form; laws by MATUS(1), one for all numbers.
 
     own_state : start from state variables, else Marc's. symmetric : part of the tangent only.
@@ -54,11 +56,18 @@ def hypela2_source(
         for number, law in laws.items()
     ]
     return render(
-        "marc/hypela2.f.j2", head=head, laws=written, bar=_check(next(iter(laws.values()))),
-        power=next(iter(laws.values())).area_power, states=STATE_VARIABLES,
-        size=max(len(law["constants"]) for law in written), own_state=own_state,
-        symmetric=symmetric, double=base.double, fortran=base.logical
-    )  # fmt: skip
+        "marc/hypela2.f.j2",
+        head=head,
+        laws=written,
+        bar=_check(next(iter(laws.values()))),
+        power=next(iter(laws.values())).area_power,
+        states=STATE_VARIABLES,
+        size=max(len(law["constants"]) for law in written),
+        own_state=own_state,
+        symmetric=symmetric,
+        double=base.double,
+        fortran=base.logical,
+    )
 
 
 def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
@@ -72,9 +81,11 @@ def _check(law: HypoelasticLaw) -> dict[str, Any] | None:
     shear, _ = law.increment(np.zeros(3), np.array([0.0, 0.0, SHEAR]), np.zeros(3))
     thinning = math.exp((law.area_power - 1) * (strain[-1, 0] + strain[-1, 1]))
     return {
-        "elongation": elongation, "increments": INCREMENTS, "stress": stress[-1, 0] * thinning,
-        "shear": float(shear[0, 2])
-    }  # fmt: skip
+        "elongation": elongation,
+        "increments": INCREMENTS,
+        "stress": stress[-1, 0] * thinning,
+        "shear": float(shear[0, 2]),
+    }
 
 
 HYPELA2 = base.Format("marc-hypela2", hypela2)
@@ -159,9 +170,12 @@ def umat(card: MaterialCard, options: base.NoOptions) -> base.Export:
         ),
     )
     context = {
-        "name": material_name(card), "constants": list(base.law_constants(card.law)),
-        "poisson": poisson, "thickness": card.thickness, "exact": repr
-    }  # fmt: skip
+        "name": material_name(card),
+        "constants": list(base.law_constants(card.law)),
+        "poisson": poisson,
+        "thickness": card.thickness,
+        "exact": repr,
+    }
     source = render(
         "abaqus/umat.f.j2",
         head=base.heading(card, "Abaqus/Standard user subroutine UMAT", says, "!"),

@@ -124,7 +124,8 @@ def ratios_of(form: Form, name: str) -> tuple[float, ...]:
 @lru_cache(maxsize=64)
 def _in_range(form: Form, ends: tuple[float, ...]) -> tuple[Array, Array]:
     """Return upper ends (3, P) and map (3, P, 4, size) without pieces beyond the range."""
-    uppers, rows = form.uppers(), form.piece_map()
+    uppers = form.uppers()
+    rows = form.piece_map()
     lowers = np.column_stack([np.zeros(3), uppers[:, :-1]])
     # Of a repeated last piece the first is enough.
     used = (lowers < np.array(ends)[:, None]) & (lowers < UNLIMITED)

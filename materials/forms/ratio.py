@@ -67,10 +67,12 @@ class SplineRatio(_MoreThanSpline):
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from moduli at the knots, and at rest where one yarn carries all."""
-        whole, share = np.eye(self.size), 1.0 / (1.0 - EVEN)
+        whole = np.eye(self.size)
+        share = 1.0 / (1.0 - EVEN)
         first = self.modulus_of.index
         for place, name in ((-2, "E2"), (-1, "E1")):
-            whole[place, first(name)], whole[place, place] = -share, share
+            whole[place, first(name)] = -share
+            whole[place, place] = share
         return whole
 
     def describe(self) -> str:
@@ -87,9 +89,7 @@ class SplineCrimp(_MoreThanSpline):
     name = "spline-crimp"
     more, of_more = ("T1", "T2", "S"), ("T", "T", "S")
     #: Least and largest, MPa: of slopes times S, and of S.
-    own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {
-        "T": (0.01, 30.0), "S": (0.5, 200.0)
-    }  # fmt: skip
+    own_bounds: ClassVar[Mapping[str, tuple[float, float]]] = {"T": (0.01, 30.0), "S": (0.5, 200.0)}
 
     def by_crimp(self) -> Array:
         return np.eye(self.size)[-3:]
@@ -111,9 +111,11 @@ class SplineCrimp(_MoreThanSpline):
 for _form in (SplineRatio, SplineCrimp):
 
     def _named(
-        name: str, settings: Mapping[str, Any], strain_range: Sequence[float],
+        name: str,
+        settings: Mapping[str, Any],
+        strain_range: Sequence[float],
         made: type[Spline] = _form,
-    ) -> Spline:  # fmt: skip
+    ) -> Spline:
         return made.at(knots_of(settings, strain_range))
 
     register_form(Offer(_form.name, _named, ("knots",), of_load_ratio=True))

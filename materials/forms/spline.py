@@ -62,8 +62,11 @@ class Spline(base.Form):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return tuple(f"{name} at {knot:.{_digits(self.knots[COMPONENTS[name]])}f}" for name in ORDER
-                     for knot in self.knots[COMPONENTS[name]])  # fmt: skip
+        return tuple(
+            f"{name} at {knot:.{_digits(self.knots[COMPONENTS[name]])}f}"
+            for name in ORDER
+            for knot in self.knots[COMPONENTS[name]]
+        )
 
     def piece_map(self) -> Array:
         return self._map.copy()
@@ -71,7 +74,8 @@ class Spline(base.Form):
     @cached_property
     def _map(self) -> Array:
         most = max(len(row) for row in self.knots)
-        whole, start = np.zeros((3, most, 4, self.size)), 0
+        whole = np.zeros((3, most, 4, self.size))
+        start = 0
         for name in ORDER:
             component = COMPONENTS[name]
             own = self.knots[component]
@@ -326,10 +330,16 @@ def pieces_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[
         said = settings["pieces"]
         labels, owners = (tuple(map(str, said[key])) for key in ("labels", "modulus_of"))
         upper, cubics = (np.array(said[key], dtype=float) for key in ("uppers", "map"))
-        good = set(owners) == set(ORDER) and len(labels) == len(owners) and bool(
-            cubics.shape == (3, upper.shape[1], 4, len(labels)) and np.isfinite(cubics).all()
-            and (np.diff(upper, prepend=0.0) >= 0).all() and (upper[:, -1] == UNLIMITED).all()
-        )  # fmt: skip
+        good = (
+            set(owners) == set(ORDER)
+            and len(labels) == len(owners)
+            and bool(
+                cubics.shape == (3, upper.shape[1], 4, len(labels))
+                and np.isfinite(cubics).all()
+                and (np.diff(upper, prepend=0.0) >= 0).all()
+                and (upper[:, -1] == UNLIMITED).all()
+            )
+        )
     except (TypeError, ValueError, KeyError, IndexError, OverflowError):
         good = False
     if not good:
@@ -366,7 +376,9 @@ class Form:
 
     def pieces(self, strain_range: Sequence[float]) -> Pieces:
         """Return the form up to these strains (eps1, eps2, gamma12); InputError: no such form."""
-        labels, owners, found = list[str](), list[str](), {}
+        labels = list[str]()
+        owners = list[str]()
+        found = {}
         for name in ORDER:
             end = float(strain_range[COMPONENTS[name]])
             close = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
@@ -378,9 +390,11 @@ class Form:
                 problem = f"expected {len(close)} of {name}, one of each function, got {len(own)}"
                 raise InputError(None, "form.labels", problem)
             found[COMPONENTS[name]] = len(labels), parts
-            labels, owners = [*labels, *own], [*owners, *[name] * len(own)]
+            labels = [*labels, *own]
+            owners = [*owners, *[name] * len(own)]
         most = max(len(parts) for _, parts in found.values())
-        upper, cubics = np.full((3, most), UNLIMITED), np.zeros((3, most, 4, len(labels)))
+        upper = np.full((3, most), UNLIMITED)
+        cubics = np.zeros((3, most, 4, len(labels)))
         for component, (start, parts) in found.items():
             for k in range(most):
                 upper[component, k], piece = parts[min(k, len(parts) - 1)]
@@ -397,7 +411,8 @@ class Form:
             own = [np.broadcast_to(one, strain.shape) for one in self.functions(name, strain)]
             values = np.array(own, dtype=float)
         except (TypeError, ValueError) as error:
-            values, why = np.empty((0, 0)), f" ({error})"
+            values = np.empty((0, 0))
+            why = f" ({error})"
         if not len(values) or not np.isfinite(values).all():
             problem = f"{type(self).__name__}.functions({name!r}, strain): expected finite values, "
             raise InputError(None, "form", f"{problem}(n,) for n strains, of each unknown{why}")

@@ -58,9 +58,13 @@ def _variables(path: Path, head: bytes) -> Collection[str] | None:
 
 
 def _frames(
-    path: Path, options: FrameOptions, format: str, names: Mapping[str, str],
-    tables: Iterable[Array], **more: Any,
-) -> list[Frame]:  # fmt: skip
+    path: Path,
+    options: FrameOptions,
+    format: str,
+    names: Mapping[str, str],
+    tables: Iterable[Array],
+    **more: Any,
+) -> list[Frame]:
     """Return a frame a table (points, names)."""
     rows = (FrameRows(dict(zip(names, one.T, strict=True)), names, **more) for one in tables)
     return [frame_of(one, options, path, format) for one in rows]
@@ -108,7 +112,8 @@ def read_ncorr(path: Path, options: FrameOptions) -> Sequence[Frame]:
     if not isinstance(frames, list) or not frames or not isinstance(frames[0], dict):
         raise InputError(path, SAVED, "expected displacements of frames")
     spacing, scale = (_number(path, about, name) for name in ("spacing", "pixtounits"))
-    unit, step = about.get("units"), (spacing + 1) * scale
+    unit = about.get("units")
+    step = (spacing + 1) * scale
     names = {"x": "column", "y": "row", "dx": "plot_u_ref_formatted", "dy": "plot_v_ref_formatted"}
     units = dict.fromkeys(names, unit if isinstance(unit, str) else "")
     tables = (_correlated(path, one, step) for one in frames)
@@ -158,7 +163,8 @@ def read_multidic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read a frame for each cell."""
     there = read_variables(path, RESULTS)
     results = next((_struct(there[name]) for name in RESULTS if name in there), {})
-    points, moved = results.get("Points3D"), _struct(results.get("Disp")).get("DispVec")
+    points = results.get("Points3D")
+    moved = _struct(results.get("Disp")).get("DispVec")
     if not isinstance(points, list) or not isinstance(moved, list) or len(points) != len(moved):
         raise InputError(path, "", "expected cells of Points3D and Disp.DispVec, one a frame")
     for place, move in zip(points, moved, strict=True):
@@ -278,7 +284,8 @@ def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
         if given is not None:
             moved[:, :, i] = given.astype(float)
     names = dict.fromkeys(PLACES, "points3D") | dict(zip(MOVED, "UVW", strict=True))
-    tables, units = np.concatenate([points, moved], axis=2), dict.fromkeys(names, "mm")
+    tables = np.concatenate([points, moved], axis=2)
+    units = dict.fromkeys(names, "mm")
     return _frames(path, options, "pyaldic", names, tables, units=units, camera_axes=True)
 
 

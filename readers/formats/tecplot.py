@@ -116,9 +116,13 @@ def _flat(lines: list[str], width: int) -> NDArray[np.float64]:
     """Return all numbers, as they follow each other: rows of one length by pandas' reader."""
     if {len(line.split()) for line in lines} == {width} and not any("," in line for line in lines):
         table = pd.read_csv(
-            StringIO("\n".join(lines)), sep=r"\s+", header=None, dtype=float, keep_default_na=False,
+            StringIO("\n".join(lines)),
+            sep=r"\s+",
+            header=None,
+            dtype=float,
+            keep_default_na=False,
             na_values=["nan", "NaN", "NAN"],
-        )  # fmt: skip
+        )
         return table.to_numpy().ravel()
     return np.array(" ".join(lines).replace(",", " ").split(), dtype=float)
 

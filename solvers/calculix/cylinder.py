@@ -81,7 +81,8 @@ class SolidMesh:
 def solid_mesh(model: CylinderModel) -> SolidMesh:
     """Return the solids about the middle surface; InputError: a seam not three times as thick."""
     mesh = model.mesh
-    count, quads = len(mesh.points), np.asarray(mesh.quads)
+    count = len(mesh.points)
+    quads = np.asarray(mesh.quads)
     numbers = np.arange(len(quads))
     seam = np.asarray(mesh.element_sets.get("seam", np.empty(0)), dtype=np.intp)
     caps = np.asarray(mesh.element_sets["caps"])
@@ -93,10 +94,12 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
 
     outward = _outward(mesh.points, quads, caps)
     on_seam = np.unique(quads[seam])
-    inner, outer = np.arange(count), count + np.arange(count)
+    inner = np.arange(count)
+    outer = count + np.arange(count)
     last = np.full(count, -1)
     last[on_seam] = 2 * count + np.arange(len(on_seam))
-    middle, out = np.asarray(mesh.points, float), layer * outward
+    middle = np.asarray(mesh.points, float)
+    out = layer * outward
     outermost = middle[on_seam] + (SEAM_LAYERS - 0.5) * out[on_seam]
     points = np.concatenate([middle - 0.5 * out, middle + 0.5 * out, outermost])
     base = np.concatenate([inner[quads], outer[quads]], axis=1)
@@ -126,9 +129,12 @@ def _outward(points: Array, quads: Numbers, caps: Numbers) -> Array:
 
 
 def cylinder_decks(
-    model: CylinderModel, law: HypoelasticLaw, solids: SolidMesh,
-    bending: Mapping[str, Any] | None = None, folder: Path | None = None,
-) -> dict[str, str]:  # fmt: skip
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    solids: SolidMesh,
+    bending: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
+) -> dict[str, str]:
     """Return the text of each file; bending : of `bending_context`; InputError: of a template."""
     # The plane of the caps is xy, where the warp runs along x or y.
     yarn = np.asarray(model.mesh.warp)[solids.element_sets["caps"][0]]
@@ -190,18 +196,23 @@ def bending_context(
     tube = ~np.isin(np.arange(len(mesh.quads)), mesh.element_sets["caps"])
     # Contact is not looked for everywhere.
     may_touch = prescribed.may_touch(model, mesh.points[mesh.quads].mean(axis=1))
-    listed, node, element = [], len(solids.points), len(solids.elements)
+    listed = []
+    node = len(solids.points)
+    element = len(solids.elements)
     names = ("SUPPORT_BODY", "COLLAR_BODY")
     for name, body, own in zip(names, bodies, may_touch, strict=True):
         listed.append(
             {
-                "name": name, "points": body.points.tolist(),
-                "elements": (body.elements + 1 + node).tolist(), "first_node": node,
+                "name": name,
+                "points": body.points.tolist(),
+                "elements": (body.elements + 1 + node).tolist(),
+                "first_node": node,
                 "first_element": element,
                 "fabric": (solids.element_sets["outside"][tube & own] + 1).tolist(),
             }
-        )  # fmt: skip
-        node, element = node + len(body.points), element + len(body.elements)
+        )
+        node = node + len(body.points)
+        element = element + len(body.elements)
     way = ABOVE + model.deflections[-1]
     gas = gas or (np.zeros(1), np.full(1, model.pressure))
     pressures = [(0.0, model.pressure), (REST + ABOVE, model.pressure)]
@@ -242,17 +253,23 @@ class BentCylinder:
 
 
 def bent_cylinder(
-    path: Path, model: CylinderModel, solids: SolidMesh, iterations: int,
-    converged: Collection[tuple[int, int]] | None = None, why: str = "",
-) -> BentCylinder:  # fmt: skip
+    path: Path,
+    model: CylinderModel,
+    solids: SolidMesh,
+    iterations: int,
+    converged: Collection[tuple[int, int]] | None = None,
+    why: str = "",
+) -> BentCylinder:
     """Read what a result file holds of bending; SolverFailure: nothing, or not to its end.
 
     converged : steps and increments of a run that stopped early, and `why`; None: it ended well.
     """
-    ended, inflated = converged is None, float(len(model.inflation))
+    ended = converged is None
+    inflated = float(len(model.inflation))
     count = len(solids.points)
     support, collar = body_nodes(count)
-    deflections, shapes = list[float](), list[Array]()
+    deflections = list[float]()
+    shapes = list[Array]()
     forces: dict[str, list[Array]] = {"supports": [], "collar": []}
     damage = ""
     try:
@@ -262,7 +279,8 @@ def bent_cylinder(
                 continue
             if not {"DISP", "FORC"} <= frame.fields.keys() or frame.time < inflated - NEAR:
                 continue
-            moved, force = frame.fields["DISP"], frame.fields["FORC"]
+            moved = frame.fields["DISP"]
+            force = frame.fields["FORC"]
             down = -float(moved[collar, 1].mean()) - ABOVE
             if frame.step > 1 and down <= 0:
                 continue  # not on the cylinder yet
@@ -283,7 +301,8 @@ def bent_cylinder(
     reactions = {name: np.array(values) for name, values in forces.items()}
     for values in reactions.values():
         values[0] = 0.0  # the bodies have no contact while the cylinder is inflated
-    deflection, volume = np.array(deflections), volumes(model, middle)
+    deflection = np.array(deflections)
+    volume = volumes(model, middle)
     return BentCylinder(deflection, middle, reactions, volume, iterations, not ended, why)
 
 
@@ -302,13 +321,17 @@ def bending_history(model: CylinderModel, bent: BentCylinder, gas: GasCurve) -> 
         early = f"the run stopped early; the last increment is at {reached:.4g} mm"
         early += f": {bent.why}" if bent.why else ""
     return History(
-        -reactions["collar"][:, 1], at(bent.displacement),
-        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)), reactions,
-        cavity_pressure=np.interp(wanted, *gas), cavity_volume=at(bent.volume),
-        iterations=bent.iterations, path=bent.displacement,
+        -reactions["collar"][:, 1],
+        at(bent.displacement),
+        *extremes(log_strain(model.mesh, bent.displacement, model.mesh.warp)),
+        reactions,
+        cavity_pressure=np.interp(wanted, *gas),
+        cavity_volume=at(bent.volume),
+        iterations=bent.iterations,
+        path=bent.displacement,
         remarks=(Note(EARLY, early),) if early else (),
         early=early if len(wanted) <= len(model.deflections) else "",
-    )  # fmt: skip
+    )
 
 
 def _between(x: Array, values: Array, wanted: Array) -> Array:
@@ -324,7 +347,8 @@ def analyse(model: CylinderModel, law: HypoelasticLaw, setup: Setup, run: Run) -
     stops early is reported up to there. SolverFailure: not to the first deflection.
     """
     prescribed.without_cords(model, "CalculiX")
-    solids, folder = solid_mesh(model), setup.templates
+    solids = solid_mesh(model)
+    folder = setup.templates
 
     def blown(frd: Path, iterations: int) -> tuple[Array, Array]:
         start = whole_times(frd, len(model.inflation), len(solids.points))[0]

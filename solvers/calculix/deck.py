@@ -34,7 +34,8 @@ class ShellMesh:
 
 def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
     """Return the mesh as S4, or as S8R with midside nodes, those of the rim moved onto it."""
-    points, quads = np.asarray(mesh.points, float), np.asarray(mesh.quads)
+    points = np.asarray(mesh.points, float)
+    quads = np.asarray(mesh.quads)
     if element == "S4":
         return ShellMesh(points, quads, mesh.node_sets, len(points))
     # Edge k of a quad joins corners k and k + 1: the order of S8R's midsides.
@@ -63,26 +64,38 @@ TIME_INCREMENTATION = "8, 12, 9, 24, 20, 4, , 10\n0.5, 0.5, 0.75, 0.85, , , 4"
 
 
 def deck_files(
-    deck: str, name: str, mesh: Any, element: str, tolerances: tuple[float, float],
-    context: Mapping[str, Any], folder: Path | None = None,
-) -> dict[str, str]:  # fmt: skip
+    deck: str,
+    name: str,
+    mesh: Any,
+    element: str,
+    tolerances: tuple[float, float],
+    context: Mapping[str, Any],
+    folder: Path | None = None,
+) -> dict[str, str]:
     """Return the text of `job.inp` of template `deck`, and of the mesh; InputError: of these.
 
     mesh : shells, or solids, which have `element_sets`. tolerances : largest residual force over
     the mean, and correction over the largest change.
     """
     element_sets = getattr(mesh, "element_sets", {})
-    nodes, elements = mesh.points.tolist(), (mesh.elements + 1).tolist()
+    nodes = mesh.points.tolist()
+    elements = (mesh.elements + 1).tolist()
     listed = {"element": element, "points": nodes, "elements": elements}
     for key, sets in (("node_sets", mesh.node_sets), ("element_sets", element_sets)):
         listed[key] = {n.upper(): (own + 1).tolist() for n, own in sets.items() if len(own)}
     kind, own_mesh = ("solids", "solids.inp.j2") if element_sets else ("shells", "mesh.inp.j2")
     common = {
-        "version": __version__, "title": f"{name}, {len(elements)} {kind} {element}",
-        "mesh_file": MESH_FILE, "mesh": listed, "material": MATERIAL,
-        "state_variables": STATE_VARIABLES, "element": element, "force_tolerance": tolerances[0],
-        "correction_tolerance": tolerances[1], "time_incrementation": TIME_INCREMENTATION,
-    }  # fmt: skip
+        "version": __version__,
+        "title": f"{name}, {len(elements)} {kind} {element}",
+        "mesh_file": MESH_FILE,
+        "mesh": listed,
+        "material": MATERIAL,
+        "state_variables": STATE_VARIABLES,
+        "element": element,
+        "force_tolerance": tolerances[0],
+        "correction_tolerance": tolerances[1],
+        "time_incrementation": TIME_INCREMENTATION,
+    }
     # By our template where the user's decks do not have that of the mesh too.
     own = folder if folder is not None and (folder / own_mesh).is_file() else None
     return {
@@ -152,10 +165,12 @@ def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
     slopes = 0.25 * np.stack([_NATURAL[:4, 0] * (1 + s[:, 1]), _NATURAL[:4, 1] * (1 + s[:, 0])])
     if nodes == 4:
         return values, slopes
-    middle, rise = np.empty(4), np.empty((2, 4))
+    middle = np.empty(4)
+    rise = np.empty((2, 4))
     for k, (u, v) in enumerate(_NATURAL[4:]):
         along = 0 if u == 0 else 1  # the coordinate that runs along the edge
-        across, sign = 1 - along, v if u == 0 else u
+        across = 1 - along
+        sign = v if u == 0 else u
         middle[k] = 0.5 * (1 - x[along] ** 2) * (1 + sign * x[across])
         rise[along, k] = -x[along] * (1 + sign * x[across])
         rise[across, k] = 0.5 * sign * (1 - x[along] ** 2)
@@ -195,7 +210,8 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
         raise SolverFailure(problem, "calculix")
     rim = shells.node_sets["rim"]
     back = shells.points - without_stress(shells, model).points
-    times, places = [0.0], [np.zeros_like(back)]
+    times = [0.0]
+    places = [np.zeros_like(back)]
     for i in range(len(model.increments)):
         moved = back.copy()
         if model.rim_motion is not None:
@@ -204,12 +220,13 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
         places += [places[-1], moved]
     return [
         {
-            "node": int(node) + 1, "dof": axis + 1,
+            "node": int(node) + 1,
+            "dof": axis + 1,
             "path": [(t, float(at[node, axis])) for t, at in zip(times, places, strict=True)],
         }
         for node in rim
         for axis in model.supports["rim"]
-    ]  # fmt: skip
+    ]
 
 
 def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:

@@ -50,8 +50,9 @@ def find_ccx(named: Path | str | None = None) -> Executable:
         if candidate.external is not False:
             return candidate
         if candidate.origin in (NAMED, ENVIRONMENT):
-            raise SolverFailure(f"{candidate.path} cannot load material libraries; {ADVICE}",
-                                "calculix")  # fmt: skip
+            raise SolverFailure(
+                f"{candidate.path} cannot load material libraries; {ADVICE}", "calculix"
+            )
         without = without or candidate
     if without is not None:
         problem = f"no ccx that can load material libraries ({without.path} cannot); {ADVICE}"
@@ -186,12 +187,14 @@ class CalculixSettings(ExternalSettings):
     programs = started = ("ccx",)
     overrides = (
         Override(
-            "ccx", "The CalculiX to run.", metavar="PATH",
+            "ccx",
+            "The CalculiX to run.",
+            metavar="PATH",
             look="A CalculiX to look at beside the ones found.",
         ),
         Override("templates", "Folder of your own input decks.", metavar="PATH", path=True),
         Override("element", "Shell element", "S8R or S4"),
-    )  # fmt: skip
+    )
 
     ccx: str | None = None
     templates: str | None = None

@@ -25,12 +25,19 @@ NODES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 
 
 #: meshio's name of each element type of the format, and its node order where it differs.
 CELLS: dict[int, tuple[str, tuple[int, ...] | None]] = {
-    1: ("hexahedron", None), 2: ("wedge", None), 3: ("tetra", None),
+    1: ("hexahedron", None),
+    2: ("wedge", None),
+    3: ("tetra", None),
     4: ("hexahedron20", (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)),
-    5: ("wedge15", (*range(9), 12, 13, 14, 9, 10, 11)), 6: ("tetra10", None), 7: ("triangle", None),
-    8: ("triangle6", None), 9: ("quad", None), 10: ("quad8", None), 11: ("line", None),
+    5: ("wedge15", (*range(9), 12, 13, 14, 9, 10, 11)),
+    6: ("tetra10", None),
+    7: ("triangle", None),
+    8: ("triangle6", None),
+    9: ("quad", None),
+    10: ("quad8", None),
+    11: ("line", None),
     12: ("line3", (0, 2, 1)),
-}  # fmt: skip
+}
 
 
 class FrdFile:
@@ -46,7 +53,8 @@ class FrdFile:
 
     def frames(self, ended: bool = True) -> Iterator[ResultFrame]:
         """Yield every increment in order; `ended`: with its mark; if not, all whole results."""
-        self._at, self._held = self._first, 0
+        self._at = self._first
+        self._held = 0
         frame: ResultFrame | None = None
         step = increment = 0
         while ended or self._at < len(self._data):
@@ -54,7 +62,8 @@ class FrdFile:
             if line.startswith("9999", 1):
                 break
             if line.startswith("    1PSTEP"):
-                increment, step = self._int(line[36:48]), self._int(line[48:60])
+                increment = self._int(line[36:48])
+                step = self._int(line[48:60])
             elif line.startswith("  100C"):
                 time = self._number(line[12:24], float, "a number")
                 if frame is None or (frame.step, frame.increment) != (step, increment):
@@ -70,7 +79,9 @@ class FrdFile:
     def _header(self) -> ResultMesh:
         if not self._data.startswith(b"    1C"):
             raise InputError(self.path, "", "is not a CalculiX result file (no 1C record)")
-        numbers, points, elements = np.empty(0, np.int64), np.empty((0, 3)), []
+        numbers = np.empty(0, np.int64)
+        points = np.empty((0, 3))
+        elements = []
         while True:
             start = self._at
             line = self._line()
@@ -90,11 +101,13 @@ class FrdFile:
         return ResultMesh(numbers, points, tuple(elements))
 
     def _result(self, header: str, frame: ResultFrame) -> None:
-        count, flag = self._int(header[24:36]), self._int(header[73:75])
+        count = self._int(header[24:36])
+        flag = self._int(header[73:75])
         line = self._line()
         if not line.startswith(" -4"):
             raise self._wrong("a result without its name")
-        name, components = line[5:13].strip(), self._int(line[13:18])
+        name = line[5:13].strip()
+        components = self._int(line[13:18])
         for _ in range(self._int(line[13:18])):
             # Calculated components (the length of a vector) are named but not stored.
             components -= self._line()[33:38].strip() == "1"
@@ -118,7 +131,8 @@ class FrdFile:
         if flag in (FLOAT, DOUBLE):
             kind = np.dtype([("node", "<i4"), ("values", "<f4" if flag == FLOAT else "<f8", width)])
             table = np.frombuffer(self._take(count * kind.itemsize), kind)
-            numbers, values = table["node"].astype(np.int64), table["values"].astype(float)
+            numbers = table["node"].astype(np.int64)
+            values = table["values"].astype(float)
         else:
             digits = 10 if flag == LONG else 5
             numbers, values = self._text_rows(count, width, digits)
@@ -131,7 +145,8 @@ class FrdFile:
         lines = [min(ROW, width - first) for first in range(0, width, ROW)]
         sizes = [3 + digits + 12 * n + 1 for n in lines]
         table = np.frombuffer(self._take(count * sum(sizes)), np.uint8).reshape(count, sum(sizes))
-        parts, at = [], 0
+        parts = []
+        at = 0
         for i, (n, size) in enumerate(zip(lines, sizes, strict=True)):
             rows = table[:, at : at + size]
             key = b" -1" if i == 0 else b" -2"

@@ -43,7 +43,8 @@ def law_files(law: HypoelasticLaw) -> dict[str, str]:
 
 def _numbers(law: HypoelasticLaw) -> str:
     constants = piece_constants(law, coupled=True)
-    counts, numbers = constants[:3], list(constants[3:])
+    counts = constants[:3]
+    numbers = list(constants[3:])
     if law.of_load_ratio:  # gains of E1 and E2, then T1, T2 and S
         numbers += [*law.coupling[1:], *[0.0] * 3][:5]
     rows = [[f"{count:.0f}" for count in counts]]
@@ -66,9 +67,12 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-pthread")
 
 
 def constants(
-    law: HypoelasticLaw, angle: float = 0.0, normal_axis: Literal[1, 3] = 3,
-    whole_times: bool = False, whole_until: int = 0,
-) -> tuple[float, ...]:  # fmt: skip
+    law: HypoelasticLaw,
+    angle: float = 0.0,
+    normal_axis: Literal[1, 3] = 3,
+    whole_times: bool = False,
+    whole_until: int = 0,
+) -> tuple[float, ...]:
     """Return the constants (9,) of `*USER MATERIAL`, in the order of `law.c`.
 
     No multiple of 8, of which CalculiX reads one more line, and never above 21. Through the
@@ -95,8 +99,9 @@ def compiler() -> list[str]:
             return [found, *command[1:]]
     wanted = f"the C compiler {named[0]!r} that CC names" if named else "a C compiler (cc)"
     advice = "install gcc, or name a compiler in the environment variable CC"
-    raise SolverFailure(f"the material library needs {wanted}, which is not there; {advice}",
-                        "calculix")  # fmt: skip
+    raise SolverFailure(
+        f"the material library needs {wanted}, which is not there; {advice}", "calculix"
+    )
 
 
 def material_library(cache: Path | None = None) -> Path:
@@ -147,10 +152,14 @@ def calculix(card: MaterialCard, options: NoOptions) -> Export:
     confirm = "that this ccx loads material libraries (Debian's does not): bubblefit doctor"
     says = Says(carries=(carries,), loses=loses, confirm=(confirm,))
     text = render(
-        "calculix/card.inp.j2", head=heading(card, "CalculiX material", says, "**"),
-        material=MATERIAL, constants=constants(card.law), states=STATE_VARIABLES,
-        library=LIBRARY_FILE, flags=" ".join(FLAGS),
-    )  # fmt: skip
+        "calculix/card.inp.j2",
+        head=heading(card, "CalculiX material", says, "**"),
+        material=MATERIAL,
+        constants=constants(card.law),
+        states=STATE_VARIABLES,
+        library=LIBRARY_FILE,
+        flags=" ".join(FLAGS),
+    )
     source = SOURCE.read_text(encoding="utf-8")
     return Export({".inp": text, ".c": source, SUFFIX: law_text(card.law)}, says)
 

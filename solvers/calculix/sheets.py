@@ -73,7 +73,8 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
             for name in ("DISP", "FORC"):
                 values = frames[step].fields.get(name) if step in frames else None
                 if values is None or not np.isfinite(values[place]).all():
-                    at, problem = f"step {step} of {count}", f"holds no {name} at every node"
+                    at = f"step {step} of {count}"
+                    problem = f"holds no {name} at every node"
                     raise InputError(path, at, problem)
                 found.append(values[place])
     except InputError as error:
@@ -97,9 +98,12 @@ def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: R
 
 
 def bubble_decks(
-    model: BubbleModel, law: HypoelasticLaw, shells: ShellMesh, element: str,
+    model: BubbleModel,
+    law: HypoelasticLaw,
+    shells: ShellMesh,
+    element: str,
     folder: Path | None = None,
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """Return the text of `job.inp` and of the mesh; InputError: a template that cannot be used."""
     supports = {
         name: held_dofs(directions)
@@ -134,7 +138,8 @@ def bubble_history(path: Path, model: BubbleModel, shells: ShellMesh, iterations
         pressure_forces(shells.points + u[i], shells.elements, model.increments[i])
         for i in model.reported
     ]
-    forces, corners = nodal[model.reported] - np.array(pushed), u[:, : shells.corners]
+    forces = nodal[model.reported] - np.array(pushed)
+    corners = u[:, : shells.corners]
     return inflated_history(model, corners, forces, shells.node_sets, iterations)
 
 
@@ -161,9 +166,13 @@ def analyse_strip(model: UniaxialModel, law: HypoelasticLaw, setup: Setup, run: 
 
 
 def strip_decks(
-    model: UniaxialModel, law: HypoelasticLaw, shells: ShellMesh, element: str, pulls: Array,
+    model: UniaxialModel,
+    law: HypoelasticLaw,
+    shells: ShellMesh,
+    element: str,
+    pulls: Array,
     folder: Path | None = None,
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """Return the text of each input file; `pulls` (increments,) mm of the pulled end, along -y."""
     angle = math.degrees(math.atan2(model.warp[1], model.warp[0]))
     context = {
@@ -181,7 +190,8 @@ def strip_decks(
 
 def analyse_patch(model: PatchModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
     """Load a patch with every one of its loads; SolverFailure where the run does not end well."""
-    shells, count = setup.shells(model.mesh), len(model.loads)
+    shells = setup.shells(model.mesh)
+    count = len(model.loads)
     context = {
         "constants": constants(law, whole_times=True),
         "thickness": model.thickness,
@@ -210,7 +220,8 @@ def analyse_patch(model: PatchModel, law: HypoelasticLaw, setup: Setup, run: Run
         u, _ = whole_times(frd, count, len(shells.points))
         corners = np.ascontiguousarray(u[:, : shells.corners])
         strain = np.column_stack([np.log1p(elongations(corners)), np.zeros(len(corners))])
-        low, high = strain.min(axis=0), strain.max(axis=0)
+        low = strain.min(axis=0)
+        high = strain.max(axis=0)
         return History(model.loads.sum(axis=1), corners, low, high, iterations=iterations)
 
     files = deck_files(

@@ -39,9 +39,11 @@ TIMEOUT_S = 3600.0
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, Setup, Run], History]] = {
-    BubbleModel: sheets.analyse_bubble, UniaxialModel: sheets.analyse_strip,
-    CylinderModel: cylinder.analyse, PatchModel: sheets.analyse_patch,
-}  # fmt: skip
+    BubbleModel: sheets.analyse_bubble,
+    UniaxialModel: sheets.analyse_strip,
+    CylinderModel: cylinder.analyse,
+    PatchModel: sheets.analyse_patch,
+}
 
 
 class CalculixSolver:
@@ -56,18 +58,29 @@ class CalculixSolver:
     external = load_ratios = True
 
     def __init__(
-        self, ccx: Path | str | None = None, templates: Path | None = None, element: str = "S8R",
-        timeout: float = TIMEOUT_S, scratch: Path | None = None, keep: bool = False,
-        threads: int = 1, progress: Callable[[Progress], None] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        ccx: Path | str | None = None,
+        templates: Path | None = None,
+        element: str = "S8R",
+        timeout: float = TIMEOUT_S,
+        scratch: Path | None = None,
+        keep: bool = False,
+        threads: int = 1,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
         if element not in ELEMENTS:
             problem = f"expected one of {', '.join(ELEMENTS)}, got {element!r}"
             raise InputError(None, "solver.calculix.element", problem)
         if templates is not None and not templates.is_dir():
             raise InputError(templates, "templates", "there is no such folder")
-        self.ccx, self.templates, self.element = ccx, templates, element
-        self.timeout, self.scratch, self.keep = timeout, scratch, keep
-        self.threads, self.progress = threads, progress
+        self.ccx = ccx
+        self.templates = templates
+        self.element = element
+        self.timeout = timeout
+        self.scratch = scratch
+        self.keep = keep
+        self.threads = threads
+        self.progress = progress
         self._found: Executable | None = None
         self._shells: tuple[Mesh, ShellMesh] | None = None
 
@@ -102,12 +115,16 @@ class CalculixSolver:
         return self._found
 
     def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:  # fmt: skip
+    ) -> History:
         """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
 
-        place, seconds = scratch or self.scratch, timeout or self.timeout
+        place = scratch or self.scratch
+        seconds = timeout or self.timeout
 
         def run(files: Mapping[str, str], read: Reader[T], rescue: Rescue[T] | None = None) -> T:
             return self._once({**files, **law_files(law)}, read, place, seconds, rescue)
@@ -116,11 +133,16 @@ class CalculixSolver:
         return analyse(model, law, Setup(self.element, self.templates, self._shell_mesh), run)
 
     def _once(
-        self, files: Mapping[str, str], read: Reader[T], parent: Path | None, timeout: float,
+        self,
+        files: Mapping[str, str],
+        read: Reader[T],
+        parent: Path | None,
+        timeout: float,
         rescue: Rescue[T] | None = None,
-    ) -> T:  # fmt: skip
+    ) -> T:
         """Run in a fresh scratch folder; return what `read`, or `rescue` of a bad end, makes."""
-        program, library = self.executable().path, material_library()
+        program = self.executable().path
+        library = material_library()
         with run_folder("ccx", parent, self.keep, self.name, f"{JOB}.log") as folder:
             write_deck(folder, files)
             log_file, sta, frd = (folder / f"{JOB}.{end}" for end in ("log", "sta", "frd"))
@@ -131,7 +153,8 @@ class CalculixSolver:
             watch = None if self.progress is None else Watch(lambda: increments(sta), self.progress)
             command: list[str | Path] = [program, "-i", JOB]
             outcome = run_process(command, folder, log_file, timeout, environment, watch)
-            problem, done = reason(folder, JOB, outcome, timeout), increments(sta)
+            problem = reason(folder, JOB, outcome, timeout)
+            done = increments(sta)
             iterations = sum(i.iterations for i in done)
             if problem is None:
                 return read(frd, iterations)
@@ -171,16 +194,31 @@ def _absent(advice: str, origin: str, expected: bool) -> Diagnosis:
 
 def _tried(ccx: Executable) -> Diagnosis:
     expected = ccx.origin != FOUND
-    usable, stresses, off, advice = False, None, None, ""
+    usable = False
+    stresses = None
+    off = None
+    advice = ""
     if ccx.external is False:
         advice = f"cannot load material libraries; {ADVICE}"
     else:
         try:
             found = strip_stresses(CalculixSolver(ccx.path, timeout=SECONDS))
             stresses = checked_stresses(found, str(ccx.path), "calculix")
-            usable, off = True, difference(stresses)
+            usable = True
+            off = difference(stresses)
         except BubblefitError as error:
             advice = str(error).splitlines()[0]
     carries = {True: "yes", False: "no", None: "cannot be seen"}[ccx.external]
-    return Diagnosis("calculix", ccx.version, ccx.path, ccx.origin, expected, ccx.external,
-                     usable, stresses, off, advice, f"external materials: {carries}")  # fmt: skip
+    return Diagnosis(
+        "calculix",
+        ccx.version,
+        ccx.path,
+        ccx.origin,
+        expected,
+        ccx.external,
+        usable,
+        stresses,
+        off,
+        advice,
+        f"external materials: {carries}",
+    )

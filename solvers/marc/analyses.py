@@ -65,7 +65,8 @@ def analyse_bubble(
     ):
         problem = "takes no slack sheet, no metric and no rim that moves, use another solver"
         raise SolverFailure(problem, "marc")
-    deck, count = bubble_deck(model, law, settings), len(model.increments)
+    deck = bubble_deck(model, law, settings)
+    count = len(model.increments)
     return run(deck, count, lambda t19, iterations: bubble_history(t19, model, iterations))
 
 
@@ -77,9 +78,20 @@ def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings)
     held = supports(sets, settings.element)
     cases = [("inflation", len(model.increments), [*(one["name"] for one in held), "pressure"])]
     tables = [time_table(1, "load", (0.0, *model.increments))]
-    named, pressure = node_sets(model.mesh, list(sets)), pressure_context(settings)
-    return deck_text("bubble.dat.j2", "Bubble", settings, law, fabric, named, cases, tables, held,
-                     pressure=pressure)  # fmt: skip
+    named = node_sets(model.mesh, list(sets))
+    pressure = pressure_context(settings)
+    return deck_text(
+        "bubble.dat.j2",
+        "Bubble",
+        settings,
+        law,
+        fabric,
+        named,
+        cases,
+        tables,
+        held,
+        pressure=pressure,
+    )
 
 
 def pressure_context(settings: MarcSettings) -> dict[str, float]:
@@ -93,16 +105,19 @@ def analyse_strip(
     """Pull a strip, its grips driven by `pulls`; SolverFailure: no good end, or not so far."""
 
     def gauge(pulls: Array) -> Array:
-        deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+        deck = strip_deck(model, law, settings, pulls)
+        count = len(pulls)
         frames = run(deck, count, lambda t19, _: whole_times(t19, model.mesh, count))
         return gauge_opened(model, displacements(frames))
 
     pulls, driven = grip_pulls(model, law, gauge, "marc")
-    deck, count = strip_deck(model, law, settings, pulls), len(pulls)
+    deck = strip_deck(model, law, settings, pulls)
+    count = len(pulls)
 
     def read(t19: Path, iterations: int) -> History:
         frames = whole_times(t19, model.mesh, count)
-        forces, sets = reactions(frames), model.mesh.node_sets
+        forces = reactions(frames)
+        sets = model.mesh.node_sets
         if forces is None:
             raise SolverFailure(NO_FORCES, "marc")
         u = displacements(frames)
@@ -152,7 +167,8 @@ def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, A
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
     found: dict[int, dict[str, Array]] = {}
     for frame in file.frames(ended):
-        time, moved = round(frame.time), frame.fields.get(MOVED)
+        time = round(frame.time)
+        moved = frame.fields.get(MOVED)
         if abs(frame.time - time) < NEAR_TIME and moved is not None and moved.shape[1] >= 3:
             found[time] = frame.fields
     return found
@@ -173,7 +189,8 @@ def reactions(frames: Sequence[Mapping[str, Array]]) -> Array | None:
 def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
     """Return displacements, support forces and strains; SolverFailure as `whole_times`."""
     frames = whole_times(path, model.mesh, len(model.increments))
-    forces, sets = reactions(frames), model.mesh.node_sets
+    forces = reactions(frames)
+    sets = model.mesh.node_sets
     remarks = () if forces is not None else (Note(NO_REACTIONS, NO_FORCES),)
     given = None if forces is None else forces[model.reported]
     return inflated_history(model, displacements(frames), given, sets, iterations, remarks)
@@ -217,23 +234,30 @@ TONNES = 1e-12  # t/mm^3 in a kg/m^3
 
 
 def cylinder_deck(
-    model: CylinderModel, law: HypoelasticLaw, settings: MarcSettings,
+    model: CylinderModel,
+    law: HypoelasticLaw,
+    settings: MarcSettings,
     shape: Array | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Return the deck of inflation, the bottom held at the supports; InputError as `deck_text`.
 
     shape : (nodes, 3) mm, inflated: then that of a cavity's inflation and bending.
     """
-    mesh, filling, steps = model.mesh, len(model.inflation), len(model.increments)
+    mesh = model.mesh
+    filling = len(model.inflation)
+    steps = len(model.increments)
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
     names = [one["name"] for one in guided]
     held = [*guided, fixed("hold", HELD, (1,))]
-    load, tables, bending = [0.0, *model.inflation], [], dict[str, Any]()
+    load = [0.0, *model.inflation]
+    tables = []
+    bending = dict[str, Any]()
     if shape is None:
         cases = [("inflation", filling, [*names, "hold", "pressure"])]
     else:
-        gas, density = model.gas, TONNES * model.gas.density
+        gas = model.gas
+        density = TONNES * model.gas.density
         cavity = {"pressure": gas.ambient, "temperature": gas.temperature, "density": density}
         bending = {"gas": cavity, "bodies": contact_bodies(model, shape)}
         cases = [
@@ -297,15 +321,23 @@ def cylinder_history(
     gas = model.gas.closed_in(model.pressure, float(volume[0]))
     pressure = [gas.pressure(float(v)) for v in volume]
     return History(
-        -forces["collar"][:, 1], u, *extremes(log_strain(mesh, u, mesh.warp)), forces,
-        cavity_pressure=np.array(pressure), cavity_volume=volume, iterations=iterations, path=u,
-        remarks=tuple(remarks), early=early,
-    )  # fmt: skip
+        -forces["collar"][:, 1],
+        u,
+        *extremes(log_strain(mesh, u, mesh.warp)),
+        forces,
+        cavity_pressure=np.array(pressure),
+        cavity_volume=volume,
+        iterations=iterations,
+        path=u,
+        remarks=tuple(remarks),
+        early=early,
+    )
 
 
 def touching(model: CylinderModel) -> dict[str, Numbers]:
     """Return the nodes of the tube that supports and collar may touch."""
-    sets, tube = model.mesh.node_sets, np.ones(len(model.mesh.points), bool)
+    sets = model.mesh.node_sets
+    tube = np.ones(len(model.mesh.points), bool)
     # The rim where caps and tube meet is the tube's.
     tube[np.setdiff1d(sets["caps"], sets["ends"])] = False
     support, collar = may_touch(model, model.mesh.points)
@@ -328,7 +360,8 @@ def _forces(
         f"the collar's force is the sum of {name!r}, which is not confirmed (bubblefit docs marc)"
     )
     remarks = [Note(UNCONFIRMED, words)]
-    collar, supports = found["collar"][-1, 1], found["supports"][-1, 1]
+    collar = found["collar"][-1, 1]
+    supports = found["supports"][-1, 1]
     if abs(collar + supports) > BALANCE * abs(collar):
         words = (
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
@@ -343,11 +376,13 @@ def analyse_cylinder(
 ) -> History:
     """Inflate alone, to know where collar and supports touch; then run it all, up to a collapse."""
     without_cords(model, "Marc")
-    filling, bending = len(model.inflation), len(model.increments)
+    filling = len(model.inflation)
+    bending = len(model.increments)
     deck = cylinder_deck(model, law, settings)
     shape = run(deck, filling, lambda t19, _: inflated(t19, model))
     return run(
-        cylinder_deck(model, law, settings, shape), filling + APPROACH + bending,
+        cylinder_deck(model, law, settings, shape),
+        filling + APPROACH + bending,
         lambda t19, n: cylinder_history(t19, model, n),
         lambda t19, n: cylinder_history(t19, model, n, ended=False),
-    )  # fmt: skip
+    )

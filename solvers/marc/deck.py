@@ -52,12 +52,14 @@ def schedule(
         "tolerance": TOLERANCE,
         "cases": [
             {
-                "name": n, "increments": cuts * count, "step": 1 / cuts,
+                "name": n,
+                "increments": cuts * count,
+                "step": 1 / cuts,
                 "conditions": list(conditions),
             }
             for n, count, conditions in cases
         ],
-    }  # fmt: skip
+    }
 
 
 def fixed(
@@ -66,9 +68,12 @@ def fixed(
     """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
     given = list(values) or [0.0] * len(dofs)
     return {
-        "name": name, "set": members, "dofs": [dof + 1 for dof in dofs], "amounts": given,
+        "name": name,
+        "set": members,
+        "dofs": [dof + 1 for dof in dofs],
+        "amounts": given,
         "tables": [table if value else 0 for value in given],
-    }  # fmt: skip
+    }
 
 
 def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
@@ -86,20 +91,34 @@ def time_table(number: int, name: str, values: Sequence[float]) -> dict[str, Any
 
 
 def deck_text(
-    template: str, title: str, settings: MarcSettings, law: HypoelasticLaw, fabric: dict[str, Any],
-    sets: Sequence[dict[str, Any]], cases: Sequence[tuple[str, int, Sequence[str]]],
-    tables: Sequence[dict[str, Any]], held: Sequence[dict[str, Any]], **context: Any,
-) -> str:  # fmt: skip
+    template: str,
+    title: str,
+    settings: MarcSettings,
+    law: HypoelasticLaw,
+    fabric: dict[str, Any],
+    sets: Sequence[dict[str, Any]],
+    cases: Sequence[tuple[str, int, Sequence[str]]],
+    tables: Sequence[dict[str, Any]],
+    held: Sequence[dict[str, Any]],
+    **context: Any,
+) -> str:
     """Return the deck, `context` for its template; InputError: a template, or as `law_context`."""
     whole = {
         "version": __version__,
         "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
-        "element": settings.element, "shell": settings.element != MEMBRANE,
-        "follower": "pressure" in context, "gas": None, **fabric, "sets": [*fabric["sets"], *sets],
-        **law_context(law, settings), **schedule(settings, cases), "time_tables": tables,
-        "fixed": held, "start": {"name": "start", "conditions": [one["name"] for one in held]},
+        "element": settings.element,
+        "shell": settings.element != MEMBRANE,
+        "follower": "pressure" in context,
+        "gas": None,
+        **fabric,
+        "sets": [*fabric["sets"], *sets],
+        **law_context(law, settings),
+        **schedule(settings, cases),
+        "time_tables": tables,
+        "fixed": held,
+        "start": {"name": "start", "conditions": [one["name"] for one in held]},
         **context,
-    }  # fmt: skip
+    }
     folder = Path(settings.templates) if settings.templates is not None else None
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
     return render("marc", template, whole, folder, instead)
@@ -116,7 +135,8 @@ def set_lines(numbers: Numbers) -> list[str]:
     items = []
     runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     for run in runs:
-        first, last = int(run[0]) + 1, int(run[-1]) + 1
+        first = int(run[0]) + 1
+        last = int(run[-1]) + 1
         if len(run) > 2:
             items.append(f"{first:10d} to {last:d}")
         else:
@@ -179,9 +199,15 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
         {"set": name, "warp": rows[one, :3].tolist(), "fill": rows[one, 3:].tolist()}
         for name, one in groups(rows, "frame")
     ]
-    points, elements = np.asarray(mesh.points, float).tolist(), (quads + 1).tolist()
-    return {"points": points, "elements": elements, "sets": sets, "layers": layers,
-            "frames": frames}  # fmt: skip
+    points = np.asarray(mesh.points, float).tolist()
+    elements = (quads + 1).tolist()
+    return {
+        "points": points,
+        "elements": elements,
+        "sets": sets,
+        "layers": layers,
+        "frames": frames,
+    }
 
 
 def node_sets(mesh: Mesh, names: Mapping[str, Any] | list[str]) -> list[dict[str, Any]]:

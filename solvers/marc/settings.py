@@ -15,9 +15,19 @@ from ..settings import ExternalSettings, Offer, Override
 VARIABLE = "BUBBLEFIT_MARC"
 #: Blocks of the deck that a site's file can stand in for: the templates of these names.
 BLOCKS = (
-    "cavity", "cavity_parameter", "contact", "control", "fixed_disp", "geometry", "hypoelastic",
-    "nlelast", "orientation", "post", "pressure", "stepping",
-)  # fmt: skip
+    "cavity",
+    "cavity_parameter",
+    "contact",
+    "control",
+    "fixed_disp",
+    "geometry",
+    "hypoelastic",
+    "nlelast",
+    "orientation",
+    "post",
+    "pressure",
+    "stepping",
+)
 
 Seconds = Annotated[float, Field(gt=0, le=1e9)]
 Count = Annotated[int, Field(ge=1, le=1024)]
@@ -46,12 +56,14 @@ class MarcSettings(ExternalSettings):
     uncounted = ("timeout", "keep", "include")
     overrides = (
         Override(
-            "marc", "The Marc to run: run_marc, or a site's .toml.", metavar="PATH",
+            "marc",
+            "The Marc to run: run_marc, or a site's .toml.",
+            metavar="PATH",
             look="The Marc (run_marc, or a site's .toml) to look at.",
         ),
         Override("templates", "Folder of your own input decks.", metavar="PATH", path=True),
         Override("element", "Shell element", "139, 75 or 18"),
-    )  # fmt: skip
+    )
 
     executable: str = "run_marc"
     version: str = ""

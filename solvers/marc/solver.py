@@ -47,15 +47,22 @@ REPEATED = NoteKind("repeated increments")
 
 #: Settings that change what the deck or the subroutine says, or what Marc makes of them.
 MATTERING = (
-    "law", "element", "increments", "pressure_type", "pressure_sign", "own_state", "symmetric",
+    "law",
+    "element",
+    "increments",
+    "pressure_type",
+    "pressure_sign",
+    "own_state",
+    "symmetric",
     "arguments",
-)  # fmt: skip
+)
 T = TypeVar("T")
 #: What is done with each model.
 ANALYSES: dict[type, Callable[[Any, HypoelasticLaw, MarcSettings, Run], History]] = {
-    BubbleModel: analyses.analyse_bubble, UniaxialModel: analyses.analyse_strip,
+    BubbleModel: analyses.analyse_bubble,
+    UniaxialModel: analyses.analyse_strip,
     CylinderModel: analyses.analyse_cylinder,
-}  # fmt: skip
+}
 
 
 class MarcSolver:
@@ -65,9 +72,11 @@ class MarcSolver:
     external = True
 
     def __init__(
-        self, marc: Path | str | None = None, progress: Callable[[Progress], None] | None = None,
+        self,
+        marc: Path | str | None = None,
+        progress: Callable[[Progress], None] | None = None,
         **settings: Any,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.settings: MarcSettings = marc_settings(settings, None if marc is None else str(marc))
         self.progress = progress
 
@@ -99,8 +108,11 @@ class MarcSolver:
     @property
     def site_licences(self) -> dict[str, Any]:
         """Return what the site's file says of licences; the project's own words count more."""
-        return {key: getattr(self.settings, key) for key in KEYS
-                if key in self.settings.model_fields_set}  # fmt: skip
+        return {
+            key: getattr(self.settings, key)
+            for key in KEYS
+            if key in self.settings.model_fields_set
+        }
 
     def check(self) -> SolverCheck:
         """Return whether there is a run_marc; that it carries the law, `doctor` shows."""
@@ -111,14 +123,20 @@ class MarcSolver:
         return SolverCheck(self.name, True, self.settings.version, True)
 
     def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
         timeout: float | None = None,
-    ) -> History:  # fmt: skip
+    ) -> History:
         """Inflate, pull or bend the model; SolverFailure: names the folder; InputError."""
-        settings, repeats, early = self.settings, 0, ""
+        settings = self.settings
+        repeats = 0
+        early = ""
         source: str | None = None
         if settings.law == "hypela2":
-            own, symmetric = settings.own_state, settings.symmetric
+            own = settings.own_state
+            symmetric = settings.symmetric
             source = hypela2_source({1: law}, own_state=own, symmetric=symmetric)
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
 
@@ -151,7 +169,8 @@ def prove(solver: MarcSolver, timeout: float = SECONDS) -> tuple[float, ...]:
         # The table of the modulus ends with the bar: to the reach of a law without a range its
         # points would lie so far apart that the warp bar is 2e-4 off.
         end = np.full(3, float(np.log1p(bar.elongation)))
-        model, law = bar_model(bar), replace(bar_law(bar.model), strain_range=end)
+        model = bar_model(bar)
+        law = replace(bar_law(bar.model), strain_range=end)
         stresses.append(stress_of(model, solver.run(model, law, timeout=timeout)))
     return checked_stresses(tuple(stresses), "this Marc", solver.name)
 
@@ -163,7 +182,11 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return one entry (`named`: the one to look at), none if it is neither there nor was named."""
     origin = NAMED if named is not None else VARIABLE if os.environ.get(VARIABLE) else FOUND
     expected = origin != FOUND
-    path, stresses, off, advice, version = None, None, None, "", ""
+    path = None
+    stresses = None
+    off = None
+    advice = ""
+    version = ""
     try:
         solver = MarcSolver(named)
         version = solver.settings.version or "?"
@@ -174,8 +197,20 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
         if path is None and not expected:
             return []
         advice = str(error).splitlines()[0]
-    return [Diagnosis("marc", version, path, origin, expected, None, stresses is not None,
-                      stresses, off, advice)]  # fmt: skip
+    return [
+        Diagnosis(
+            "marc",
+            version,
+            path,
+            origin,
+            expected,
+            None,
+            stresses is not None,
+            stresses,
+            off,
+            advice,
+        )
+    ]
 
 
 # One run of Marc
@@ -233,8 +268,9 @@ def find_marc(settings: MarcSettings) -> Path | None:
 
 def _in_modules(settings: MarcSettings) -> Path | None:
     """Return run_marc as the shell sees it after `module load`."""
-    ask = with_modules(settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh",
-                                          settings.executable])  # fmt: skip
+    ask = with_modules(
+        settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh", settings.executable]
+    )
     said = None
     with suppress(OSError, subprocess.SubprocessError):
         said = subprocess.run(ask, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL)
@@ -336,7 +372,8 @@ def ending(
     licence = bool(licence_lines) and not done
     problem = None
     if outcome.timed_out:
-        problem, licence = f"did not end within {timeout:g} s: killed {reached}", False
+        problem = f"did not end within {timeout:g} s: killed {reached}"
+        licence = False
     elif licence and number != NORMAL:
         problem = f"no licence: {licence_lines[0]}"
     elif full and number != NORMAL:
@@ -355,14 +392,22 @@ def ending(
         at = done[-1].time if done else 0.0
         problem = f"ended at time {at:g} of {time:g}, {reached}"
     said = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
-    return Ending(problem, number, said, licence and problem is not None,
-                  sum(one.iterations for one in done), repeated(done))  # fmt: skip
+    return Ending(
+        problem,
+        number,
+        said,
+        licence and problem is not None,
+        sum(one.iterations for one in done),
+        repeated(done),
+    )
 
 
 def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[str]]:
     """Return `*** error` lines, refusals of a licence, which element was inside out ("" unknown),
     and complaints of a full disk."""
-    errors, refusals, full = list[str](), list[str](), list[str]()
+    errors = list[str]()
+    refusals = list[str]()
+    full = list[str]()
     turned: str | None = None
     for file in files:
         with suppress(OSError), file.open(encoding="latin-1") as text:
@@ -382,10 +427,16 @@ def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[st
 
 
 def run_job(
-    deck: str, time: int, source: str | None, settings: MarcSettings, read: Reader[T],
-    rescue: Reader[T] | None = None, parent: Path | None = None, timeout: float | None = None,
+    deck: str,
+    time: int,
+    source: str | None,
+    settings: MarcSettings,
+    read: Reader[T],
+    rescue: Reader[T] | None = None,
+    parent: Path | None = None,
+    timeout: float | None = None,
     tell: Tell | None = None,
-) -> tuple[T, Ending]:  # fmt: skip
+) -> tuple[T, Ending]:
     """Run a deck in a fresh scratch folder below `parent`; return what `read` makes of its results.
 
     time : total, at the end. source : of a user subroutine, or None. rescue : reads the results of
@@ -397,9 +448,11 @@ def run_job(
     subroutine = None if source is None else SUBROUTINE
     with run_folder(NAME, parent, settings.keep, NAME, SCREEN) as folder:
         write_deck(folder, {f"{JOB}.dat": deck, SUBROUTINE: source})
-        sts, results = folder / f"{JOB}.sts", folder / f"{JOB}.t19"
+        sts = folder / f"{JOB}.sts"
+        results = folder / f"{JOB}.t19"
         watch = None if tell is None else Watch(lambda: increments(sts), tell)
-        command, screen = run_command(settings, JOB, subroutine), folder / SCREEN
+        command = run_command(settings, JOB, subroutine)
+        screen = folder / SCREEN
         outcome = run_process(command, folder, screen, seconds, settings.environment, watch)
         set_earlier_aside(folder)
         end = ending(folder, JOB, SCREEN, outcome, seconds, float(time))

@@ -22,7 +22,8 @@ class Records:
     """A place in a file, and checked reading from there; InputError says which line."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.at = path, 0
+        self.path = path
+        self.at = 0
         with reading(path):
             self._lines = path.read_bytes().split(b"\n")
 
@@ -152,7 +153,8 @@ class T19File:
             yield frame
 
     def _model(self) -> ResultMesh:
-        numbers, points = np.empty(0, np.int64), np.empty((0, 3))
+        numbers = np.empty(0, np.int64)
+        points = np.empty((0, 3))
         elements: list[tuple[int, NDArray[np.int64]]] = []
         header = [0] * 30
         while self._file.peek() not in ("****", "++++"):
@@ -171,7 +173,8 @@ class T19File:
         return ResultMesh(numbers, points, tuple(elements))
 
     def _frame(self) -> ResultFrame:
-        frame, timed = ResultFrame(), False
+        frame = ResultFrame()
+        timed = False
         while self._file.peek() != "----":
             if self._file.peek() in ("****", "++++"):
                 raise self._file.wrong("an increment without its end (----): truncated")
@@ -188,7 +191,8 @@ class T19File:
                 count = self._file.integers(1)[0] if version else 1
                 if count < 1:
                     raise self._file.wrong("an increment without its time")
-                frame.time, timed = float(self._file.reals(count if version else 6)[0]), True
+                frame.time = float(self._file.reals(count if version else 6)[0])
+                timed = True
             elif kind == 524:
                 self._vectors(frame)
             else:

@@ -27,8 +27,11 @@ class Beam:
     """Half of a beam; its state x: Z - s, Y, angle node by node, then the reaction and the load."""
 
     def __init__(self, model: BeamModel, tolerance: float) -> None:
-        self.model, self.tolerance = model, tolerance
-        half, at, width = 0.5 * model.span, 0.5 * model.load_spacing, 0.5 * model.load_width
+        self.model = model
+        self.tolerance = tolerance
+        half = 0.5 * model.span
+        at = 0.5 * model.load_spacing
+        width = 0.5 * model.load_width
         ends = sorted({0.0, max(at - width, 0.0), at, at + width, half})
         pieces = [
             np.linspace(a, b, max(2, round((b - a) / model.size)) + 1)[1:]
@@ -38,7 +41,8 @@ class Beam:
         self.length = np.diff(self.s)
         count = 3 * len(self.s)
         self.places = 3 * np.arange(len(self.length))[:, None] + np.arange(6)
-        self.load, self.weight = np.zeros(count), np.zeros(count)
+        self.load = np.zeros(count)
+        self.weight = np.zeros(count)
         shares = np.zeros(len(self.s))
         if width > 0:
             # A strap over mid-span lies on both halves, as two straps do.
@@ -56,26 +60,38 @@ class Beam:
 
     def residual(self, x: Array, deflection: float | None) -> tuple[Array, Array]:
         """Return the residual (n,) and its tangent (n, n) at x; without a deflection no load."""
-        model, count = self.model, 3 * len(self.s)
-        q, reaction, load = x[:count].reshape(-1, 3), x[count], x[count + 1]
-        z, y = 1.0 + np.diff(q[:, 0]) / self.length, np.diff(q[:, 1]) / self.length
-        turn, bend = 0.5 * (q[1:, 2] + q[:-1, 2]), np.diff(q[:, 2]) / self.length
-        c, s = np.cos(turn), np.sin(turn)
-        stretch, shear = z * c + y * s, y * c - z * s
+        model = self.model
+        count = 3 * len(self.s)
+        q = x[:count].reshape(-1, 3)
+        reaction = x[count]
+        load = x[count + 1]
+        z = 1.0 + np.diff(q[:, 0]) / self.length
+        y = np.diff(q[:, 1]) / self.length
+        turn = 0.5 * (q[1:, 2] + q[:-1, 2])
+        bend = np.diff(q[:, 2]) / self.length
+        c = np.cos(turn)
+        s = np.sin(turn)
+        stretch = z * c + y * s
+        shear = y * c - z * s
         normal, moment, stiff = model.section.resultants(stretch - 1.0, bend)
         stiffness = model.section.shear
         self.strains = (stretch - 1.0, bend)
         # Derivatives of (e, g, a') by (Z', Y', a, a').
         by = np.zeros((len(c), 3, 4))
-        by[:, 0, 0], by[:, 0, 1], by[:, 0, 2] = c, s, shear
-        by[:, 1, 0], by[:, 1, 1], by[:, 1, 2] = -s, c, -stretch
+        by[:, 0, 0] = c
+        by[:, 0, 1] = s
+        by[:, 0, 2] = shear
+        by[:, 1, 0] = -s
+        by[:, 1, 1] = c
+        by[:, 1, 2] = -stretch
         by[:, 2, 3] = 1.0
         force = np.stack([normal, stiffness * shear, moment], axis=1)
         law = np.zeros((len(c), 3, 3))
         law[:, ::2, ::2] = stiff
         law[:, 1, 1] = stiffness
         inner = np.einsum("eai,eab,ebj->eij", by, law, by)
-        n, v = force[:, 0], force[:, 1]
+        n = force[:, 0]
+        v = force[:, 1]
         for i, curved in ((0, -n * s - v * c), (1, n * c - v * s)):
             inner[:, i, 2] += curved
             inner[:, 2, i] += curved
@@ -83,9 +99,11 @@ class Beam:
         # By the six unknowns of an element.
         to = np.zeros((len(c), 4, 6))
         for k in range(2):
-            to[:, k, k], to[:, k, 3 + k] = -1 / self.length, 1 / self.length
+            to[:, k, k] = -1 / self.length
+            to[:, k, 3 + k] = 1 / self.length
         to[:, 2, 2] = to[:, 2, 5] = 0.5
-        to[:, 3, 2], to[:, 3, 5] = -1 / self.length, 1 / self.length
+        to[:, 3, 2] = -1 / self.length
+        to[:, 3, 5] = 1 / self.length
         local = np.einsum("e,eka,eik,ei->ea", self.length, to, by, force)
         element = np.einsum("e,eka,ekl,elb->eab", self.length, to, inner, to)
         r: Array = np.zeros(count + 2)
@@ -94,7 +112,8 @@ class Beam:
         np.add.at(matrix, (self.places[:, :, None], self.places[:, None, :]), element)
         r[:count] -= self.weight + load * self.load
         matrix[:count, count + 1] = -self.load
-        h, end = model.roller_below, q[-1, 2]
+        h = model.roller_below
+        end = q[-1, 2]
         r[count - 2] += reaction
         r[count - 1] += reaction * h * np.sin(end)
         matrix[count - 1, count - 1] += reaction * h * np.cos(end)
@@ -102,14 +121,17 @@ class Beam:
         for row, value in ((count - 2, 1.0), (count - 1, h * np.sin(end))):
             matrix[row, count] = matrix[count, row] = value
         if deflection is None:
-            r[count + 1], matrix[count + 1, count + 1] = load, 1.0
+            r[count + 1] = load
+            matrix[count + 1, count + 1] = 1.0
         else:
-            r[count + 1], matrix[count + 1, 1] = -q[0, 1] - deflection, -1.0
+            r[count + 1] = -q[0, 1] - deflection
+            matrix[count + 1, 1] = -1.0
         return r, matrix
 
     def equilibrium(self, x: Array, deflection: float | None) -> Array | None:
         """Return the state at a deflection of mid-span (mm), from x; None where none is found."""
-        x, free = x.copy(), self.free
+        x = x.copy()
+        free = self.free
         for _ in range(MOST_ITERATIONS):
             r, k = self.residual(x, deflection)
             self.iterations += 1
@@ -135,7 +157,8 @@ class Beam:
 
     def surface(self, x: Array) -> Array:
         """Return the displacement (nodes, 3) mm of the mesh that is drawn."""
-        p, q = self.model.mesh.points, x[: 3 * len(self.s)].reshape(-1, 3)
+        p = self.model.mesh.points
+        q = x[: 3 * len(self.s)].reshape(-1, 3)
         along, up, turn = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
         moved = up + p[:, 1] * (np.cos(turn) - 1.0), along - p[:, 1] * np.sin(turn)
         return np.column_stack([np.zeros(len(p)), *moved])
@@ -155,7 +178,10 @@ def analyse(beam: Beam, model: BeamModel, asked: Asked) -> tuple[History, Array]
     x = beam.equilibrium(np.zeros(3 * len(beam.s) + 2), None)
     if x is None:
         raise SolverFailure("no equilibrium of the inflated tube under its weight")
-    sag, states, early, wanted = -x[1], [x], "", 0.0
+    sag = -x[1]
+    states = [x]
+    early = ""
+    wanted = 0.0
     low = high = 0.0
     for i, deflection in enumerate(model.increments):
         found = beam.reach(states[-1], sag + wanted, sag + deflection)
@@ -179,10 +205,15 @@ def analyse(beam: Beam, model: BeamModel, asked: Asked) -> tuple[History, Array]
     none = np.zeros(len(kept))
     volume = 2 * np.pi * model.section.radius**2 * (0.5 * model.span + kept[:, -5])
     history = History(
-        load, np.array([beam.surface(one) for one in kept]), np.array([low, 0.0, 0.0]),
+        load,
+        np.array([beam.surface(one) for one in kept]),
+        np.array([low, 0.0, 0.0]),
         np.array([high, 0.0, 0.0]),
         {"supports": np.column_stack([none, -2 * kept[:, -2], none])},
-        cavity_pressure=np.full(len(kept), model.pressure), cavity_volume=volume,
-        iterations=beam.iterations, remarks=(Note(EARLY, early),) if early else (), early=early,
-    )  # fmt: skip
+        cavity_pressure=np.full(len(kept), model.pressure),
+        cavity_volume=volume,
+        iterations=beam.iterations,
+        remarks=(Note(EARLY, early),) if early else (),
+        early=early,
+    )
     return history, np.zeros((*history.displacement.shape, 0))

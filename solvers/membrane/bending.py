@@ -66,7 +66,8 @@ class Neighbours:
     """
 
     def __init__(self, membrane: ClosedMembrane, parameters: Sequence[str]) -> None:
-        law, self.each = membrane.law, []
+        law = membrane.law
+        self.each = []
         acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}  # others of a form stay zero
         self.steps = np.array([usual_step(law, name, 1.0, SHARE) for name in parameters])
         for name, step in zip(parameters, self.steps.tolist(), strict=True):
@@ -79,7 +80,8 @@ class Neighbours:
         before = self.each
         self.each = [_copied(membrane, own.law) for own in before]
         for own, old in zip(self.each, before, strict=True):
-            own.strain_old[:], own.stress_old[:] = old.strain_old, old.stress_old
+            own.strain_old[:] = old.strain_old
+            own.stress_old[:] = old.stress_old
 
     def follow(self, membrane: ClosedMembrane, u: Array) -> None:
         """Move to the equilibria beside u (n, 3), that of the membrane, before it is accepted."""
@@ -122,7 +124,8 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
     """
     facet = float(np.sqrt(np.median(membrane.elements.area.sum(axis=1))))
     unit = membrane.pressure / facet
-    viscosity, u = FIRST * unit, start
+    viscosity = FIRST * unit
+    u = start
     try:
         for _ in range(MOST_STEPS):
             membrane.drag(viscosity, u)
@@ -132,7 +135,8 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
                 if viscosity > MOST * unit:
                     return None
                 continue
-            moved, u = float(np.abs(found - u).max()), found
+            moved = float(np.abs(found - u).max())
+            u = found
             restless = viscosity > LITTLE * unit or moved > NEAR * facet
             viscosity = max(DOWN * viscosity, LEAST * unit)
             if restless:
@@ -150,11 +154,13 @@ class Bodies:
     """Supports, and collars by their way, around an inflated membrane."""
 
     def __init__(self, membrane: ClosedMembrane, plan: Bending, inflated: Array) -> None:
-        self.membrane, self.way = membrane, np.asarray(plan.direction, dtype=float)
+        self.membrane = membrane
+        self.way = np.asarray(plan.direction, dtype=float)
         position = membrane.reference + inflated
         self.posts = [brought_to_touch(body, position, -self.way, BITE) for body in plan.supports]
         self.collars: list[RigidCylinder] = []
-        membrane.penalty, membrane.bodies = plan.penalty, self.posts
+        membrane.penalty = plan.penalty
+        membrane.bodies = self.posts
         if plan.weight:
             weight = membrane.node_weight(plan.weight)
             membrane.dead = np.outer(weight, -self.way).reshape(-1)
@@ -165,7 +171,8 @@ class Bodies:
         self.collars = [brought_to_touch(body, position, self.way, 0.0) for body in plan.collars]
         volume, _ = self.membrane.cavity.measure(position)
         closed = plan.gas.closed_in(pressure, volume) if plan.gas.constant == "mass" else None
-        self.membrane.gas, self.membrane.pressure = closed, pressure
+        self.membrane.gas = closed
+        self.membrane.pressure = pressure
 
     def move(self, moved: float) -> None:
         """Move the collars by a way (mm) from where they touched."""
@@ -181,9 +188,15 @@ class Bodies:
 
 
 def analyse(
-    membrane: ClosedMembrane, model: InflatedModel, inflated: Array, pressure: float,
-    extremes: tuple[Array, Array], sides: NDArray[np.bool_], asked: Asked, beside: Neighbours,
-) -> tuple[History, Array]:  # fmt: skip
+    membrane: ClosedMembrane,
+    model: InflatedModel,
+    inflated: Array,
+    pressure: float,
+    extremes: tuple[Array, Array],
+    sides: NDArray[np.bool_],
+    asked: Asked,
+    beside: Neighbours,
+) -> tuple[History, Array]:
     """Return the frames of the bending: the inflated state and every reported displacement.
 
     `load` is the force (N) of the collar on the whole membrane along its way, `wrinkled` a share of
@@ -192,7 +205,8 @@ def analyse(
     """
     plan = model.bending
     assert plan is not None
-    way, membrane.pressure = np.asarray(plan.direction, dtype=float), pressure
+    way = np.asarray(plan.direction, dtype=float)
+    membrane.pressure = pressure
     bodies = Bodies(membrane, plan, inflated)
     others = [Bodies(own, plan, u) for own, u in zip(beside.each, beside.moved, strict=True)]
     if plan.weight:
@@ -210,15 +224,23 @@ def analyse(
     membrane.keep_tangent = True
 
     low, high = (extreme.copy() for extreme in extremes)
-    path, moves = [inflated], [0.0]
+    path = [inflated]
+    moves = [0.0]
     wrinkle = membrane.wrinkle.copy()
-    gas, pushes = [(pressure, volume)], [bodies.pushes()]
-    rates = [(beside.slopes(inflated, beside.moved),
-              beside.slopes(pushes[0], [own.pushes() for own in others]))]  # fmt: skip
+    gas = [(pressure, volume)]
+    pushes = [bodies.pushes()]
+    rates = [
+        (
+            beside.slopes(inflated, beside.moved),
+            beside.slopes(pushes[0], [own.pushes() for own in others]),
+        )
+    ]
     remarks: list[Note] = []
     snaps: list[float] = []
     early = ""
-    wrinkled, of_wrinkles, deepest = [membrane.wrinkled_share(sides)], 0.0, 0.0
+    wrinkled = [membrane.wrinkled_share(sides)]
+    of_wrinkles = 0.0
+    deepest = 0.0
     moving = Moving(membrane, bodies.move)
     # A displacement without equilibrium ends the history, and is no failure.
     try:
@@ -238,8 +260,12 @@ def analyse(
             moves.append(wanted)
             gas.append((membrane.pressure, membrane.volume))
             pushes.append(bodies.pushes())
-            rates.append((beside.slopes(found, beside.moved),
-                          beside.slopes(pushes[-1], [own.pushes() for own in others])))  # fmt: skip
+            rates.append(
+                (
+                    beside.slopes(found, beside.moved),
+                    beside.slopes(pushes[-1], [own.pushes() for own in others]),
+                )
+            )
             wrinkled.append(membrane.wrinkled_share(sides))
             of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
             now = membrane.reference + found
@@ -273,13 +299,21 @@ def analyse(
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
     by_collars = np.array([own[len(plan.supports) :].sum(axis=0) for _, own in rates])[frames]
     history = History(
-        reactions[plan.collars[0].name] @ way, np.array(path)[frames], low, high, reactions,
+        reactions[plan.collars[0].name] @ way,
+        np.array(path)[frames],
+        low,
+        high,
+        reactions,
         cavity_pressure=np.array([p for p, _ in gas])[frames],
         cavity_volume=model.copies * np.array([v for _, v in gas])[frames],
-        iterations=membrane.iterations, path=np.array(path), wrinkled=np.array(wrinkled)[frames],
-        remarks=tuple(remarks), early=early, relaxed=membrane.wrinkle_stiffness is not None,
+        iterations=membrane.iterations,
+        path=np.array(path),
+        wrinkled=np.array(wrinkled)[frames],
+        remarks=tuple(remarks),
+        early=early,
+        relaxed=membrane.wrinkle_stiffness is not None,
         load_slope=np.einsum("fik,i->fk", by_collars, whole * way) if beside.each else None,
-    )  # fmt: skip
+    )
     return history, np.array([own for own, _ in rates])[frames]
 
 
@@ -289,7 +323,8 @@ class Moving(Loading):
     most_cuts = 3
 
     def __init__(self, membrane: ClosedMembrane, move: Callable[[float], None]) -> None:
-        self.membrane, self.move = membrane, move
+        self.membrane = membrane
+        self.move = move
         self.expected = np.zeros_like(membrane.reference)
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
@@ -311,7 +346,10 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
     """Return the equilibrium at `level` beyond a limit pressure, led there by the volume."""
     outside = OVERPRESSURE * level
     first, _ = membrane.cavity.measure(membrane.reference + u)
-    volume, pressure, step, slope = first, before, STEP, np.zeros_like(u)
+    volume = first
+    pressure = before
+    step = STEP
+    slope = np.zeros_like(u)
     try:
         while step >= LEAST_STEP and volume < MOST_GROWTH * first:
             membrane.gas = ClosedGas((outside + pressure) * volume * (1.0 + step), outside)
@@ -322,14 +360,17 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
                 if found is None:
                     found = settled(membrane, u + step * slope)
             if found is None:
-                step, slope = 0.5 * step, np.zeros_like(u)
+                step = 0.5 * step
+                slope = np.zeros_like(u)
                 continue
             if membrane.pressure >= level:
                 membrane.gas = None
                 return membrane.equilibrium(found, level)
             membrane.accept()
-            slope, u = (found - u) / step, found
-            volume, pressure = membrane.volume, membrane.pressure
+            slope = (found - u) / step
+            u = found
+            volume = membrane.volume
+            pressure = membrane.pressure
             step = min(STEP, 1.5 * step)
         return None
     finally:
@@ -344,8 +385,10 @@ def analyse_inflated(
         raise InputError(None, "guess", "a closed membrane takes none")
     beside = Neighbours(membrane, asked.parameters)
     levels = np.array(model.pressures)
-    volume, wrinkled = np.zeros(len(levels)), np.zeros(len(levels))
-    sides, filling = np.ones(len(model.mesh.quads), dtype=bool), Filling(membrane)
+    volume = np.zeros(len(levels))
+    wrinkled = np.zeros(len(levels))
+    sides = np.ones(len(model.mesh.quads), dtype=bool)
+    filling = Filling(membrane)
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     record = Record(membrane, len(levels))
     membrane.keep_tangent = False
@@ -366,7 +409,8 @@ def analyse_inflated(
     if model.bending is not None:
         fixed = model.fixed(bent=True)
         bent = closed_membrane(model, membrane.law, membrane.tolerance, fixed, membrane.wall)
-        bent.strain_old[:], bent.stress_old[:] = membrane.strain_old, membrane.stress_old
+        bent.strain_old[:] = membrane.strain_old
+        bent.stress_old[:] = membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
         beside.on(bent)
         for own, u in [(bent, record.path[-1]), *zip(beside.each, beside.moved, strict=True)]:
@@ -380,11 +424,20 @@ def analyse_inflated(
     sets = model.mesh.node_sets
     reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
     history = History(
-        levels, record.path, record.low, record.high, reactions, cavity_pressure=levels,
-        cavity_volume=model.copies * volume, iterations=membrane.iterations, path=record.path,
-        wrinkled=wrinkled, remarks=remarks, relaxed=membrane.wrinkle_stiffness is not None,
+        levels,
+        record.path,
+        record.low,
+        record.high,
+        reactions,
+        cavity_pressure=levels,
+        cavity_volume=model.copies * volume,
+        iterations=membrane.iterations,
+        path=record.path,
+        wrinkled=wrinkled,
+        remarks=remarks,
+        relaxed=membrane.wrinkle_stiffness is not None,
         load_slope=np.zeros((len(levels), len(beside.each))) if beside.each else None,
-    )  # fmt: skip
+    )
     return history, rates
 
 
@@ -411,7 +464,8 @@ class Filling(Loading):
     ) -> Array | None:
         found = self._directly(lower, u, level, start, cuts)
         if found is not None:
-            cavity, reference = self.membrane.cavity, self.membrane.reference
+            cavity = self.membrane.cavity
+            reference = self.membrane.reference
             now, then = (cavity.measure(reference + at)[0] for at in (found, u))
             if now < (1.0 + MOST_GROWTH_INFLATED) * then:
                 return found
@@ -465,14 +519,19 @@ def analyse_cylinder(
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:
     """Return the cylinder with its posts, whose forces are reported as one, and its ring."""
     sides = (1,) if "symmetry_z" in model.mesh.node_sets else (1, -1)
-    supports, collar = model.supports, model.collar
+    supports = model.supports
+    collar = model.collar
     posts = [
-        RigidCylinder("supports", (1.0, 0.0, 0.0), (0.0, 0.0, side * 0.5 * supports.span),
-                      0.5 * supports.diameter)
+        RigidCylinder(
+            "supports",
+            (1.0, 0.0, 0.0),
+            (0.0, 0.0, side * 0.5 * supports.span),
+            0.5 * supports.diameter,
+        )
         if supports.saddle is None
         else _ring("supports", supports.saddle, side * 0.5 * supports.span)
         for side in sides
-    ]  # fmt: skip
+    ]
     places = [side * 0.5 * collar.spacing for side in sides] if collar.spacing else [0.0]
     bending = Bending(
         posts,
@@ -484,12 +543,19 @@ def closed_membrane_of(model: CylinderModel) -> InflatedModel:
         weight=model.weight,
     )
     return InflatedModel(
-        model.mesh, model.thickness, np.asarray(model.mesh.warp), model.inflation,
-        {**model.guides, "support_bottom": (1,)}, model.copies, bending, model.cords,
-    )  # fmt: skip
+        model.mesh,
+        model.thickness,
+        np.asarray(model.mesh.warp),
+        model.inflation,
+        {**model.guides, "support_bottom": (1,)},
+        model.copies,
+        bending,
+        model.cords,
+    )
 
 
 def _ring(name: str, size: Collar, place: float) -> RigidCylinder:
     """Return a ring around the tube at z = place."""
-    centre, radius = (0.0, 0.0, place), 0.5 * size.inner_diameter
+    centre = (0.0, 0.0, place)
+    radius = 0.5 * size.inner_diameter
     return RigidCylinder(name, (0.0, 0.0, 1.0), centre, radius, True, size.length, size.fillet)

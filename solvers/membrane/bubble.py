@@ -103,10 +103,17 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     free = np.setdiff1d(np.arange(points.size), model.fixed)
     return Membrane(
-        points, quads, reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
-        model.thickness, law, free, tangent_for(quads, points.size, free), tolerance,
-        step_limit=0.1 * float(np.ptp(points, axis=0).max()), cords=cords_on_sheet(model),
-    )  # fmt: skip
+        points,
+        quads,
+        reference_elements(model.stress_free, quads, model.mesh.warp, model.stretch),
+        model.thickness,
+        law,
+        free,
+        tangent_for(quads, points.size, free),
+        tolerance,
+        step_limit=0.1 * float(np.ptp(points, axis=0).max()),
+        cords=cords_on_sheet(model),
+    )
 
 
 def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[History, Array]:
@@ -115,8 +122,10 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
     shape = membrane.reference.shape
     derivatives = _derivatives(membrane, model, asked) if asked.parameters else None
     rates = np.zeros((len(levels), *shape, len(asked.parameters)))
-    record, keep = Record(membrane, len(levels)), model.reported
-    judged, unstable = set(keep.tolist()), []
+    record = Record(membrane, len(levels))
+    keep = model.reported
+    judged = set(keep.tolist())
+    unstable = []
     membrane.keep_tangent = derivatives is not None or 0 in judged
     for i, u in enumerate(march(Inflation(membrane, model), levels, asked)):
         if i in judged and not membrane.tangent.definite():
@@ -126,14 +135,20 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
             rates[i] = derivatives.increment(u, levels[i]).reshape(*shape, -1)
         record.accept(i, u)
         membrane.keep_tangent = derivatives is not None or i + 1 in judged
-    forces, sets = record.forces[keep], model.mesh.node_sets
+    forces = record.forces[keep]
+    sets = model.mesh.node_sets
     reactions = {n: forces[:, sets[n]].sum(axis=1) for n in model.supports if n in sets}
     history = History(
-        levels[keep], record.path[keep], record.low, record.high, reactions,
-        iterations=membrane.iterations, path=record.path,
+        levels[keep],
+        record.path[keep],
+        record.low,
+        record.high,
+        reactions,
+        iterations=membrane.iterations,
+        path=record.path,
         path_slope=rates if asked.parameters else None,
         unstable=named(1e3 * levels[unstable], "kPa"),
-    )  # fmt: skip
+    )
     return history, rates[keep]
 
 
@@ -152,7 +167,8 @@ def balance(membrane: Membrane, model: MeasuredShape, asked: Asked) -> tuple[His
     """
     derivatives = _derivatives(membrane, model, asked)
     still = np.zeros((membrane.reference.size, len(asked.parameters)))
-    record, inner = Record(membrane, len(model.moved)), model.fields[membrane.free]
+    record = Record(membrane, len(model.moved))
+    inner = model.fields[membrane.free]
     steps = np.zeros((*model.moved.shape, 1 + len(asked.parameters)))
     for i, (u, pressure) in enumerate(zip(model.moved, model.pressures, strict=True)):
         if not np.isfinite(membrane.unbalance(u, pressure, with_tangent=True)):
@@ -174,7 +190,8 @@ class Inflation(Loading):
     """A flat or nearly flat membrane under a pressure (MPa); its rim moves as in the model."""
 
     def __init__(self, membrane: Membrane, model: BubbleModel) -> None:
-        self.membrane, self.model = membrane, model
+        self.membrane = membrane
+        self.model = model
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
         if self.model.rim_motion is not None:

@@ -65,10 +65,13 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
     if not in_plane.any(axis=1).all():
         first, second = border[int(np.argmin(in_plane.any(axis=1)))]
         raise InputError(
-            None, "mesh", f"the cavity is open between nodes {first} and {second}: close it, "
+            None,
+            "mesh",
+            f"the cavity is open between nodes {first} and {second}: close it, "
             "or hold the edge normal to a symmetry plane",
-        )  # fmt: skip
-    weight, origin = np.ones(3), points.mean(axis=0)
+        )
+    weight = np.ones(3)
+    origin = points.mean(axis=0)
     for k in range(3):
         at = points[border[in_plane[:, k], 0], k]
         if len(at):
@@ -128,11 +131,14 @@ def flexure_of(
     planes : (n, 3) whether an open edge at the node lies in a plane of symmetry, by its normal.
     """
     share, inertia, along = _of_nodes(points, quads, warp, thickness)
-    nodes, differences, shares = [], [], []
+    nodes = []
+    differences = []
+    shares = []
     for before, node, after, mirror in _lines(points, quads, planes):
         step = points[after] - points[node]
         back = points[node] - points[before] if before != after else -mirror * step
-        ahead, behind = float(np.linalg.norm(step)), float(np.linalg.norm(back))
+        ahead = float(np.linalg.norm(step))
+        behind = float(np.linalg.norm(back))
         if step @ back < STRAIGHT * ahead * behind:
             continue
         one = np.ones(3)
@@ -163,7 +169,9 @@ def _of_nodes(
     normal = across / (2.0 * area[:, None])
     flat = warp - np.einsum("mk,mk->m", warp, normal)[:, None] * normal
     flat /= np.linalg.norm(flat, axis=1)[:, None]
-    share, cube, along = np.zeros(len(points)), np.zeros(len(points)), np.zeros(points.shape)
+    share = np.zeros(len(points))
+    cube = np.zeros(len(points))
+    along = np.zeros(points.shape)
     np.add.at(share, quads, 0.25 * area[:, None])
     np.add.at(cube, quads, 0.25 * (area * np.broadcast_to(thickness, area.shape) ** 3)[:, None])
     np.add.at(along, quads, flat[:, None])
@@ -239,7 +247,9 @@ def contact_forces(
     gap, out, hessian = gaps(body, position[near])
     inside = gap < 0
     touched = near[inside]
-    k, g, n = stiffness[touched], gap[inside], out[inside]
+    k = stiffness[touched]
+    g = gap[inside]
+    n = out[inside]
     force = np.zeros_like(position)
     force[touched] = -(k * g)[:, None] * n
     slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[inside]
@@ -260,7 +270,8 @@ def brought_to_touch(
     body: RigidCylinder, position: Array, direction: Array, bite: float
 ) -> RigidCylinder:
     """Return the body moved along `direction` until it is `bite` (mm) into the surface."""
-    centre, axis = np.asarray(body.centre, dtype=float), np.asarray(body.axis, dtype=float)
+    centre = np.asarray(body.centre, dtype=float)
+    axis = np.asarray(body.axis, dtype=float)
     arm = position - centre
     if body.ring:
         near = np.abs(arm @ axis) < 0.5 * body.length
@@ -269,8 +280,10 @@ def brought_to_touch(
     if not near.any():
         problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
         raise InputError(None, "mesh", problem)
-    nodes, heights = position[near], arm[near] @ direction
-    low, high = float(heights.min()) - 2 * body.radius, float(heights.max()) + 2 * body.radius
+    nodes = position[near]
+    heights = arm[near] @ direction
+    low = float(heights.min()) - 2 * body.radius
+    high = float(heights.max()) + 2 * body.radius
     # Search the first touch from outside; a ring starts around the membrane's middle.
     if body.ring:
         low = 0.5 * float(heights.min() + heights.max())
@@ -283,7 +296,8 @@ def brought_to_touch(
     while high - low > TOUCH:
         ways = np.linspace(low, high, WAYS)
         first = int(np.argmax(least(ways) < -bite))
-        low, high = float(ways[max(first - 1, 0)]), float(ways[first])
+        low = float(ways[max(first - 1, 0)])
+        high = float(ways[first])
     return replace(body, centre=tuple((centre + low * direction).tolist()))
 
 
@@ -319,7 +333,8 @@ class ClosedMembrane(Membrane):
         super().__post_init__()
         self.wrinkle_stiffness = self.wall.wrinkle_stiffness
         self._stiff: tuple[HypoelasticLaw, sp.csr_matrix, Array] | None = None
-        e, dn = self.elements, self.elements.slopes
+        e = self.elements
+        dn = self.elements.slopes
         weight: Array = e.area * self.section[:, None]
         #: (elements, 4, 4) N/mm for 1 MPa of isotropic stress
         self.isotropic: Array = np.einsum("mp,mpan,mpak->mnk", weight, dn, dn)
@@ -402,11 +417,13 @@ class ClosedMembrane(Membrane):
 
     def drag(self, viscosity: float, anchor: Array) -> None:
         """Resist (MPa/mm times distance) motion away from the displacement `anchor` (n, 3)."""
-        self.viscosity, self.anchor = viscosity, anchor
+        self.viscosity = viscosity
+        self.anchor = anchor
 
     def wrinkled_share(self, sides: NDArray[np.bool_]) -> float:
         """Return the share of the surface of `sides` (elements,) without tension in a direction."""
-        area, s = self.elements.area[sides], self.stress_new[sides]
+        area = self.elements.area[sides]
+        s = self.stress_new[sides]
         least = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(0.5 * (s[..., 0] - s[..., 1]), s[..., 2])
         folded = (self.wrinkle[sides] != 0.0).any(axis=2) | (least < 0.0)
         return float(area[folded].sum() / area.sum())
@@ -455,7 +472,8 @@ def closed_membrane(
     free = np.setdiff1d(np.arange(points.size), fixed)
     cavity = closed_cavity(points, quads, fixed)
     thickness = np.asarray(model.thickness, dtype=float)
-    flexure, coupled = None, quads
+    flexure = None
+    coupled = quads
     if model.bending is not None and wall.bending_stiffness > 0:
         flexure = flexure_of(points, quads, warp, thickness, cavity.planes)
         flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)

@@ -30,12 +30,21 @@ class Cords:
     """
 
     def __init__(
-        self, cords: Sequence[Cord] | Sequence[SheetCord], quads: Numbers, shares: Array,
-        cord: Numbers, part: Array, nodes: Numbers, points: Array,
-    ) -> None:  # fmt: skip
+        self,
+        cords: Sequence[Cord] | Sequence[SheetCord],
+        quads: Numbers,
+        shares: Array,
+        cord: Numbers,
+        part: Array,
+        nodes: Numbers,
+        points: Array,
+    ) -> None:
         self.cords: list[Cord | SheetCord] = list(cords)
-        self.quads, self.shares = quads, shares
-        self.cord, self.part, self.nodes = cord, part, nodes
+        self.quads = quads
+        self.shares = shares
+        self.cord = cord
+        self.part = part
+        self.nodes = nodes
         self.level, self.force = 1.0, np.zeros(len(quads))
         self.given = np.array([c.initial_force is not None for c in cords])[cord]
         self.start = np.array([c.prestrain for c in cords])[cord]
@@ -50,7 +59,8 @@ class Cords:
 
     def begin(self, position: Array) -> None:
         """Begin to strain cords with an initial force, from the inflated `position` (n, 3) on."""
-        length, given = np.linalg.norm(self._vectors(position), axis=1), self.given
+        length = np.linalg.norm(self._vectors(position), axis=1)
+        given = self.given
         self.rest[given] = length[given]
         strains = [c.table.strain_at(c.initial_force or 0.0) for c in self.cords]
         self.start[given] = np.array(strains)[self.cord[given]]
@@ -70,7 +80,8 @@ class Cords:
                 strain[own] = self.part[own] @ length[own] / rest - 1.0 + self.start[own]
             force[own], slope[own] = cord.table.pull(strain[own], cord.tension_only)
             if cord.initial_force is not None and not self.bent:
-                force[own], slope[own] = self.level * cord.initial_force, 0.0
+                force[own] = self.level * cord.initial_force
+                slope[own] = 0.0
             if not cord.bonded and rest > 0:
                 opens = np.zeros(position.shape)
                 pulls = (self.part[own, None] * self.shares[own])[..., None] * t[own, None]
@@ -91,7 +102,8 @@ class Cords:
 
         surface, free : (n, 3, k) of its places at the start, and of those without stress.
         """
-        tangent, d = self.forces(position)[1], self._vectors(position)
+        tangent = self.forces(position)[1]
+        d = self._vectors(position)
         moved = surface[self.nodes].reshape(len(d), 12, -1)
         longer = np.einsum("mi,mn,mnik->mk", self.rest_way, self.shares, free[self.nodes])
         pull = -(self.steep / self.rest)[:, None] * longer
@@ -109,7 +121,8 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
     Raises InputError : on half of a tube, a cord without its mirror image.
     """
     half = bool(planes[:, 0].any())
-    p, found = mesh.points, []
+    p = mesh.points
+    found = []
     radius = np.hypot(p[:, 0], p[:, 1])
     tube = (np.abs(radius[mesh.quads] - radius.max()) < NEAR * radius.max()).all(1)
     for i, cord in enumerate(cords):
@@ -131,7 +144,9 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
 
     Raises InputError : a cord that meets no quad of a whole sheet.
     """
-    q, p, found = model.mesh.quads, model.mesh.points, []
+    q = model.mesh.quads
+    p = model.mesh.points
+    found = []
     for i, cord in enumerate(model.cords):
         x, y = (p[:, :2] - cord.ends[0]).T
         length = float(np.linalg.norm(cord.ends[1] - cord.ends[0]))
@@ -145,9 +160,11 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
 
 
 def _members(
-    mesh: Mesh, cords: Sequence[Cord] | Sequence[SheetCord],
-    found: Sequence[tuple[int, Numbers, Array, float]], points: Array,
-) -> Cords | None:  # fmt: skip
+    mesh: Mesh,
+    cords: Sequence[Cord] | Sequence[SheetCord],
+    found: Sequence[tuple[int, Numbers, Array, float]],
+    points: Array,
+) -> Cords | None:
     """Return members by number of a cord, quads, b_n and part; points (n, 3) without stress."""
     if not sum(len(quads) for _, quads, _, _ in found):
         return None
@@ -174,15 +191,20 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
         crossed = np.flatnonzero(cut.any(axis=1))
         if len(crossed):
             break
-    aside, along, cut = aside[crossed], along[crossed], cut[crossed]
+    aside = aside[crossed]
+    along = along[crossed]
+    cut = cut[crossed]
     # From edge to edge: between nodes at asides a and b the line is at a share a / (a - b).
-    rows, places = np.arange(len(crossed)), []
+    rows = np.arange(len(crossed))
+    places = []
     for first in (np.argmax(cut, axis=1), 3 - np.argmax(cut[:, ::-1], axis=1)):
         second = (first + 1) % 4
-        a, b = aside[rows, first], aside[rows, second]
+        a = aside[rows, first]
+        b = aside[rows, second]
         to = a / (a - b)
         place = np.zeros(aside.shape)
-        place[rows, first], place[rows, second] = 1.0 - to, to
+        place[rows, first] = 1.0 - to
+        place[rows, second] = to
         places.append(place)
     start, end = np.sort([(place * along).sum(axis=1) for place in places], axis=0)
     held = np.minimum(end, ends[1]) - np.maximum(start, ends[0])

@@ -29,7 +29,8 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
     near = NEAR * float(np.ptp(along))
-    rows, columns = np.repeat(quads, 4, axis=1).ravel(), np.tile(quads, (1, 4)).ravel()
+    rows = np.repeat(quads, 4, axis=1).ravel()
+    columns = np.tile(quads, (1, 4)).ravel()
     graph = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
     ends = (np.flatnonzero(np.abs(along - at) <= near) for at in (along.min(), along.max()))
     return [_from(graph, end) for end in ends]
@@ -38,9 +39,11 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
 def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
     """Return the order, breadth first from the nodes of an end, which follow one another."""
     first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
-    degree, seen = np.diff(graph.indptr), np.zeros(graph.shape[0], dtype=bool)
+    degree = np.diff(graph.indptr)
+    seen = np.zeros(graph.shape[0], dtype=bool)
     seen[first] = True
-    order, at = first.tolist(), 0
+    order = first.tolist()
+    at = 0
     while at < len(order):
         beside = graph.indices[graph.indptr[order[at]] : graph.indptr[order[at] + 1]]
         fresh = beside[~seen[beside]]
@@ -103,7 +106,8 @@ def tangent_for(
         orders.append(unknowns[unknowns >= 0])
     ranks = [np.argsort(order) for order in orders]
     widths = [int(np.abs(rank[rows[inside]] - rank[columns[inside]]).max()) for rank in ranks]
-    width, rank = min(widths), ranks[int(np.argmin(widths))]
+    width = min(widths)
+    rank = ranks[int(np.argmin(widths))]
     if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else OF_TUBES):
         return BandedTangent(rank, rows, columns, inside, width)
     return SparseTangent(rows, columns, inside, len(free))
@@ -113,16 +117,22 @@ class BandedTangent(Tangent):
     """LAPACK gbtrf/gbtrs on a renumbered band."""
 
     def __init__(
-        self, rank: NDArray[np.int64], rows: NDArray[np.int64], columns: NDArray[np.int64],
-        inside: NDArray[np.bool_], width: int,
-    ) -> None:  # fmt: skip
+        self,
+        rank: NDArray[np.int64],
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        inside: NDArray[np.bool_],
+        width: int,
+    ) -> None:
         self.width, self.size = width, len(rank)
         self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.data = np.zeros(self.depth * self.size)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
-        i, j = rank[rows[inside]], rank[columns[inside]]
+        i = rank[rows[inside]]
+        j = rank[columns[inside]]
         self.slot[inside] = j * self.depth + 2 * width + i - j
-        self.rank, self.order = rank, np.argsort(rank)
+        self.rank = rank
+        self.order = np.argsort(rank)
 
     def factor(self) -> None:
         band = self.data.reshape((self.depth, self.size), order="F")
@@ -167,9 +177,12 @@ class SparseTangent(Tangent):
     """
 
     def __init__(
-        self, rows: NDArray[np.int64], columns: NDArray[np.int64], inside: NDArray[np.bool_],
+        self,
+        rows: NDArray[np.int64],
+        columns: NDArray[np.int64],
+        inside: NDArray[np.bool_],
         size: int,
-    ) -> None:  # fmt: skip
+    ) -> None:
         keys, position = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
         self.slot[inside] = position
@@ -225,7 +238,9 @@ class AroundTangent(Tangent):
     """A tangent that is another one, `inner`, and more."""
 
     def __init__(self, inner: Tangent) -> None:
-        self.inner, self.data, self.slot = inner, inner.data, inner.slot
+        self.inner = inner
+        self.data = inner.data
+        self.slot = inner.slot
 
     def factor(self) -> None:
         self.inner.factor()
@@ -245,7 +260,8 @@ class BorderedTangent(AroundTangent):
 
     def __init__(self, inner: Tangent) -> None:
         super().__init__(inner)
-        self.stiffness, self.border = 0.0, np.empty(0)
+        self.stiffness = 0.0
+        self.border = np.empty(0)
 
     def factor(self) -> None:
         self.inner.factor()

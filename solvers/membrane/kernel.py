@@ -65,10 +65,27 @@ def metric(f):  # type: ignore[no-untyped-def]
 
 @compiled()
 def assemble(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, pressure,
-    pieces, coupling, power, h_old, s_old, h_new, s_new, slot, data, residual, with_tangent,
-    share, wrinkle,
-):  # fmt: skip
+    position,
+    quads,
+    values,
+    slopes,
+    area,
+    thickness,
+    pressure,
+    pieces,
+    coupling,
+    power,
+    h_old,
+    s_old,
+    h_new,
+    s_new,
+    slot,
+    data,
+    residual,
+    with_tangent,
+    share,
+    wrinkle,
+):
     """Write internal minus pressure forces at `position`, and the tangent.
 
     h_*, s_* (elements, 4, 3) log strain and stress before (old) and here (new, written); slot
@@ -80,16 +97,25 @@ def assemble(  # type: ignore[no-untyped-def]
     residual[:] = 0.0
     if with_tangent:
         data[:] = 0.0
-    p, law = np.empty((3, 3)), np.empty((3, 3))
-    pull, work, stiff = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    pk2, steep, total = np.empty(3), np.empty(SLOPES), np.empty(3)
-    x, f = np.empty((4, 3)), np.empty((2, 3))
+    p = np.empty((3, 3))
+    law = np.empty((3, 3))
+    pull = np.empty((3, 3))
+    work = np.empty((3, 3))
+    stiff = np.empty((3, 3))
+    pk2 = np.empty(3)
+    steep = np.empty(SLOPES)
+    total = np.empty(3)
+    x = np.empty((4, 3))
+    f = np.empty((2, 3))
     left = np.empty((3, 12))  # rows: a_m K00 + d_m K01
     right = np.empty((3, 12))
     push = np.empty((3, 12))  # follower pressure
-    element, force = np.empty((12, 12)), np.empty(12)
-    k00, k01 = np.empty((3, 3)), np.empty((3, 3))
-    k10, k11 = np.empty((3, 3)), np.empty((3, 3))
+    element = np.empty((12, 12))
+    force = np.empty(12)
+    k00 = np.empty((3, 3))
+    k01 = np.empty((3, 3))
+    k10 = np.empty((3, 3))
+    k11 = np.empty((3, 3))
     largest = 0.0
     for e in range(quads.shape[0]):
         for n in range(4):
@@ -104,24 +130,61 @@ def assemble(  # type: ignore[no-untyped-def]
             m, q, c = metric(f)
             if share is not None:
                 # Only of a law without a memory, see `closed.prepare`.
-                if relaxed_membrane_stress(
-                    m, q, c, pieces, coupling, power, share, h_old[e, g], s_old[e, g], total,
-                    h_new[e, g], s_new[e, g], pk2, stiff, p, law, steep, pull, work,
-                ) < 0:  # fmt: skip
+                if (
+                    relaxed_membrane_stress(
+                        m,
+                        q,
+                        c,
+                        pieces,
+                        coupling,
+                        power,
+                        share,
+                        h_old[e, g],
+                        s_old[e, g],
+                        total,
+                        h_new[e, g],
+                        s_new[e, g],
+                        pk2,
+                        stiff,
+                        p,
+                        law,
+                        steep,
+                        pull,
+                        work,
+                    )
+                    < 0
+                ):
                     return -1.0
                 for k in range(3):
                     wrinkle[e, g, k] = h_new[e, g, k] - total[k]
             elif not membrane_stress(
-                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h_new[e, g],
-                s_new[e, g], pk2, stiff, p, law, steep, pull, work,
-            ):  # fmt: skip
+                m,
+                q,
+                c,
+                pieces,
+                coupling,
+                power,
+                h_old[e, g],
+                s_old[e, g],
+                h_new[e, g],
+                s_new[e, g],
+                pk2,
+                stiff,
+                p,
+                law,
+                steep,
+                pull,
+                work,
+            ):
                 return -1.0
             wt = area[e, g] * thickness[e]
             wp = area[e, g] * pressure
             nx = f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]
             ny = f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]
             nz = f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]
-            s0, s1, s2 = wt * pk2[0], wt * pk2[1], wt * pk2[2]
+            s0 = wt * pk2[0]
+            s1 = wt * pk2[1]
+            s2 = wt * pk2[2]
             for n in range(4):
                 g0 = dn[0, n] * s0 + dn[1, n] * s2
                 g1 = dn[1, n] * s1 + dn[0, n] * s2
@@ -136,7 +199,8 @@ def assemble(  # type: ignore[no-untyped-def]
                 for j in range(3):
                     stiff[i, j] *= wt
             for i in range(3):
-                f0, f1 = f[0, i], f[1, i]
+                f0 = f[0, i]
+                f1 = f[1, i]
                 # row i of A0^T D and of A1^T D
                 u0 = f0 * stiff[0, 0] + f1 * stiff[2, 0]
                 u1 = f0 * stiff[0, 1] + f1 * stiff[2, 1]
@@ -154,20 +218,31 @@ def assemble(  # type: ignore[no-untyped-def]
                 k10[i, i] += s2
                 k11[i, i] += s1
             for n in range(4):
-                a, d = dn[0, n], dn[1, n]
+                a = dn[0, n]
+                d = dn[1, n]
                 z0 = wp * (d * f[0, 0] - a * f[1, 0])
                 z1 = wp * (d * f[0, 1] - a * f[1, 1])
                 z2 = wp * (d * f[0, 2] - a * f[1, 2])
-                c0, c1, c2 = 3 * n, 3 * n + 1, 3 * n + 2
-                push[0, c0], push[0, c1], push[0, c2] = 0.0, z2, -z1
-                push[1, c0], push[1, c1], push[1, c2] = -z2, 0.0, z0
-                push[2, c0], push[2, c1], push[2, c2] = z1, -z0, 0.0
+                c0 = 3 * n
+                c1 = 3 * n + 1
+                c2 = 3 * n + 2
+                push[0, c0] = 0.0
+                push[0, c1] = z2
+                push[0, c2] = -z1
+                push[1, c0] = -z2
+                push[1, c1] = 0.0
+                push[1, c2] = z0
+                push[2, c0] = z1
+                push[2, c1] = -z0
+                push[2, c2] = 0.0
                 for i in range(3):
                     for j in range(3):
                         left[i, 3 * n + j] = a * k00[i, j] + d * k01[i, j]
                         right[i, 3 * n + j] = a * k10[i, j] + d * k11[i, j]
             for n in range(4):
-                a, d, shape = dn[0, n], dn[1, n], values[g, n]
+                a = dn[0, n]
+                d = dn[1, n]
+                shape = values[g, n]
                 for i in range(3):
                     for j in range(12):
                         element[3 * n + i, j] += (
@@ -226,7 +301,8 @@ def reference_elements(
     jacobian = np.einsum("mpak,mpbk->mpab", base, frame)
     slopes = np.einsum("mpab,pan->mpbn", np.linalg.inv(jacobian).transpose(0, 1, 3, 2), NATURAL)
     if stretch is not None:
-        slopes, area = np.linalg.solve(stretch, slopes), area * np.linalg.det(stretch)
+        slopes = np.linalg.solve(stretch, slopes)
+        area = area * np.linalg.det(stretch)
         if not (area > 0).all():
             raise InputError(None, "strain", "turns the stress-free sheet inside out")
     return ReferenceElements(VALUES, np.ascontiguousarray(slopes), area)
@@ -234,25 +310,52 @@ def reference_elements(
 
 @compiled()
 def explicit(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, pieces, coupling, power,
-    h_old, s_old, rows, by_coupling, push, dh_old, ds_old, ds_new, point, rate,
-):  # fmt: skip
+    position,
+    quads,
+    values,
+    slopes,
+    area,
+    thickness,
+    pieces,
+    coupling,
+    power,
+    h_old,
+    s_old,
+    rows,
+    by_coupling,
+    push,
+    dh_old,
+    ds_old,
+    ds_new,
+    point,
+    rate,
+):
     """Write the derivative of the residual at fixed displacement.
 
     rows (3, P, 4, np), by_coupling (3, np) of `law_slopes`; push the number of the parameter that
     is a pressure, or -1; dh_old, ds_old (elements, 4, 3, np) at the start of the increment. Writes
     ds_new (the part at fixed displacement), point (elements, 4, POINT) and rate (3 n, np).
     """
-    nu, count = coupling[0], by_coupling.shape[1]
+    nu = coupling[0]
+    count = by_coupling.shape[1]
     rate[:] = 0.0
     memory = np.empty(RECALLED)
-    h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
-    weights, steep = np.empty((pieces.shape[1], 4)), np.empty(SLOPES)
-    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    work, stiff = np.empty((3, 3)), np.empty((3, 3))
-    x, f = np.empty((4, 3)), np.empty((2, 3))
+    h = np.empty(h_old.shape[2])
+    s_new = np.empty(3)
+    pk2 = np.empty(3)
+    weights = np.empty((pieces.shape[1], 4))
+    steep = np.empty(SLOPES)
+    p = np.empty((3, 3))
+    law = np.empty((3, 3))
+    pull = np.empty((3, 3))
+    work = np.empty((3, 3))
+    stiff = np.empty((3, 3))
+    x = np.empty((4, 3))
+    f = np.empty((2, 3))
     own = np.empty((3, count))  # explicit derivatives of (E1, E2, G12) by each parameter
-    t0, t1, t2 = np.empty(count), np.empty(count), np.empty(count)
+    t0 = np.empty(count)
+    t1 = np.empty(count)
+    t2 = np.empty(count)
     local = np.empty((12, count))
     for e in range(quads.shape[0]):
         for n in range(4):
@@ -264,15 +367,33 @@ def explicit(  # type: ignore[no-untyped-def]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
-                pk2, stiff, p, law, steep, pull, work,
-            )  # fmt: skip
+                m,
+                q,
+                c,
+                pieces,
+                coupling,
+                power,
+                h_old[e, g],
+                s_old[e, g],
+                h,
+                s_new,
+                pk2,
+                stiff,
+                p,
+                law,
+                steep,
+                pull,
+                work,
+            )
             for i in range(3):
                 first, stop = by_pieces(pieces, i, h[i], h_old[e, g, i], weights)
                 row = own[i]
                 row[:] = 0.0
                 for k in range(first, stop):
-                    w0, w1, w2, w3 = weights[k, 0], weights[k, 1], weights[k, 2], weights[k, 3]
+                    w0 = weights[k, 0]
+                    w1 = weights[k, 1]
+                    w2 = weights[k, 2]
+                    w3 = weights[k, 3]
                     third, second, first_power, constant = rows[i, k]
                     for j in range(count):
                         row[j] += (
@@ -281,21 +402,33 @@ def explicit(  # type: ignore[no-untyped-def]
             if len(coupling) > CRIMPED:
                 for i in range(3):
                     remember(
-                        pieces, coupling, i, h, h_old[e, g], rows, by_coupling, dh_old[e, g],
-                        weights, own[i], memory,
-                    )  # fmt: skip
-                    point[e, g, POINT + i], point[e, g, POINT + 3 + i] = memory[ON], memory[BY_X]
+                        pieces,
+                        coupling,
+                        i,
+                        h,
+                        h_old[e, g],
+                        rows,
+                        by_coupling,
+                        dh_old[e, g],
+                        weights,
+                        own[i],
+                        memory,
+                    )
+                    point[e, g, POINT + i] = memory[ON]
+                    point[e, g, POINT + 3 + i] = memory[BY_X]
             dh2 = h[2] - h_old[e, g, 2]
             wt = area[e, g] * thickness[e]
             for i in range(3):
                 for k in range(3):
                     pull[i, k] *= wt
-            old, before = dh_old[e, g], ds_old[e, g]
+            old = dh_old[e, g]
+            before = ds_old[e, g]
             after = ds_new[e, g]
             for j in range(count):
                 stress_rate(steep, nu, own, by_coupling, j, old, before, after)
                 shear = own[2, j] + old[2, j] * steep[BEFORE3]
-                a0, a1 = after[0, j], after[1, j]
+                a0 = after[0, j]
+                a1 = after[1, j]
                 a2 = before[2, j] + shear * dh2 - steep[G12] * old[2, j]
                 after[2, j] = a2
                 t0[j] = pull[0, 0] * a0 + pull[0, 1] * a1 + pull[0, 2] * a2
@@ -319,9 +452,11 @@ def explicit(  # type: ignore[no-untyped-def]
                     local[3 * n + 2, push] -= share * nz
             record = point[e, g]
             for k in range(3):
-                record[k], record[3 + k] = f[0, k], f[1, k]
+                record[k] = f[0, k]
+                record[3 + k] = f[1, k]
                 for i in range(3):
-                    record[6 + 3 * i + k], record[15 + 3 * i + k] = p[i, k], law[i, k]
+                    record[6 + 3 * i + k] = p[i, k]
+                    record[15 + 3 * i + k] = law[i, k]
         for n in range(4):
             for k in range(3):
                 for j in range(count):
@@ -332,10 +467,13 @@ def explicit(  # type: ignore[no-untyped-def]
 def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
     """Add the part of the displacement derivatives du (3 n, np) to dh and ds (in place)."""
     count = du.shape[1]
-    e0, e1, e2 = np.empty(count), np.empty(count), np.empty(count)
+    e0 = np.empty(count)
+    e1 = np.empty(count)
+    e2 = np.empty(count)
     for e in range(quads.shape[0]):
         for g in range(4):
-            record, dn = point[e, g], slopes[e, g]
+            record = point[e, g]
+            dn = slopes[e, g]
             e0[:] = 0.0
             e1[:] = 0.0
             e2[:] = 0.0
@@ -349,12 +487,15 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
                         e0[j] += b0 * row[j]
                         e1[j] += b1 * row[j]
                         e2[j] += b2 * row[j]
-            strain, stress = dh[e, g], ds[e, g]
+            strain = dh[e, g]
+            stress = ds[e, g]
             for j in range(count):
                 a0 = record[6] * e0[j] + record[7] * e1[j] + record[8] * e2[j]
                 a1 = record[9] * e0[j] + record[10] * e1[j] + record[11] * e2[j]
                 a2 = record[12] * e0[j] + record[13] * e1[j] + record[14] * e2[j]
-                strain[0, j], strain[1, j], strain[2, j] = a0, a1, a2
+                strain[0, j] = a0
+                strain[1, j] = a1
+                strain[2, j] = a2
                 stress[0, j] += record[15] * a0 + record[16] * a1 + record[17] * a2
                 stress[1, j] += record[18] * a0 + record[19] * a1 + record[20] * a2
                 stress[2, j] += record[21] * a0 + record[22] * a1 + record[23] * a2
@@ -365,9 +506,24 @@ def advance(quads, slopes, point, du, dh, ds):  # type: ignore[no-untyped-def]
 
 @compiled()
 def by_sheet(  # type: ignore[no-untyped-def]
-    position, quads, values, slopes, area, thickness, pressure, pieces, coupling, power, h_old,
-    s_old, surface, slopes_by, area_by, green, rate,
-):  # fmt: skip
+    position,
+    quads,
+    values,
+    slopes,
+    area,
+    thickness,
+    pressure,
+    pieces,
+    coupling,
+    power,
+    h_old,
+    s_old,
+    surface,
+    slopes_by,
+    area_by,
+    green,
+    rate,
+):
     """Write the derivative of the residual at fixed displacement and fixed strain at the start.
 
     surface (n, 3, k), slopes_by (elements, 4, 2, 4, k), area_by (elements, 4, k): derivatives by k
@@ -375,27 +531,53 @@ def by_sheet(  # type: ignore[no-untyped-def]
     """
     count = surface.shape[2]
     rate[:] = 0.0
-    h, s_new, pk2 = np.empty(h_old.shape[2]), np.empty(3), np.empty(3)
+    h = np.empty(h_old.shape[2])
+    s_new = np.empty(3)
+    pk2 = np.empty(3)
     steep = np.empty(SLOPES)
-    p, law, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    work, stiff = np.empty((3, 3)), np.empty((3, 3))
-    x, f, f_by = np.empty((4, 3)), np.empty((2, 3)), np.empty((2, 3, count))
-    force, force_by = np.empty((2, 3)), np.empty((2, 3, count))
-    normal, normal_by = np.empty(3), np.empty((3, count))
-    pk2_by, local = np.empty((3, count)), np.empty((12, count))
+    p = np.empty((3, 3))
+    law = np.empty((3, 3))
+    pull = np.empty((3, 3))
+    work = np.empty((3, 3))
+    stiff = np.empty((3, 3))
+    x = np.empty((4, 3))
+    f = np.empty((2, 3))
+    f_by = np.empty((2, 3, count))
+    force = np.empty((2, 3))
+    force_by = np.empty((2, 3, count))
+    normal = np.empty(3)
+    normal_by = np.empty((3, count))
+    pk2_by = np.empty((3, count))
+    local = np.empty((12, count))
     for e in range(quads.shape[0]):
         for n in range(4):
             for k in range(3):
                 x[n, k] = position[quads[e, n], k]
         local[:] = 0.0
         for g in range(4):
-            dn, dn_by = slopes[e, g], slopes_by[e, g]
+            dn = slopes[e, g]
+            dn_by = slopes_by[e, g]
             base_vectors(x, dn, f)
             m, q, c = metric(f)
             membrane_stress(
-                m, q, c, pieces, coupling, power, h_old[e, g], s_old[e, g], h, s_new,
-                pk2, stiff, p, law, steep, pull, work,
-            )  # fmt: skip
+                m,
+                q,
+                c,
+                pieces,
+                coupling,
+                power,
+                h_old[e, g],
+                s_old[e, g],
+                h,
+                s_new,
+                pk2,
+                stiff,
+                p,
+                law,
+                steep,
+                pull,
+                work,
+            )
             f_by[:] = 0.0
             for n in range(4):
                 for k in range(3):
@@ -411,7 +593,9 @@ def by_sheet(  # type: ignore[no-untyped-def]
                     own[1, j] += f[1, k] * f_by[1, k, j]
                     own[2, j] += f[0, k] * f_by[1, k, j] + f[1, k] * f_by[0, k, j]
             for i in range(3):
-                d0, d1, d2 = stiff[i, 0], stiff[i, 1], stiff[i, 2]
+                d0 = stiff[i, 0]
+                d1 = stiff[i, 1]
+                d2 = stiff[i, 2]
                 for j in range(count):
                     pk2_by[i, j] = d0 * own[0, j] + d1 * own[1, j] + d2 * own[2, j]
             for i in range(2):
@@ -420,30 +604,42 @@ def by_sheet(  # type: ignore[no-untyped-def]
                     force[i, k] = pk2[i] * f[i, k] + pk2[2] * f[1 - i, k]
                     for j in range(count):
                         force_by[i, k, j] = (
-                            pk2_by[i, j] * f[i, k] + pk2[i] * f_by[i, k, j]
-                            + pk2_by[2, j] * f[1 - i, k] + pk2[2] * f_by[1 - i, k, j]
-                        )  # fmt: skip
+                            pk2_by[i, j] * f[i, k]
+                            + pk2[i] * f_by[i, k, j]
+                            + pk2_by[2, j] * f[1 - i, k]
+                            + pk2[2] * f_by[1 - i, k, j]
+                        )
             for k in range(3):
-                a, b = (k + 1) % 3, (k + 2) % 3
+                a = (k + 1) % 3
+                b = (k + 2) % 3
                 normal[k] = f[0, a] * f[1, b] - f[0, b] * f[1, a]
                 for j in range(count):
                     normal_by[k, j] = (
-                        f_by[0, a, j] * f[1, b] - f_by[0, b, j] * f[1, a]
-                        + f[0, a] * f_by[1, b, j] - f[0, b] * f_by[1, a, j]
-                    )  # fmt: skip
-            share, share_by = area[e, g], area_by[e, g]
+                        f_by[0, a, j] * f[1, b]
+                        - f_by[0, b, j] * f[1, a]
+                        + f[0, a] * f_by[1, b, j]
+                        - f[0, b] * f_by[1, a, j]
+                    )
+            share = area[e, g]
+            share_by = area_by[e, g]
             wall = thickness[e] * share
             for n in range(4):
-                d0, d1, push = wall * dn[0, n], wall * dn[1, n], pressure * values[g, n]
+                d0 = wall * dn[0, n]
+                d1 = wall * dn[1, n]
+                push = pressure * values[g, n]
                 for k in range(3):
-                    f0, f1 = wall * force[0, k], wall * force[1, k]
+                    f0 = wall * force[0, k]
+                    f1 = wall * force[1, k]
                     by_area = (d0 * force[0, k] + d1 * force[1, k]) / share - push * normal[k]
                     for j in range(count):
                         local[3 * n + k, j] += (
-                            by_area * share_by[j] - push * share * normal_by[k, j]
-                            + dn_by[0, n, j] * f0 + dn_by[1, n, j] * f1
-                            + d0 * force_by[0, k, j] + d1 * force_by[1, k, j]
-                        )  # fmt: skip
+                            by_area * share_by[j]
+                            - push * share * normal_by[k, j]
+                            + dn_by[0, n, j] * f0
+                            + dn_by[1, n, j] * f1
+                            + d0 * force_by[0, k, j]
+                            + d1 * force_by[1, k, j]
+                        )
         for n in range(4):
             for k in range(3):
                 for j in range(count):
@@ -451,9 +647,14 @@ def by_sheet(  # type: ignore[no-untyped-def]
 
 
 def element_slopes(
-    points: Array, quads: NDArray[np.intp], ways: Array, yarn: Array, yarn_by: Array,
-    stretch: Array, stretch_by: Array,
-) -> tuple[Array, Array]:  # fmt: skip
+    points: Array,
+    quads: NDArray[np.intp],
+    ways: Array,
+    yarn: Array,
+    yarn_by: Array,
+    stretch: Array,
+    stretch_by: Array,
+) -> tuple[Array, Array]:
     """Return derivatives of `reference_elements`, (elements, 4, 2, 4, k) and (elements, 4, k).
 
     ways (k, n, 3) : directions of the points. yarn (3,), the warp of all facets, and yarn_by (k, 3)
@@ -467,7 +668,8 @@ def element_slopes(
     normal_by += np.cross(base[:, :, 0], base_by[..., 1, :])
     unit, unit_by, area, area_by = _normalised(normal, normal_by)
     # Along the yarn: its direction less the part along the normal.
-    across, across_by = unit @ yarn[:, None], unit_by @ yarn[:, None]
+    across = unit @ yarn[:, None]
+    across_by = unit_by @ yarn[:, None]
     across_by += (unit * yarn_by).sum(axis=-1, keepdims=True)
     along = yarn - across * unit
     along, along_by, _, _ = _normalised(along, yarn_by - across_by * unit - across * unit_by)
@@ -476,10 +678,12 @@ def element_slopes(
     inverse = np.linalg.inv(base @ frame)
     slopes_by = -inverse @ (base_by @ frame + base @ frame_by) @ (inverse @ NATURAL)
     # The yarns' own stretch S takes slopes to S^-1 slopes and areas to det(S) area.
-    back, whole = np.linalg.inv(stretch), np.linalg.det(stretch)
+    back = np.linalg.inv(stretch)
+    whole = np.linalg.det(stretch)
     slopes_by = back @ (slopes_by - stretch_by @ back @ inverse @ NATURAL)
     area_by = whole * (area_by + area * np.trace(back @ stretch_by, axis1=-2, axis2=-1))
-    slopes_by, area_by = np.moveaxis(slopes_by, 0, -1), np.moveaxis(area_by, 0, -1)
+    slopes_by = np.moveaxis(slopes_by, 0, -1)
+    area_by = np.moveaxis(area_by, 0, -1)
     return np.ascontiguousarray(slopes_by), np.ascontiguousarray(area_by)
 
 

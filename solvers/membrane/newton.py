@@ -84,23 +84,42 @@ class Membrane:
     residual: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        shape, state = (len(self.quads), 4, 3), (len(self.quads), 4, self.law.state)
+        shape = (len(self.quads), 4, 3)
+        state = (len(self.quads), 4, self.law.state)
         self.section = np.array(np.broadcast_to(self.thickness, len(self.quads)), dtype=float)
-        self.strain_old, self.stress_old = np.zeros(state), np.zeros(shape)
-        self.strain_new, self.stress_new = np.zeros(state), np.zeros(shape)
+        self.strain_old = np.zeros(state)
+        self.stress_old = np.zeros(shape)
+        self.strain_new = np.zeros(state)
+        self.stress_new = np.zeros(shape)
         self.wrinkle = np.zeros(shape)
         self.residual = np.zeros(3 * len(self.reference))
 
     def unbalance(self, u: Array, pressure: float, with_tangent: bool) -> float:
         """Return the largest free residual over the largest pressure force; inf without stress."""
-        law, e = self.law, self.elements
+        law = self.law
+        e = self.elements
         force = assemble(
-            self.reference + u, self.quads, e.values, e.slopes, e.area, self.section, pressure,
-            law.pieces, law.coupling, law.area_power, self.strain_old,
-            self.stress_old, self.strain_new, self.stress_new, self.tangent.slot,
-            self.tangent.data, self.residual, with_tangent,
-            self.wrinkle_stiffness, self.wrinkle,
-        )  # fmt: skip
+            self.reference + u,
+            self.quads,
+            e.values,
+            e.slopes,
+            e.area,
+            self.section,
+            pressure,
+            law.pieces,
+            law.coupling,
+            law.area_power,
+            self.strain_old,
+            self.stress_old,
+            self.strain_new,
+            self.stress_new,
+            self.tangent.slot,
+            self.tangent.data,
+            self.residual,
+            with_tangent,
+            self.wrinkle_stiffness,
+            self.wrinkle,
+        )
         self.iterations += 1
         if force < 0:
             return np.inf
@@ -121,7 +140,8 @@ class Membrane:
             tangent = self.tangent
             for opens, steep in self.cords.sliding:
                 tangent = tangent.inner  # type: ignore[attr-defined]
-                tangent.border, tangent.stiffness = opens[self.free], steep
+                tangent.border = opens[self.free]
+                tangent.stiffness = steep
 
     def add(self, slot: NDArray[np.int64], entries: Array) -> None:
         """Add entries to the tangent at their places; those below zero are held."""
@@ -145,9 +165,15 @@ class Membrane:
         u = u.copy()
         flat = u.reshape(-1)
         step = before = np.empty(0)
-        last, scale, backtracks, chord = np.inf, 1.0, 0, False
-        least, first, idle = np.inf, np.inf, 0
-        jumps, fruitless = self.law.jumps, 0
+        last = np.inf
+        scale = 1.0
+        backtracks = 0
+        chord = False
+        least = np.inf
+        first = np.inf
+        idle = 0
+        jumps = self.law.jumps
+        fruitless = 0
         for k in range(MOST_ITERATIONS):
             norm = self.unbalance(u, pressure, with_tangent=self.keep_tangent or not chord)
             first = norm if k == 0 else first
@@ -162,7 +188,9 @@ class Membrane:
             least = min(least, norm)
             worse = norm > (20.0 * last + 1e-3 if fruitless < MOST_FRUITLESS else last)
             if len(step) and worse and backtracks < MOST_BACKTRACKS:
-                scale, backtracks, chord = 0.35 * scale, backtracks + 1, False
+                scale = 0.35 * scale
+                backtracks = backtracks + 1
+                chord = False
                 flat[self.free] = before + scale * step
                 continue
             if not np.isfinite(norm):
@@ -181,7 +209,9 @@ class Membrane:
             before = flat[self.free].copy()
             scale = min(1.0, self.step_limit / largest) if largest > 0 else 1.0
             flat[self.free] = before + scale * step
-            last, backtracks, chord = norm, 0, norm < CHORD_BELOW and scale == 1.0
+            last = norm
+            backtracks = 0
+            chord = norm < CHORD_BELOW and scale == 1.0
         return None
 
 
@@ -266,9 +296,12 @@ class Loading:
 
 
 def march(
-    loading: Loading, levels: Sequence[float] | Array, asked: Asked,
-    begun: tuple[float, Array] | None = None, done: int = 0,
-) -> Iterator[Array]:  # fmt: skip
+    loading: Loading,
+    levels: Sequence[float] | Array,
+    asked: Asked,
+    begun: tuple[float, Array] | None = None,
+    done: int = 0,
+) -> Iterator[Array]:
     """Yield the displacement (nodes, 3) at each level; the caller accepts it before the next one.
 
     begun : level and displacement to start from, else unloaded. done : earlier increments of the
@@ -352,7 +385,8 @@ class Record:
     def __init__(self, membrane: Membrane, count: int) -> None:
         self.membrane = membrane
         self.path, self.forces = (np.zeros((count, *membrane.reference.shape)) for _ in range(2))
-        self.low, self.high = np.zeros(3), np.zeros(3)
+        self.low = np.zeros(3)
+        self.high = np.zeros(3)
 
     def accept(self, i: int, u: Array) -> None:
         self.membrane.accept()
@@ -373,7 +407,8 @@ class Record:
 def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array | None:
     u = u.copy()
     norm = membrane.unbalance(u, pressure, with_tangent=True)
-    least, idle = np.inf, 0
+    least = np.inf
+    idle = 0
     for _ in range(MOST_STEPS):
         if norm < membrane.tolerance:
             return u
@@ -396,12 +431,16 @@ def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array
 
 def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: float) -> float:
     """Move u along the step as far as is good; return the residual there, with its tangent."""
-    flat, free = u.reshape(-1), membrane.free
+    flat = u.reshape(-1)
+    free = membrane.free
     before = flat[free].copy()
     slope = float(step @ membrane.residual[free])
     largest = float(np.abs(step).max())
     part = min(1.0, membrane.step_limit / largest) if largest > 0 else 1.0
-    low, slope_low, high, slope_high = 0.0, slope, math.inf, math.nan
+    low = 0.0
+    slope_low = slope
+    high = math.inf
+    slope_high = math.nan
     for trial in range(MOST_TRIALS):
         flat[free] = before + part * step
         # Most steps are taken as they are, so that the first comes with its tangent.
@@ -412,9 +451,11 @@ def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: flo
         if now * slope > 0 and abs(now) <= abs(slope):
             if high == math.inf:
                 break
-            low, slope_low = part, now
+            low = part
+            slope_low = now
         else:
-            high, slope_high = part, now if now * slope < 0 else math.nan
+            high = part
+            slope_high = now if now * slope < 0 else math.nan
         share = slope_low / (slope_low - slope_high)
         share = BLIND if math.isnan(share) else min(FARTHEST, max(NEAREST, share))
         part = low + share * (high - low)
@@ -437,16 +478,21 @@ class Derivatives:
     """
 
     def __init__(
-        self, membrane: Membrane, parameters: Sequence[str], sheet: SheetSlopes | None = None,
+        self,
+        membrane: Membrane,
+        parameters: Sequence[str],
+        sheet: SheetSlopes | None = None,
         at: tuple[Array, Array, Array] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.membrane = membrane
-        law, names = membrane.law, list(parameters)
+        law = membrane.law
+        names = list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
         more = law.state - 3
         self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
-        self.stress, self.fresh = np.zeros(shape), np.empty(shape)
+        self.stress = np.zeros(shape)
+        self.fresh = np.empty(shape)
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
         self.point = np.empty((len(membrane.quads), 4, POINT + more))
         self.rate = np.empty((membrane.reference.size, len(names)))
@@ -466,18 +512,50 @@ class Derivatives:
 
     def at_fixed_displacement(self, u: Array, pressure: float = 0.0) -> Array:
         """Return the explicit derivative of the residual at the equilibrium u, (3 n, np)."""
-        m, e, law = self.membrane, self.membrane.elements, self.membrane.law
+        m = self.membrane
+        e = self.membrane.elements
+        law = self.membrane.law
         explicit(
-            m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, law.pieces,
-            law.coupling, law.area_power, m.strain_old, m.stress_old, self.rows, self.by_coupling,
-            self.push, self.strain, self.stress, self.fresh, self.point, self.rate,
-        )  # fmt: skip
+            m.reference + u,
+            m.quads,
+            e.values,
+            e.slopes,
+            e.area,
+            m.section,
+            law.pieces,
+            law.coupling,
+            law.area_power,
+            m.strain_old,
+            m.stress_old,
+            self.rows,
+            self.by_coupling,
+            self.push,
+            self.strain,
+            self.stress,
+            self.fresh,
+            self.point,
+            self.rate,
+        )
         if self.columns:
             by_sheet(
-                m.reference + u, m.quads, e.values, e.slopes, e.area, m.section, pressure,
-                law.pieces, law.coupling, law.area_power, m.strain_old, m.stress_old, self.surface,
-                self.slopes, self.area, self.green, self.sheet_rate,
-            )  # fmt: skip
+                m.reference + u,
+                m.quads,
+                e.values,
+                e.slopes,
+                e.area,
+                m.section,
+                pressure,
+                law.pieces,
+                law.coupling,
+                law.area_power,
+                m.strain_old,
+                m.stress_old,
+                self.surface,
+                self.slopes,
+                self.area,
+                self.green,
+                self.sheet_rate,
+            )
             self.rate[:, self.columns] += self.sheet_rate
             if m.cords is not None:
                 self.rate[:, self.columns] += m.cords.slopes(

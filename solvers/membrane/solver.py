@@ -60,9 +60,12 @@ class MembraneSolver:
     load_ratios = remembers = True
 
     def __init__(
-        self, tolerance: float = 1e-8, wrinkle_stiffness: float | None = None,
-        bending_stiffness: float | None = None, wall: Walls = "band",
-    ) -> None:  # fmt: skip
+        self,
+        tolerance: float = 1e-8,
+        wrinkle_stiffness: float | None = None,
+        bending_stiffness: float | None = None,
+        wall: Walls = "band",
+    ) -> None:
         self.tolerance = tolerance
         self.wall = chosen_wall(wall, wrinkle_stiffness, bending_stiffness)
         self.progress: Callable[[Progress], None] | None = None
@@ -80,9 +83,13 @@ class MembraneSolver:
         return SolverCheck(self.name, True, __version__, True)
 
     def run(
-        self, model: Any, law: HypoelasticLaw, scratch: Path | None = None,
-        timeout: float | None = None, guess: Array | None = None,
-    ) -> History:  # fmt: skip
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        scratch: Path | None = None,
+        timeout: float | None = None,
+        guess: Array | None = None,
+    ) -> History:
         """Inflate, bend or pull the model (scratch and timeout are for external solvers only).
 
         guess : (increments, nodes, 3) displacements to start each increment from, mm.
@@ -90,9 +97,12 @@ class MembraneSolver:
         return self._analyse(model, law, (), guess)[0]
 
     def run_with_sensitivity(
-        self, model: Any, law: HypoelasticLaw, parameters: Sequence[str] | None = None,
+        self,
+        model: Any,
+        law: HypoelasticLaw,
+        parameters: Sequence[str] | None = None,
         guess: Array | None = None,
-    ) -> tuple[History, Array]:  # fmt: skip
+    ) -> tuple[History, Array]:
         """Return the history and d displacement / d parameters, (frames, nodes, 3, parameters).
 
         The parameters are every entry of the law's beta (per MPa) unless given; those of the model
@@ -132,7 +142,8 @@ class MembraneSolver:
         if isinstance(membrane, beam.Beam):
             return membrane
         membrane.law = law
-        membrane.keep_tangent, membrane.iterations = False, 0
+        membrane.keep_tangent = False
+        membrane.iterations = 0
         membrane.strain_old[:] = 0.0
         membrane.stress_old[:] = 0.0
         return membrane
@@ -150,5 +161,17 @@ def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
         stresses.append(float(bar(bar_law(one.model), pulled, ends)[1][-1, pulled]))
     off = difference(tuple(stresses))
     advice = "the embedded law is broken; install bubblefit and numba again"
-    return [Diagnosis("membrane", __version__, None, EMBEDDED, True, None, off < TOLERANCE,
-                      tuple(stresses), off, "" if off < TOLERANCE else advice)]  # fmt: skip
+    return [
+        Diagnosis(
+            "membrane",
+            __version__,
+            None,
+            EMBEDDED,
+            True,
+            None,
+            off < TOLERANCE,
+            tuple(stresses),
+            off,
+            "" if off < TOLERANCE else advice,
+        )
+    ]

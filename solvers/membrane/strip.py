@@ -52,7 +52,8 @@ class DrivenTangent(AroundTangent):
     ) -> None:
         super().__init__(tangent_for(quads, size, free))
         dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
-        rows, columns = np.repeat(dofs, 12, axis=1), np.tile(dofs, (1, 12))
+        rows = np.repeat(dofs, 12, axis=1)
+        columns = np.tile(dofs, (1, 12))
         beside = np.isin(rows, driven) | np.isin(columns, driven)
         inside = self.inner.data.size
         count = int(beside.sum())
@@ -79,10 +80,16 @@ def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: W
     free = np.setdiff1d(np.arange(points.size), held)
     warp = np.broadcast_to(model.warp, (len(quads), 3))
     return Membrane(
-        points, quads, reference_elements(points, quads, warp), model.thickness, law, free,
-        DrivenTangent(quads, points.size, free, model.driven), tolerance,
+        points,
+        quads,
+        reference_elements(points, quads, warp),
+        model.thickness,
+        law,
+        free,
+        DrivenTangent(quads, points.size, free, model.driven),
+        tolerance,
         step_limit=0.1 * float(np.ptp(points, axis=0).max()),
-    )  # fmt: skip
+    )
 
 
 def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[History, Array]:
@@ -101,11 +108,14 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     direction = np.zeros(membrane.reference.size)
     direction[model.driven] = -1.0
     pull = Pulling(membrane, tangent, direction, model.mesh.node_sets["gauge"])
-    levels, shape, free = np.array(model.elongations), membrane.reference.shape, membrane.free
+    levels = np.array(model.elongations)
+    shape = membrane.reference.shape
+    free = membrane.free
     rates = np.zeros((len(levels), *shape, len(parameters)))
     load_slope = np.zeros((len(levels), len(parameters)))
     derivatives = Derivatives(membrane, parameters) if parameters else None
-    record, unstable = Record(membrane, len(levels)), []
+    record = Record(membrane, len(levels))
+    unstable = []
     membrane.keep_tangent = True
     for i, u in enumerate(march(pull, levels, asked)):
         if not tangent.definite():
@@ -121,14 +131,20 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
             derivatives.advance(du)
             rates[i] = du.reshape(*shape, -1)
         record.accept(i, u)
-    forces, sets = record.forces, model.mesh.node_sets
+    forces = record.forces
+    sets = model.mesh.node_sets
     history = History(
-        model.load_factor * (forces.reshape(len(levels), -1) @ direction), record.path, record.low,
-        record.high, {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
-        iterations=membrane.iterations, path=record.path, path_slope=rates if parameters else None,
+        model.load_factor * (forces.reshape(len(levels), -1) @ direction),
+        record.path,
+        record.low,
+        record.high,
+        {n: forces[:, sets[n]].sum(axis=1) for n in (*model.supports, model.pulled)},
+        iterations=membrane.iterations,
+        path=record.path,
+        path_slope=rates if parameters else None,
         load_slope=model.load_factor * load_slope if parameters else None,
         unstable=named(levels[unstable], "mm of elongation"),
-    )  # fmt: skip
+    )
     return history, rates
 
 
@@ -141,8 +157,10 @@ class Pulling(Loading):
     def __init__(
         self, membrane: Membrane, tangent: DrivenTangent, direction: Array, gauge: NDArray[np.intp]
     ) -> None:
-        self.membrane, self.tangent = membrane, tangent
-        self.direction, self.gauge = direction, gauge
+        self.membrane = membrane
+        self.tangent = tangent
+        self.direction = direction
+        self.gauge = gauge
         lower, upper = membrane.reference[gauge]
         self.gauge_length = float(np.linalg.norm(upper - lower))
 
@@ -169,7 +187,9 @@ class Pulling(Loading):
         return self._in_turn(start, level) if found is None else found
 
     def _together(self, start: Array, level: float) -> Array | None:
-        m, u, free = self.membrane, start.copy(), self.membrane.free
+        m = self.membrane
+        u = start.copy()
+        free = self.membrane.free
         last = np.inf
         for _ in range(MOST_CORRECTIONS):
             norm = m.unbalance(u, 0.0, with_tangent=True)
@@ -196,7 +216,8 @@ class Pulling(Loading):
         return None
 
     def _in_turn(self, start: Array, level: float) -> Array | None:
-        m, u = self.membrane, start
+        m = self.membrane
+        u = start
         for _ in range(MOST_CORRECTIONS):
             found = m.equilibrium(u, 0.0)
             if found is None:
@@ -277,7 +298,8 @@ def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[Histor
             "softens before it",
             "membrane",
         )
-    patch.strain_old[0, 0, :2], patch.stress_old[0, 0, :2] = found.strain[-1], found.stress[-1]
+    patch.strain_old[0, 0, :2] = found.strain[-1]
+    patch.stress_old[0, 0, :2] = found.stress[-1]
     patch.iterations = len(model.loads)
     stretch = 1.0 + found.elongation
     slope = stretch[:, :, None] * found.slope
@@ -288,10 +310,13 @@ def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[Histor
     if asked.tell is not None:
         asked.tell(Done(float(len(model.loads))))
     history = History(
-        model.loads.sum(axis=1), moved, np.concatenate([found.strain.min(axis=0), none]),
-        np.concatenate([found.strain.max(axis=0), none]), iterations=patch.iterations,
+        model.loads.sum(axis=1),
+        moved,
+        np.concatenate([found.strain.min(axis=0), none]),
+        np.concatenate([found.strain.max(axis=0), none]),
+        iterations=patch.iterations,
         unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
-    )  # fmt: skip
+    )
     return history, rates
 
 
@@ -299,16 +324,24 @@ class Whole:
     """The dense stiffness of one quad, as `assemble` writes it."""
 
     def __init__(self) -> None:
-        self.slot, self.data = np.arange(144, dtype=np.int64)[None], np.zeros(144)
+        self.slot = np.arange(144, dtype=np.int64)[None]
+        self.data = np.zeros(144)
 
 
 def prepare_tube(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
     return Membrane(
-        points, quads, reference_elements(points, quads), model.thickness, law, np.arange(12),
-        Whole(), tolerance, step_limit=np.inf,  # type: ignore[arg-type]
-    )  # fmt: skip
+        points,
+        quads,
+        reference_elements(points, quads),
+        model.thickness,
+        law,
+        np.arange(12),
+        Whole(),
+        tolerance,
+        step_limit=np.inf,  # type: ignore[arg-type]
+    )
 
 
 def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[History, Array]:
@@ -319,24 +352,36 @@ def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[Hi
     p R a b^2 / 2 + F a / (2 pi R) + T s / (2 pi R^2 b).
     """
     initial_moduli(membrane.law)
-    points, parameters = membrane.reference, asked.parameters
+    points = membrane.reference
+    parameters = asked.parameters
     to = np.zeros((12, 3))
-    to[0::3, 0], to[1::3, 1], to[1::3, 2] = points[:, 0], points[:, 1], points[:, 0]
-    area, radius = float(membrane.elements.area.sum()), model.radius
+    to[0::3, 0] = points[:, 0]
+    to[1::3, 1] = points[:, 1]
+    to[1::3, 2] = points[:, 0]
+    area = float(membrane.elements.area.sum())
+    radius = model.radius
     derivatives = Derivatives(membrane, parameters) if parameters else None
     record = Record(membrane, len(model.loads))
     rates = np.zeros((*record.path.shape, len(parameters)))
-    unstable, c, small = [], np.zeros(3), 0.0
+    unstable = []
+    c = np.zeros(3)
+    small = 0.0
     for i, (pressure, force, torque) in enumerate(model.loads.tolist()):
         twisting = torque / (2 * np.pi * radius**2)
         for _ in range(MOST_ROUNDS):
             membrane.unbalance((to @ c).reshape(4, 3), 0.0, with_tangent=True)
-            a, b, s = 1.0 + c[0], 1.0 + c[1], c[2]
-            push = np.array([
-                0.5 * pressure * radius * b**2 + force / (2 * np.pi * radius),
-                pressure * radius * a * b - twisting * s / b**2, twisting / b,
-            ])  # fmt: skip
-            ab, bs = pressure * radius * b, -twisting / b**2
+            a = 1.0 + c[0]
+            b = 1.0 + c[1]
+            s = c[2]
+            push = np.array(
+                [
+                    0.5 * pressure * radius * b**2 + force / (2 * np.pi * radius),
+                    pressure * radius * a * b - twisting * s / b**2,
+                    twisting / b,
+                ]
+            )
+            ab = pressure * radius * b
+            bs = -twisting / b**2
             bb = pressure * radius * a + 2 * twisting * s / b**3
             steep = np.array([[0.0, ab, 0.0], [ab, bb, bs], [0.0, bs, 0.0]])
             left = to.T @ membrane.residual / area - push
@@ -364,7 +409,11 @@ def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[Hi
             rates[i] = du.reshape(4, 3, -1)
         record.accept(i, u)
     history = History(
-        model.loads[:, 0], record.path, record.low, record.high, iterations=membrane.iterations,
+        model.loads[:, 0],
+        record.path,
+        record.low,
+        record.high,
+        iterations=membrane.iterations,
         unstable=tuple(unstable),
-    )  # fmt: skip
+    )
     return history, rates
