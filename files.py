@@ -49,10 +49,17 @@ MOST_PARTS = 100
 #: Every file with compiled functions. An edit of one must reach the compiled code of all, while
 #: numba's own cache looks only at the file in which a function stands.
 KERNELS = (
-    "materials/pieces.py", "materials/memory.py", "materials/point_law.py", "materials/wrinkles.py",
-    "materials/law.py", "materials/responses.py", "meshes/mesh.py", "solvers/membrane/kernel.py",
+    "materials/pieces.py",
+    "materials/memory.py",
+    "materials/point_law.py",
+    "materials/wrinkles.py",
+    "materials/law.py",
+    "materials/biaxial_patch.py",
+    "materials/closed_path.py",
+    "meshes/mesh.py",
+    "solvers/membrane/kernel.py",
     "inference/posterior.py",
-)  # fmt: skip
+)
 
 # Reading
 

@@ -8,16 +8,13 @@ from pathlib import Path
 import bubblefit as bf
 import numpy as np
 from bubblefit.errors import InputError
+from bubblefit.materials.biaxial_patch import biaxial_response
+from bubblefit.materials.deformation_curves import trellis_angle, trellis_curve
 from bubblefit.materials.designers import RATIOS, constants_of_law, shares, spread_of
 from bubblefit.materials.exports import base as curves
 from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import (
-    biaxial_response,
-    modulus_tables,
-    trellis_angle,
-    trellis_curve,
-)
+from bubblefit.materials.modulus_tables import modulus_tables
 from bubblefit.meshes.bubble_model import BubbleModel
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs.validation import validate

@@ -11,7 +11,7 @@ from bubblefit.experiments.kinds import Planning
 from bubblefit.experiments.strips.prepared import candidates
 from bubblefit.inference.assessment import certainty, verdicts
 from bubblefit.inference.methods.lm import LevenbergMarquardt
-from bubblefit.materials.responses import biaxial_response
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.project.schema import UnknownSection, UnknownsSection
 from common import BENDING, EXAMPLES, known_project, known_setup, start_on
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import bubblefit as bf
 import numpy as np
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.designers import RATIOS, shares
-from bubblefit.materials.responses import biaxial_response
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 LOWEST, HIGHEST, UP, DOWN = 0.5, 10.0, 25, 10

@@ -15,9 +15,9 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..materials.closed_path import closed_path
 from ..materials.forms.base import SHEAR, Array, Form, moduli_on_grid, modulus_rows, own_bounds
 from ..materials.law import HypoelasticLaw, definite_rows
-from ..materials.responses import closed_path
 from .comparison import Comparison, NuisanceOf
 
 

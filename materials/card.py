@@ -23,10 +23,10 @@ from pydantic_core import PydanticCustomError
 from ..errors import InputError, checked
 from ..files import toml_of, write_text
 from ..readers.sections import MODULUS_UNITS, ModulusUnit, Positive, Section, first_error
+from .closed_path import ClosedPath, closed_path
 from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
-from .responses import ClosedPath, closed_path
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from .biaxial_patch import biaxial_response
 from .forms.base import Array
 from .law import HypoelasticLaw
-from .responses import biaxial_response
 
 #: Relative: constants whose cross terms differ by less are reciprocal.
 SAME = 1e-9

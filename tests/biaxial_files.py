@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.designers import shares
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response
 
 FIVE = ("1:1", "2:1", "1:2", "1:0", "0:1")
 THICKNESS = 0.8

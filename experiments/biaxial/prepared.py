@@ -9,8 +9,8 @@ import numpy as np
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison
+from ...materials.biaxial_patch import biaxial_response, largest_load
 from ...materials.designers import RATIOS, shares
-from ...materials.responses import biaxial_response, largest_load
 from ...meshes.strip_models import elongations
 from ...readers.frames import FrameSource
 from ...solvers.base import History

@@ -12,19 +12,16 @@ import numpy as np
 from ...errors import InputError, Note, NoteKind, OutputError, one_line
 from ...files import __version__, write_text
 from ..card import LEVEL, MaterialCard, strains_of
+from ..deformation_curves import Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array, ratios_of
 from ..law import HypoelasticLaw
-from ..responses import (
+from ..modulus_tables import (
     POINTS,
     REACH,
-    Measure,
     ModulusTable,
     modulus_table,
     modulus_tables,
     piece_constants,
-    trellis_angle,
-    trellis_curve,
-    uniaxial_curve,
 )
 
 LOSES = NoteKind("loses")

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ...files import render
 from ..card import MaterialCard
+from ..deformation_curves import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
 from ..forms.base import UNLIMITED, Array
-from ..responses import MEASURES, Measure, trellis_angle, trellis_curve, uniaxial_curve
 from . import base
 from .designers import SHEARED
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...errors import InputError
 from .. import designers
+from ..biaxial_patch import biaxial_response, largest_load
 from ..card import MaterialCard
 from ..forms.base import UNLIMITED
-from ..responses import biaxial_response, largest_load
 from .base import Export, Format, Says, heading, option
 
 #: Shear strain to which G is averaged without a range; a range that ends before is of no shear.

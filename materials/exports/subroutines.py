@@ -9,8 +9,9 @@ import numpy as np
 from ...errors import InputError
 from ...files import render
 from ..card import MaterialCard
+from ..deformation_curves import bar
 from ..law import HypoelasticLaw
-from ..responses import JUMP, ModulusTable, bar, modulus_tables
+from ..modulus_tables import JUMP, ModulusTable, modulus_tables
 from . import base
 from .curves import material_name
 

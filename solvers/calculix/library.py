@@ -18,7 +18,7 @@ from ...files import cache_folder, render
 from ...materials.card import MaterialCard
 from ...materials.exports.base import Export, Format, NoOptions, Says, heading
 from ...materials.law import HypoelasticLaw
-from ...materials.responses import piece_constants
+from ...materials.modulus_tables import piece_constants
 
 SUFFIX = ".law"
 #: First line of the file, before the law's number.

@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...files import __version__
 from ...materials.exports.subroutines import NUMBERS, STATE_VARIABLES, guarded
 from ...materials.law import HypoelasticLaw
-from ...materials.responses import modulus_tables
+from ...materials.modulus_tables import modulus_tables
 from ...meshes.mesh import Array, Mesh, Numbers
 from ..decks import render
 from ..prescribed import held_dofs

@@ -9,8 +9,8 @@ from threadpoolctl import ThreadpoolController
 
 from ...errors import InputError
 from ...files import __version__
+from ...materials.deformation_curves import bar
 from ...materials.law import HypoelasticLaw
-from ...materials.responses import bar
 from ...meshes.beam_model import BeamModel
 from ...meshes.bubble_model import BubbleModel, MeasuredShape
 from ...meshes.cylinder_model import CylinderModel, InflatedModel

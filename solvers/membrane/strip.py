@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import SolverFailure
+from ...materials.biaxial_patch import biaxial_response
 from ...materials.law import HypoelasticLaw
-from ...materials.responses import biaxial_response
 from ...meshes.strip_models import PatchModel, TubeModel, UniaxialModel
 from ..base import History
 from .bubble import Wall

@@ -34,7 +34,7 @@ from bubblefit.inference.unknowns import (
     coefficients_at,
     dimensions,
 )
-from bubblefit.materials.responses import closed_path
+from bubblefit.materials.closed_path import closed_path
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.runs import best as budget

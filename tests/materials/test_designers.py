@@ -8,7 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import MaterialCard
+from bubblefit.materials.deformation_curves import trellis_curve, uniaxial_curve
 from bubblefit.materials.designers import (
     RATIOS,
     SHARES,
@@ -22,7 +24,6 @@ from bubblefit.materials.designers import (
 )
 from bubblefit.materials.exports.curves import yarn_of
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response, trellis_curve, uniaxial_curve
 from bubblefit.solvers.exports import FORMATS
 from hypothesis import given, settings
 from hypothesis import strategies as st

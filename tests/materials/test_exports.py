@@ -15,21 +15,14 @@ import pytest
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError
 from bubblefit.materials.card import MaterialCard, read_card, write_card
+from bubblefit.materials.deformation_curves import trellis_angle, trellis_curve, uniaxial_curve
 from bubblefit.materials.exports.base import NoOptions
 from bubblefit.materials.exports.subroutines import umat
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.memory import Memory
+from bubblefit.materials.modulus_tables import JUMP, REACH, modulus_table, modulus_tables
 from bubblefit.materials.pieces import integral_of
-from bubblefit.materials.responses import (
-    JUMP,
-    REACH,
-    modulus_table,
-    modulus_tables,
-    trellis_angle,
-    trellis_curve,
-    uniaxial_curve,
-)
 from bubblefit.solvers.calculix.library import SOURCE, constants, law_text
 from bubblefit.solvers.exports import FORMATS
 from click.testing import CliRunner

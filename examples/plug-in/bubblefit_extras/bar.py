@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 from bubblefit.errors import InputError, SolverFailure
+from bubblefit.materials.deformation_curves import bar
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import bar
 from bubblefit.meshes.strip_models import UniaxialModel
 from bubblefit.solvers.bars import homogeneous_history
 from bubblefit.solvers.base import History, SolverCheck

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from bubblefit.experiments.biaxial.prepared import PreparedBiaxial, candidates
 from bubblefit.experiments.kinds import UNMATCHED, Expected, Planning, Precision, Weighting
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import read_card
 from bubblefit.materials.designers import shares
 from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import elongations
 from bubblefit.runs import setup
 from bubblefit.runs.check import check

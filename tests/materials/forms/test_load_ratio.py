@@ -5,7 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.card import MaterialCard, certainty_of, positive, read_card
+from bubblefit.materials.closed_path import closed_path
+from bubblefit.materials.deformation_curves import bar
 from bubblefit.materials.exports.base import check_positive
 from bubblefit.materials.forms.base import EVEN, form_named
 from bubblefit.materials.forms.polynomial import LoadRatio
@@ -13,8 +16,8 @@ from bubblefit.materials.forms.ratio import SplineCrimp
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.memory import Memory
+from bubblefit.materials.modulus_tables import piece_constants
 from bubblefit.materials.point_law import RIGHT, load_angle
-from bubblefit.materials.responses import bar, biaxial_response, closed_path, piece_constants
 from bubblefit.solvers.base import check_carries
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.registry import solver_named

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.files import TEMPLATES
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.strip_models import PatchModel, bias_strip, elongations, straight_strip
 from bubblefit.solvers.calculix import sheets
 from bubblefit.solvers.calculix.deck import shell_mesh

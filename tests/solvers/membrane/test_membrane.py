@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from bubblefit.errors import SolverFailure
+from bubblefit.materials.biaxial_patch import biaxial_response
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.materials.responses import biaxial_response
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
 from bubblefit.meshes.strip_models import SIDE, PatchModel, elongations, straight_strip
