@@ -277,7 +277,7 @@ def test_the_work_of_a_closed_path(tmp_path):
 
     exact = a**2 / 2 * (d11(b) - d11(0)) + a * (b * d12(b) - quad(d12, 0, b)[0])
     law = HypoelasticLaw(beta, nu, [0.2] * 3)
-    found = closed_path(law, (a, b), side=400)
+    found = closed_path(law, (a, b), increments=400)
     assert found.work == pytest.approx(exact, rel=1e-5) and 0.01 < found.share < 1
     assert closed_path(law, (a, b)).work == pytest.approx(exact, rel=1e-3)
     for none in (replace(law, nu12=0.0), HypoelasticLaw.linear(e1, c, 20.0), crimped(STIFF)):
