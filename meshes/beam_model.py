@@ -3,9 +3,11 @@
 For walls known as stiffness per width (N/mm) and braids, whose yarns lock bilinear quads. Sections
 stay plane and round; strain counts from the inflated tube. A section carries
 
-    N = integral of n(strain) r d angle + sum of cords - p pi r^2,   V = (G pi r + p pi r^2) gamma,
+    N = integral of n(strain) r d angle + sum of cords - p pi r^2,   V = (k G r + p pi r^2) gamma,
 
-strain = axial - curvature * height; the pressure's part of the shear is Fichter's (NASA TN D-3393).
+strain = axial - curvature * height. k is that of the shear flow between the parts that carry the
+inflated tube's bending (`shear_flow`): pi of a wall alone, 27 / (4 pi) of three cords alone; the
+pressure's part of the shear is Fichter's (NASA TN D-3393).
 A braid's yarns turn at constant length, so the thrust less its pull is p pi r^2 (1 - 2 cot^2
 angle), whose derivative stiffens the wall by 3 p r cot^2 angle.
 """
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from .cylinder_model import Collar, Cord, CurveReading, ForceTable, RigidSupports, curve_reading
 from .mesh import Array, Mesh, keep_levels, places_of
+from .shear_flow import ThinTube
 from .tube import cylinder_mesh
 
 #: Places around a wall at which its force is taken, and stiffness left to a slack wall.
@@ -202,10 +205,18 @@ class TubeSection:
             for c, force in own
         ]
 
-    @property
+    @cached_property
     def shear(self) -> float:
-        """Return V over the shear strain, N."""
-        return math.pi * self.radius * (self.wall.shear + self.pressure * self.radius)
+        """Return V over the shear strain, N: of wall and cords as stiff as in the inflated tube."""
+        wall_strain, cord_strains = self._at_rest
+        _, wall_slope = self.wall.pull(np.array([wall_strain]), self.pressure, self.radius)
+        cords = zip(self.cords, cord_strains, strict=True)
+        cord_slopes = [float(c.table.pull(e, c.tension_only)[1]) for c, e in cords]
+        angles = np.array([c.angle for c in self.cords])
+        tube = ThinTube(
+            self.radius, float(wall_slope[0]), self.wall.shear, angles, np.array(cord_slopes)
+        )
+        return tube.shear_stiffness() + math.pi * self.pressure * self.radius**2
 
     def resultants(self, strain: Array, curvature: Array) -> tuple[Array, Array, Array]:
         """Return N (m,) N, M (m,) N mm sagging, derivatives (m, 2, 2); curvature in 1/mm."""
