@@ -11,6 +11,7 @@ from pathlib import Path
 
 from bubblefit.cli.terminal import TABLE, WIDTH, wrapped
 
+from .audit import audit, is_known
 from .places import ROOT
 
 FOLDER = Path(__file__).parent / "golden"
@@ -113,8 +114,11 @@ def differences(text, expected):
 
 
 class Golden:
+    """Compare what commands print, and audit the folders that they leave, once each."""
+
     def __init__(self, rewrite):
         self.rewrite = rewrite
+        self.audited = {}
 
     def __call__(self, name, text, folder):
         """Assert that a command run in `folder` printed what NAME.txt holds; pages have a head."""
@@ -127,3 +131,16 @@ class Golden:
         for page in folder.rglob("page.json"):
             about = dict(json.loads(page.read_text())["about"])
             assert re.fullmatch(r"\d{4}-\d\d-\d\d", about["date"]) and about["fabric"], page
+        self.audit(folder, text)
+
+    def audit(self, folder, text=""):
+        """Assert that a second implementation agrees with the pages below a folder."""
+        pages = {page: page.stat().st_mtime_ns for page in folder.rglob("report.html")}
+        fresh = [page for page, written in pages.items() if self.audited.get(page) != written]
+        self.audited |= pages
+        for page in fresh:
+            if is_known(page.parent):
+                # The page that the command names is of what it printed.
+                terminal = text if f"page: {page.relative_to(folder)}" in text else ""
+                ledger = audit(page.parent, terminal=terminal, base=folder)
+                assert not ledger.findings, "\n".join([str(page), *map(str, ledger.findings)])

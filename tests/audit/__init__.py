@@ -38,6 +38,6 @@ is itself audited), or "echoed" (of the project, the card or the command). Toler
 for numbers at full length; printed numbers must be rounded to their digits, and right.
 """
 
-from .run import audit
+from .run import audit, is_known
 
-__all__ = ["audit"]
+__all__ = ["audit", "is_known"]

@@ -45,6 +45,8 @@ def audit_fit(folder, ledger):
     audit.page()
     audit.notes()
     audit.tests()
+    if folder.terminal:
+        audit.terminal()
 
 
 class FitAudit:
@@ -1051,6 +1053,89 @@ class FitAudit:
             if seen != (worst["sigma_relative"] > 0.25):
                 self.ledger.find(f"notes: {name}", f"uncertain by {worst['sigma_relative']:.3g}")
 
+    # The terminal
+
+    def terminal(self):
+        """What the command printed: moduli, misfits, starts, how many notes."""
+        ledger, result = self.ledger, self.result
+        self._printed_moduli()
+        ledger.text(rf"kN/m: times {NUM} mm", [self.card.thickness], source="terminal")
+        ledger.text(r"95 % band, MPa", [], source="terminal")
+        for name, misfit in result["misfit"].items():
+            ledger.text(
+                rf"^misfit of {name}: {NUM} {misfit['unit']} RMS, {NUM} times the noise "
+                rf"\({NUM} {misfit['unit']}, {misfit['noise_is']}\)",
+                [misfit["rms"], misfit["times_noise"], misfit["noise"]],
+                digits=[3, 2, 3],
+                source="terminal",
+            )
+        for source, moduli in result.get("pinned", {}).items():
+            each = ", ".join(rf"{name} (\S+(?: %)?) \(at worst (\S+(?: %)?)\)" for name in moduli)
+            told = [
+                percent(own[key]) if own[key] < 0.999 * PRIOR else "unknown"
+                for own in moduli.values()
+                for key in ("median", "largest")
+            ]
+            ledger.text(rf"^1 sigma by the noise, from {source}: {each}", told, source="terminal")
+        records = result["starts"]
+        ends = [r["objective"] for r in records if r["objective"] is not None]
+        ledger.text(
+            rf"^(\d+) of (\d+) starts ended with a fit; .*: best {NUM}, median {NUM}; "
+            r"(\d+) analyses(?: \((\d+) of \w+(?:, (\d+) from the cache)?\))?, \d+ s",
+            [
+                len(ends),
+                len(records),
+                result["objective"],
+                float(np.median(ends)),
+                result["analyses"],
+                result["external_runs"],
+                result["cached_runs"],
+            ],
+            digits=3,
+            source="terminal",
+        )
+        lines = self.folder.terminal.splitlines()
+        said = [line.removeprefix("warning: ") for line in lines if line.startswith("warning: ")]
+        if len(said) > 1 or any(line not in result["warnings"] for line in said):
+            ledger.find("terminal: warning", f"is {said}")
+        notes = [line for line in lines if line.startswith("note: ")]
+        count = len(result["warnings"]) - len(said) - len(notes)
+        ledger.text(r"^(\d+) further notes?:", [count], source="terminal", needed=count > 0)
+
+    def _printed_moduli(self):
+        """The table of moduli: strain, MPa, one sigma, band, kN/m."""
+        row = re.compile(
+            rf"^(?:(E1|E2|G12), \w+ \w+)?\s+{NUM} %\s+{NUM}\s+({NUM} %|unknown|not known)"
+            rf"\s+(?:{NUM} to {NUM}|not known)\s+{NUM}(  \(end\))?$"
+        )
+        name, count = None, {}
+        for text in self.ledger.texts:
+            match = row.match(text.text) if text.source == "terminal" else None
+            if match is None:
+                continue
+            name = match[1] or name
+            strains = [s for s in STRAINS if s < 0.95 * self.card.ends[name]]
+            strains.append(self.card.ends[name])
+            k = count[name] = count.get(name, -1) + 1
+            own = self.table[self.table["modulus"] == name]
+            value = float(self.card.modulus(name, strains[k]))
+            sigma, lower, upper = (
+                float(np.interp(strains[k], own["strain"], own[column]))
+                for column in ("sigma_relative", "lower_MPa", "upper_MPa")
+            )
+            place = f"terminal: {name} at {strains[k]:.3g}"
+            expected = (100 * strains[k], value, lower, upper, value * self.card.thickness)
+            found = (match[2], match[3], match[6], match[7], match[8])
+            for digits, number, right in zip((3, 4, 4, 4, 4), found, expected, strict=True):
+                if number is not None:
+                    self.ledger.compare_text(place, number, right, digits, 2e-3)
+            told = percent(sigma) if sigma < 0.999 * PRIOR else "unknown"
+            if match[4] not in (told, "not known") and not _near(match[4], told):
+                self.ledger.find(place, f"1 sigma is {match[4]}; expected {told}")
+            if bool(match[9]) != (k == len(strains) - 1):
+                self.ledger.find(place, "marks the end wrongly")
+            text.claim((0, len(text.text)), "consistent")
+
     def tests(self):
         for test, numbers in self.result["tests"].items():
             kind, section = self.kind_of(test)
@@ -1060,6 +1145,12 @@ class FitAudit:
                 # Numbers of a single test also stand at the top.
                 for key, own in numbers.items():
                     self.ledger.json(key, own, "consistent", rel=1e-12)
+
+
+def _near(one, other):
+    """Return whether two percentages differ by one of their last digits."""
+    numbers = [as_number(text.removesuffix(" %")) for text in (one, other) if text[0].isdigit()]
+    return len(numbers) == 2 and abs(numbers[0] - numbers[1]) <= 0.1 * max(numbers)
 
 
 def _rows(band):

@@ -15,7 +15,7 @@ NUMBER = re.compile(
 #: A number within a pattern of `Ledger.text`.
 NUM = r"([-+\u2212]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 #: Numbers that are names.
-NAMES = re.compile(r"\b(?:EN )?(?:EN|ISO) \d+(?:-\d+)?|-2 log L|\(\d+ rows\)")
+NAMES = re.compile(r"\b(?:EN )?(?:EN|ISO) \d+(?:-\d+)?|-2 log L|\b1 sigma|\(\d+ rows\)")
 HOW = ("recomputed", "consistent", "echoed")
 #: No results: how long it took, versions, identity, seeds of the record.
 EXEMPT = (
@@ -81,6 +81,18 @@ def close(value, expected, rel, abs_):
     return abs(value - expected) <= max(rel * abs(expected), abs_)
 
 
+def _whole_lines(text):
+    """Return the lines of a terminal; what was broken off a sentence is joined to it again."""
+    lines = []
+    for line in text.splitlines():
+        continues = re.match(r" {4,6}\S", line) and not re.search(r"\S {2,}\S", line)
+        if continues and lines and lines[-1] and not re.search(r"\S {2,}\S", lines[-1]):
+            lines[-1] += f" {line.strip()}"
+        else:
+            lines.append(line)
+    return lines
+
+
 class Ledger:
     """Every number of a folder; see the package for how auditors claim them."""
 
@@ -93,6 +105,7 @@ class Ledger:
         self.texts = []
         self.cells = {}  # (number of the table, row, column) -> Text
         self._read()
+        self._names()
 
     # What there is
 
@@ -108,7 +121,7 @@ class Ledger:
             self._add_csv(file, table)
         if folder.page is not None:
             self._add_page(folder.page)
-        for k, line in enumerate(folder.terminal.splitlines(), start=1):
+        for k, line in enumerate(_whole_lines(folder.terminal), start=1):
             self.texts.append(Text("terminal", f"line {k}: {line.strip()}", line))
 
     def _add_json(self, file, value, path):
@@ -155,8 +168,6 @@ class Ledger:
                 title, rows = page.tables[number].title, len(page.tables[number].rows)
                 if count != rows:
                     self.find(f"page: {title}", f"({count} rows) stands above {rows} rows")
-
-        self._names()
 
     def _names(self):
         """Numbers in names that the project gives are no results."""

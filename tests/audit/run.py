@@ -24,6 +24,12 @@ def auditors():
     return commands
 
 
+def is_known(path):
+    """Return whether an auditor knows what wrote a folder."""
+    folder = Folder(path)
+    return bool({(folder.result or {}).get("command"), *folder.tables} & set(auditors()))
+
+
 def audit(path, project=None, terminal="", base=None):
     """Return the ledger of a folder after all auditors have looked at it.
 
