@@ -135,12 +135,14 @@ class Golden:
 
     def audit(self, folder, text=""):
         """Assert that a second implementation agrees with the pages below a folder."""
-        pages = {page: page.stat().st_mtime_ns for page in folder.rglob("report.html")}
-        fresh = [page for page, written in pages.items() if self.audited.get(page) != written]
-        self.audited |= pages
-        for page in fresh:
-            if is_known(page.parent):
-                # The page that the command names is of what it printed.
-                terminal = text if f"page: {page.relative_to(folder)}" in text else ""
-                ledger = audit(page.parent, terminal=terminal, base=folder)
-                assert not ledger.findings, "\n".join([str(page), *map(str, ledger.findings)])
+        names = ("report.html", "cycles.csv")
+        written = {path.parent: path.stat().st_mtime_ns for n in names for path in folder.rglob(n)}
+        fresh = [path for path, time in written.items() if self.audited.get(path) != time]
+        self.audited |= written
+        for path in fresh:
+            if is_known(path):
+                # The folder that the command names is of what it printed.
+                place = re.escape(str(path.relative_to(folder)))
+                printed = re.search(rf"(page:|written to) {place}(/report.html)?\b", text)
+                ledger = audit(path, terminal=text if printed else "", base=folder)
+                assert not ledger.findings, "\n".join([str(path), *map(str, ledger.findings)])

@@ -26,6 +26,8 @@ from .test import BiaxialPath, BiaxialTest, Which, evaluated_paths
 
 #: Of a loading's range: how near both loads must be to those of the first row.
 BACK = 0.01
+#: Change of strain that no instrument resolves: a stiffness from it is none.
+SMALLEST_STRAIN = 1e-6
 #: Values along warp and fill that are not known.
 NEITHER = np.full(2, np.nan)
 
@@ -159,9 +161,9 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
         stiff, nu = NEITHER.copy(), NEITHER.copy()
         if line is not None:
             for own, unloaded in enumerate(line.unloaded):
-                if not unloaded and line.strain[own] > 0:
+                if not unloaded and line.strain[own] > SMALLEST_STRAIN:
                     stiff[own] = line.load[own] / line.strain[own]
-                if unloaded and line.strain[1 - own] > 0:
+                if unloaded and line.strain[1 - own] > SMALLEST_STRAIN:
                     nu[own] = -line.strain[own] / line.strain[1 - own]
         table.append(row | _by_yarn(
             from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,

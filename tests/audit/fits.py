@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from . import bubbles, strips
+from . import biaxial, bubbles, cycles, strips
 from .laws import DIRECTION, MODULI, MPA
 from .ledger import NUM, as_number
 
@@ -23,7 +23,26 @@ USABLE, NOT_KNOWN = 0.2, 1.0
 #: Two starts end in one optimum where objectives and moduli differ by no more, relative; an
 #: objective that is larger than the best by no more is as good.
 SAME_OBJECTIVE, SAME_MODULI, AS_GOOD = 0.01, 0.02, 1e-4
-KINDS = {"bubble": bubbles, "strips": strips}
+#: What notes of a kind say against the moduli, in the words of the verdict.
+UNUSABLE = {
+    "sheet taken for flat": "the sheet of a real bubble is taken for flat, so that its moduli are "
+    "not to be believed",
+    "not converged": "the fit has not converged",
+}
+AGAINST = {
+    "on its margin": "bounds are reached",
+    "on a bound": "bounds are reached",
+    "mesh error": "the error of the mesh is large",
+    "wrong form": "the form of the law or the model is wrong",
+    "unstable": "equilibria of the model are unstable",
+    "above the noise": "the fit leaves more than the noise of the data",
+    "doubtful data": "the data are doubtful",
+    "unfaithful surfaces": "polynomial surfaces bias the moduli",
+    "extensometer slip": "an extensometer slipped",
+}
+NO_CERTAINTY = "the solver gives no derivatives, so that the uncertainty is not known"
+NOTHING_USABLE = "no modulus is known to within 20 % at any strain"
+KINDS = {"bubble": bubbles, "strips": strips, "biaxial": biaxial, "cycles": cycles}
 
 
 def percent(value):
@@ -76,7 +95,9 @@ class FitAudit:
         ledger.claim_json("beta", "recomputed", file="material.toml")
         for key in ("nu12", "thickness_mm"):
             ledger.claim_json(key, "consistent", file="material.toml")
-        ledger.json("format", 3 if "certainty" in card else 2, "echoed", file="material.toml")
+        number = 4 if "memory" in card else 3 if "certainty" in card else 2
+        ledger.json("format", number, "echoed", file="material.toml")
+        self._memory(card)
         for name, key in DIRECTION.items():
             low, high = card["valid_strain"][key]
             ledger.json(("valid_strain", key), [0.0, result["valid_strain"][key]], "consistent",
@@ -99,6 +120,21 @@ class FitAudit:
             ledger.json(("valid_strain", key), limit, "recomputed", rel=1e-9)
         self._certainty()
         self._source()
+
+    def _memory(self, card):
+        """Constants of the memory are those of the unknowns, where they are fitted."""
+        unknowns = self.result.get("unknowns", {})
+        for key, values in card.get("memory", {}).items():
+            name = key.removeprefix("permanent_")
+            for k, direction in enumerate(DIRECTION.values()):
+                own = unknowns.get(f"{name}_{direction}")
+                path = ("memory", key, k)
+                if own is None:
+                    self.ledger.claim_json(path, "echoed", file="material.toml")
+                else:
+                    self.ledger.json(path, own["value"], "consistent", file="material.toml")
+            if len(values) != 3:
+                self.ledger.find(f"material.toml: memory.{key}", "has not three directions")
 
     def _ranges_of_tests(self):
         """Return how far the strips go, along warp and fill, and the shear of the bias strip."""
@@ -592,8 +628,32 @@ class FitAudit:
                 if sure[key] is not None:
                     ledger.json(("uncertainty", key, name), float(value), "recomputed",
                                 rel=1e-6, abs=1e-12)  # fmt: skip
+        self._second_order(sure["second_order"])
         self._discrepancies(sure)
         self._pinned(sure)
+
+    def _second_order(self, order):
+        """The order of the uncertainty, and the sentence on what it changes."""
+        if order is None:
+            return
+        ledger = self.ledger
+        place = ("uncertainty", "second_order")
+        ledger.claim_json(place, "consistent")
+        ledger.json((*place, "order"), 1 if order["why"] else 2, "recomputed")
+        if order["analyses"] < 0 or order["directions"] > 8:
+            ledger.find("result.json: uncertainty.second_order", f"is {order}")
+        changes = order["change_of_sigma"]
+        largest = max(map(abs, changes.values()), default=0.0)
+        if order["order"] == 2 and largest <= 0.1:
+            ledger.find("result.json: uncertainty.second_order", f"changes only {largest:.2g}")
+        each = ", ".join(rf"{name} ([-+]\d+) %" for name in changes)
+        told = [f"{100 * by:+.0f}" for by in changes.values()]
+        ledger.text(
+            rf"(?:second order: 1 sigma against that of the first derivatives:|the second would "
+            rf"change 1 sigma by) {each}",
+            told,
+            needed=order["order"] == 2,
+        )
 
     def _discrepancies(self, sure):
         """What noise does not explain of a residual is not more than the residual."""
@@ -608,11 +668,57 @@ class FitAudit:
             if own["rms"] > 2 * misfit["rms"] + 1e-3 * misfit["noise"] and not self.mesh_in_it:
                 self.ledger.find(f"result.json: {'.'.join(place)}.rms", f"is {own['rms']}")
             self._causes(own)
+            self._note_of_discrepancy(name, own)
             shares = [cause["share"] for cause in own["causes"]]
             if any(not 0 <= share <= 1 + 1e-9 for share in shares) or (
                 shares != sorted(shares, reverse=True)
             ):
                 self.ledger.find(f"result.json: {'.'.join(place)}.causes", f"have shares {shares}")
+
+    def _note_of_discrepancy(self, name, own):
+        """The note on it has its numbers; there is one where it is told."""
+        of, quantity = (
+            (r"alike in all (\d+) specimens \(Hotelling's F is", "loads")
+            if own["specimens"]
+            else (r"smooth over the whole sheet()() ?\(", "displacements")
+        )
+        pattern = (
+            rf"{NUM} {own['unit']} of what the fit leaves, {NUM} % of the {quantity}, is "
+            rf"{of.replace('()()', '()')} ?{NUM}[^;]*; chance gives {NUM} in one of a hundred\)"
+        )
+        numbers = [own["rms"], None, str(own["specimens"] or ""), own["ratio"], own["largest"]]
+
+        def expected(match):
+            share = 100 * own["share"]
+            if abs(as_number(match[2]) - share) > 0.06 * max(share, 1e-3):
+                self.ledger.find(f"notes: {name}", f"{match[0]!r}: the share is {share:.3g} %")
+            numbers[1] = match[2]
+            return numbers
+
+        told = [n for n in self.result["notes"] if n["kind"] == "wrong form"
+                and n["of"] in (name, "", name.partition(": ")[2])]  # fmt: skip
+        if own["told"] and not told:
+            self.ledger.find(f"notes: {name}", "say nothing of a discrepancy that is told")
+        if own["told"]:
+            self.ledger.text(pattern, expected, digits=[2, 3, 3, 3, 3])
+        if own["causes"]:
+            most = max(cause["share"] for cause in own["causes"])
+            self.ledger.text(r"known causes explain at most (\d+) %", [f"{100 * most:.0f}"],
+                             needed=False)  # fmt: skip
+        for cause in own["causes"]:
+            self.ledger.text(
+                rf"{re.escape(cause['words'])} \((\d+) % of it explained; moduli would[^)]*\)",
+                lambda m, cause=cause: self._cause(m, cause), needed=False,
+            )  # fmt: skip
+
+    def _cause(self, match, cause):
+        if match[1] != f"{100 * cause['share']:.0f}":
+            self.ledger.find("notes", f"{match[0]!r}: the share is {cause['share']:.3g}")
+        for text in self.ledger.texts:
+            at = text.text.find(match[0])
+            if at >= 0:
+                text.claim((at, at + len(match[0])), "consistent")
+        return [match[1]]
 
     def _causes(self, own):
         """Amounts of causes stand alike in result.json and in the note."""
@@ -684,7 +790,45 @@ class FitAudit:
             }
             for key, span in spans.items():
                 ledger.json(("verdict", "moduli", name, key), span, rel=1e-6, abs=1e-12)
+        self._state()
         self._verdict_words()
+
+    def _state(self):
+        """The state and its reasons follow from the notes and from where moduli are usable."""
+        ledger, verdict = self.ledger, self.result["verdict"]
+        kinds = {note["kind"] for note in self.result["notes"]}
+        unusable = [words for kind, words in UNUSABLE.items() if kind in kinds]
+        doubtful = {words for kind, words in AGAINST.items() if kind in kinds}
+        reasons, known = verdict["reasons"], "uncertainty" in self.result
+        usable = [own["usable"] for own in verdict["moduli"].values() if own["usable"]]
+        expected = [*unusable, *doubtful]
+        if not known:
+            expected.append(NO_CERTAINTY)
+        elif not unusable and not usable:
+            expected.append(NOTHING_USABLE)
+        if sorted(reasons) != sorted(expected):
+            ledger.find("result.json: verdict.reasons", f"are {reasons}; expected {expected}")
+        if set(reasons[: len(unusable)]) != set(unusable):
+            ledger.find("result.json: verdict.reasons", "do not begin with what makes it unusable")
+        state = "usable within limits" if expected else "usable"
+        if unusable or (known and not usable):
+            state = "not to be used"
+        if verdict["state"] != state and not (
+            state == "usable" and verdict["state"] == "usable within limits" and self._is_short()
+        ):
+            ledger.find("result.json: verdict.state", f"is {verdict['state']!r}; expected {state}")
+        for reason in reasons:
+            ledger.text(rf"{re.escape(reason)}", [], needed=False)
+
+    def _is_short(self):
+        """Whether a modulus that a test reached is not usable up to nearly its end."""
+        for name, own in self.result["verdict"]["moduli"].items():
+            end = self.card.ends[name]
+            if end >= 1e-4 and (
+                own["usable"] is None or own["usable"][0] > 0 or own["usable"][1] < 0.95 * end
+            ):
+                return True
+        return False
 
     def _verdict_words(self):
         """The page's sentence on it."""
@@ -705,9 +849,20 @@ class FitAudit:
                     words.append(f"{name} {between}")
             return ", ".join(words) or "nothing"
 
-        begin = f"Usable to within 20 % (95 % band): {spans('usable')}; not known: "
-        begin += f"{spans('not_known')}; next: {self.result['verdict']['next']}."
-        seen = [text for text in ledger.texts if text.text.startswith("Usable to within")]
+        verdict = self.result["verdict"]
+        reasons = "; ".join(verdict["reasons"])
+        begin = "Usable to within 20 % (95 % band): "
+        if reasons:
+            begin = f"Usable within limits ({reasons}), to within 20 % (95 % band): "
+        begin += f"{spans('usable')}; not known: {spans('not_known')}"
+        if verdict["state"] == "not to be used":
+            begin = f"Not to be used: {reasons}"
+        begin += f"; next: {verdict['next']}."
+        seen = [
+            text
+            for text in ledger.texts
+            if re.match(r"(Usable (within limits|to within)|Not to be used: )", text.text)
+        ]
         for text in seen:
             plain = text.text.replace("\u00a0", " ")
             if plain != begin:
@@ -1009,6 +1164,74 @@ class FitAudit:
                     if match.start() <= span[0] < match.end():
                         text.claims[span] = "consistent"
 
+    def _other_notes(self):
+        """Analyses used up, the error of the mesh, doubts about the data."""
+        ledger, result = self.ledger, self.result
+        best = min(
+            (r for r in result["starts"] if r["objective"] is not None),
+            key=lambda r: r["objective"],
+            default=None,
+        )
+        if best is not None:
+            ledger.text(r"the best start used up its (\d+) analyses", [best["analyses"]],
+                        needed=False)  # fmt: skip
+        failed = [r for r in self.folder.starts if r.get("failure")]
+        ledger.text(r"^(\d+) of (\d+) starts ended because", [len(failed), len(result["starts"])],
+                    needed=False)  # fmt: skip
+        signs = {}
+        for name in MODULI:
+            own = self.table[self.table["modulus"] == name]["mesh_relative"]
+            if own.notna().any():
+                signs[name] = own[own.abs().idxmax()]
+
+        def signed(match):
+            name, _ = match.groups()
+            value = 100 * signs[name]
+            digits = 0 if abs(value) >= 10 else 2
+            right = f"{value:+.0f}" if digits == 0 else f"{value:+.2g}"
+            return [None, right]
+
+        for text in ledger.texts:
+            if text.text.find("error of the mesh is taken out of the moduli (") >= 0:
+                for match in re.finditer(r"(E1|E2|G12) ([-+][\d.e-]+) %", text.text):
+                    right = signed(match)[1]
+                    if match[2] != right:
+                        ledger.find(f"{text.source}: mesh", f"{match[0]!r}; expected {right} %")
+                    text.claim(match.span(2), "consistent")
+        self._mesh_notes(signs)
+        doubts = [n for n in result["notes"] if n["kind"] in ("doubtful data", "doubt")]
+        ledger.text(r"^The data were looked at before the fit \([^)]*\): (\d+) doubts, listed",
+                    lambda m: [len(doubts) or m[1]], needed=False)  # fmt: skip
+        # What was seen in the data stands alike in all places; `check` is audited for it.
+        for note in doubts:
+            for text in ledger.texts:
+                at = text.text.replace("\u00a0", " ").find(note["note"])
+                if at >= 0:
+                    text.claim((at, at + len(note["note"])), "consistent")
+
+    def _mesh_notes(self, signs):
+        """A modulus on a fine mesh, where the mesh has a larger share than the noise."""
+
+        def expected(match):
+            name = match[1] or match[4]
+            by, strain = (match[2], match[3]) if match[1] else (match[6], match[5])
+            own = self.table[self.table["modulus"] == name]
+            at = float(strain) / 100
+            mesh = 100 * float(np.interp(at, own["strain"], own["mesh_relative"]))
+            noise = 100 * float(np.interp(at, own["strain"], own["noise_relative"]))
+            for told, right in ((by, mesh), (match[7], noise)):
+                if abs(as_number(told) - right) > 0.06 * abs(right) + 0.05:
+                    self.ledger.find("notes: mesh", f"{match[0]!r}: {right:.3g} % by moduli.csv")
+            return list(match.groups())
+
+        self.ledger.text(
+            rf"(?:on a fine mesh (E1|E2|G12) would be {NUM} % at {NUM} % of strain,|the mesh moved "
+            rf"(E1|E2|G12) at {NUM} % of strain: {NUM} % is taken out, and what may be left is) "
+            rf"more than the noise makes uncertain \({NUM} %\)",
+            expected,
+            needed=False,
+        )
+
     def notes(self):
         """Warnings, notes and notes.csv are the same lines; numbers in those of a fit."""
         ledger, result = self.ledger, self.result
@@ -1024,6 +1247,7 @@ class FitAudit:
                 if " ".join(line.split()) not in shown:
                     ledger.find("page: warnings", f"without {line!r}")
         self._unstable()
+        self._other_notes()
         reached = {key: 100 * own for key, own in result["strain_reached"].items()}
         limit = dict(zip(DIRECTION.values(), self.ranges, strict=True))
 
@@ -1185,4 +1409,11 @@ def _longest(strain, chosen):
     return list(best) if best and best[1] - best[0] > 0.05 * strain[-1] else None
 
 
-COMMANDS = dict.fromkeys(("bubble", "strips", "fit", "biaxial-fit", "cycles-fit"), audit_fit)
+def audit_biaxial(folder, ledger):
+    """Audit a fit to biaxial tests alone, or the constants of such tests."""
+    is_fit = "objective" in folder.result
+    (audit_fit if is_fit else biaxial.audit_constants)(folder, ledger)
+
+
+COMMANDS = dict.fromkeys(("bubble", "strips", "fit", "cycles"), audit_fit)
+COMMANDS["biaxial"] = audit_biaxial

@@ -15,8 +15,10 @@ NUMBER = re.compile(
 #: A number within a pattern of `Ledger.text`.
 NUM = r"([-+\u2212]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 #: Numbers that are names.
-NAMES = re.compile(r"\b(?:EN )?(?:EN|ISO) \d+(?:-\d+)?|-2 log L|\b1 sigma|\(\d+ rows\)")
+NAMES = re.compile(r"\b(?:EN )?(?:EN|ISO) \d+(?:-\d+)?|-2 log L|\b1 sigma|\b\d+:\d+\b|\(\d+ rows\)")
 HOW = ("recomputed", "consistent", "echoed")
+#: Letters of a line of the terminal.
+WIDTH = 80
 #: No results: how long it took, versions, identity, seeds of the record.
 EXEMPT = (
     ("result.json", r"versions\..*|(.*\.)?wall_s|(.*\.)?seconds|(.*\.)?seed(\.\d+)?|.*\.date"),
@@ -83,13 +85,15 @@ def close(value, expected, rel, abs_):
 
 def _whole_lines(text):
     """Return the lines of a terminal; what was broken off a sentence is joined to it again."""
-    lines = []
+    lines, before = [], ""
     for line in text.splitlines():
-        continues = re.match(r" {4,6}\S", line) and not re.search(r"\S {2,}\S", line)
-        if continues and lines and lines[-1] and not re.search(r"\S {2,}\S", lines[-1]):
+        # What was broken did not fit.
+        full = len(before) + 1 + len(line.strip().partition(" ")[0]) > WIDTH
+        if full and re.match(r" {4,6}\S", line) and lines:
             lines[-1] += f" {line.strip()}"
         else:
             lines.append(line)
+        before = line
     return lines
 
 
@@ -101,6 +105,7 @@ class Ledger:
         self.findings = []
         self.leaves = {}  # (file, path) -> claim
         self.values = {}
+        self.strings = {}  # (file, path) -> Text
         self.columns = {}  # (file, column) -> array of claims, 0 none, -1 no number, 1.. HOW
         self.texts = []
         self.cells = {}  # (number of the table, row, column) -> Text
@@ -132,7 +137,9 @@ class Ledger:
             for k, member in enumerate(value):
                 self._add_json(file, member, (*path, k))
         elif isinstance(value, str):
-            self.texts.append(Text(file, ".".join(map(str, path)), value))
+            text = Text(file, ".".join(map(str, path)), value)
+            self.texts.append(text)
+            self.strings[file, path] = text
             self.values[file, path] = value
         else:
             self.values[file, path] = value
@@ -211,6 +218,8 @@ class Ledger:
         if isinstance(expected, bool | str | None) or isinstance(value, bool | str | None):
             if value != expected:
                 self.find(place, f"is {value!r}; expected {expected!r}")
+            if isinstance(value, str) and isinstance(expected, str):
+                self._claim_text(self.strings[file, path], how)
         elif not close(value, expected, rel, abs):
             self.find(place, f"is {value!r}; expected {expected!r}")
 
@@ -248,6 +257,10 @@ class Ledger:
             return
         if expected.dtype.kind in "OUS":
             wrong = np.array([str(own) != text for own, text in zip(expected, texts, strict=True)])
+            there = set(texts)
+            for text in self.texts:
+                if text.source == file and text.text in there and text.place.startswith(column):
+                    self._claim_text(text, how)
         else:
             values = pd.to_numeric(pd.Series(texts), errors="coerce").to_numpy(float)
             expected = expected.astype(float)

@@ -377,6 +377,10 @@ def test_the_usual_constants_are_those_of_the_last_cycles(folder, golden):
     wanted = 100 * LAST.strain([[28.0, 14.0]])[0]
     assert row.fill_strain_change_percent == pytest.approx(wanted[1])
     assert (out / "constants.png").is_file()
+    # At 1:2 the warp does not strain: nothing over nothing is no stiffness.
+    standard = pd.read_csv(out / "en-17117.csv").set_index("ratio")
+    assert np.isnan(standard.loc["1:2", "warp_stiffness_kN_per_m"])
+    assert standard.loc["1:2", "fill_stiffness_kN_per_m"] == pytest.approx(800.0)
 
 
 def test_the_options_choose_what_is_evaluated(folder, tmp_path):
