@@ -34,13 +34,17 @@ class Counted(Formula):
 
 
 class Falling(Formula):
-    """A load that rises to a limit point and falls with one card, a straight line with others."""
+    """Knee and limit point with one card; with others a knee at high pressure, a line below it."""
 
     def run(self, model, law, *arguments, **named):
         history = super().run(model, law, *arguments, **named)
         way = np.array([0.0, *model.deflections])
         peak = 300.0 + 1e3 * model.pressure
-        load = peak * np.sin(np.pi * way / 280.0) if law.beta[11] == FALLS else 4.0 * way
+        load = 4.0 * way
+        if law.beta[11] == FALLS:
+            load = peak * np.sin(np.pi * way / 280.0)
+        elif model.pressure > 0.1:
+            load = np.minimum(load, 300.0 + way)
         return replace(history, load=load)
 
 
@@ -138,7 +142,7 @@ def test_knee_and_limit_point_are_the_same_figures_everywhere(tmp_path, monkeypa
             point = run[name.replace(" ", "_")]
             load, deflection = point["load_N"], point["deflection_mm"]
             cells = first["rows"][i][4 + 3 * number : 7 + 3 * number]
-            if card == "soft":
+            if card == "soft" or (name, test) == ("knee", "high"):
                 words = f"{load:.0f} N, {deflection:.0f} mm"
                 assert study[f"load at the {name}, N"] == pytest.approx(load)
                 assert cells == [f"{load:.0f}", None, f"{deflection:.0f}"]
