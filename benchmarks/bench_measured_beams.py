@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from bubblefit.errors import SolverFailure
-from bubblefit.experiments.cylinder.predicted import against_measured
+from bubblefit.experiments.cylinder.curve import against_measured
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, BraidedWall, TubeSection
 from bubblefit.meshes.cylinder_model import Cord, ForceTable, curve_reading

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .cylinder_model import ForceTable, alike
+from .cylinder_model import ForceTable, has_same_force
 from .mesh import GAUSS_VALUES, Array, Mesh, keep_levels, places_of
 
 THICKNESS = "thickness"
@@ -85,7 +85,7 @@ class SheetCord:
         image = other.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
         near = NEAR * np.abs(image).max()
         turned = (np.abs(self.ends - ends).max() <= near for ends in (image, image[::-1]))
-        return any(turned) and alike(self, other)
+        return any(turned) and has_same_force(self, other)
 
 
 NEAR = 1e-6  # of a length

@@ -12,8 +12,9 @@ from ...inference.comparison import Comparison, NoiseIs
 from ...readers.sections import Positive
 from ...solvers.base import History
 from .. import kinds
-from ..cylinder.test import PART, BentSection, CylinderTest
-from ..cylinder.test import read as read_cylinder
+from ..cylinder.reading import read as read_cylinder
+from ..cylinder.section import BentSection
+from ..cylinder.test import PART, CylinderTest
 from ..kinds import Array, MakeSolver, Masks, Place, Weighting
 from ..measured import MeasuredKind, PreparedWhole
 from ..strips.prepared import LoadObjective

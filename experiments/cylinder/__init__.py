@@ -1,7 +1,8 @@
 """The inflated cylinder in three-point bending: predicted with cards, not fitted."""
 
 from .predicted import STUDIED, CylinderPredicted
-from .test import CylinderSection, read
+from .reading import read
+from .section import CylinderSection
 
 
 class CylinderKind:

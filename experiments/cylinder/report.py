@@ -23,16 +23,10 @@ from ...reports.content import Exhibit, Part, Table, Words
 from ...reports.maps import write_vtu
 from ...reports.vega import save
 from ..kinds import Array, Cards, Output, PredictedRun, Runs, Shown, Simulation, record_of
-from .predicted import (
-    CURVE_PROPERTIES,
-    SECANT,
-    BendingRun,
-    CylinderOutcome,
-    CylinderPredicted,
-    load_words,
-    measured_table,
-    place_names,
-)
+from .curve import CRITERIA, CURVE_PROPERTIES
+from .predicted import CylinderOutcome, CylinderPredicted, measured_table, place_names
+from .run import BendingRun
+from .terminal import describe_load
 from .test import PART, CylinderTest
 
 #: Node sets that the picture draws as lines.
@@ -306,7 +300,7 @@ def openings(outcome: CylinderOutcome) -> Table:
     for i, run in enumerate(outcome.runs):
         if not run.predicted:
             continue
-        stiffness = outcome.measured(i, "stiffness")
+        stiffness = outcome.with_band(i, "stiffness")
         cells = [f"{stiffness[0]:.3g}" if stiffness else None, _to(stiffness, ".3g")]
         for name in ("knee", "limit"):
             cells += _point_cells(outcome, i, name)
@@ -324,7 +318,7 @@ def openings(outcome: CylinderOutcome) -> Table:
 
 def _point_cells(outcome: CylinderOutcome, number: int, name: str) -> list[str | None]:
     """Return load, band and deflection of the knee or the limit of a run."""
-    measures, load = outcome.measures.get(number), outcome.measured(number, name)
+    measures, load = outcome.measures.get(number), outcome.with_band(number, name)
     if measures is None:
         return [None, None, None]
     if load is None:
@@ -380,7 +374,7 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
         spread = outcome.sigma(i)
         loads = [(m.loads.get(place), spread.get(place)) for place in places]
-        listed = [None if one[0] is None else load_words(*one) for one in loads]
+        listed = [None if one[0] is None else describe_load(*one) for one in loads]
         rows.append([*head, stiffness, *points, wrinkles, *listed, strain, rise, *tail])
     header = [
         "test", "card", *walls, "stiffness, N/mm", "knee", "limit point", "wrinkles from",
@@ -431,7 +425,7 @@ def _errors(outcome: CylinderOutcome) -> list[Table]:
     text = tuple(range(1, len(named)))
     over = (f"{name}, {'N/mm' if name.endswith('stiffness') else 'N'}" for name in compared)
     columns = [*named, *(words for name in over for words in (name, "of it"))]
-    low, high = (f"{100 * share:g}" for share in SECANT)
+    low, high = (f"{100 * share:g}" for share in (CRITERIA.secant_from, CRITERIA.secant_to))
     how = "Measured (mean of the repetitions), and predicted over measured. Secant stiffness: "
     how += f"between {low} and {high} % of each curve's load at the last place that all reach; "
     how += "secant knee: where the slope is half of that. Measured curves begin with friction: "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...meshes.bubble_model import BubbleModel, SheetCord
-from ...meshes.cylinder_model import Cord, alike
+from ...meshes.cylinder_model import Cord, has_same_force
 from ...meshes.mesh import Array, Mesh, Numbers
 
 #: Of a tube's radius and of an angle in radians: what is rounding.
@@ -175,7 +175,7 @@ def _members(
 
 
 def _mirrored(cord: Cord, other: Cord) -> bool:
-    return abs((cord.angle + other.angle) % 360) < NEAR and alike(cord, other)
+    return abs((cord.angle + other.angle) % 360) < NEAR and has_same_force(cord, other)
 
 
 def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Numbers, Array]:

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from bubblefit import files as writing
 from bubblefit.errors import InputError, Note, OutputError
-from bubblefit.experiments.cylinder.predicted import CylinderPredicted, run_of
+from bubblefit.experiments.cylinder.predicted import CylinderPredicted
+from bubblefit.experiments.cylinder.run import run_of
 from bubblefit.files import json_text
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw

@@ -8,23 +8,22 @@ import numpy as np
 import pytest
 from bubblefit.errors import SolverFailure
 from bubblefit.experiments.cylinder import report
-from bubblefit.experiments.cylinder.predicted import (
-    STUDIED,
-    BendingRun,
+from bubblefit.experiments.cylinder.curve import (
     against_measured,
-    arrays_of,
-    bending_measures,
-    inflation_strain,
     initial_stiffness,
     knee_point,
     limit_point,
     loads_at,
-    quantities,
-    run_of,
     straightness,
+)
+from bubblefit.experiments.cylinder.measures import (
+    bending_measures,
+    inflation_strain,
     wrinkle_onset,
 )
+from bubblefit.experiments.cylinder.predicted import STUDIED, quantities
 from bubblefit.experiments.cylinder.report import bodies_of, whole_beam
+from bubblefit.experiments.cylinder.run import BendingRun, arrays_of, run_of
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.beam_model import BeamModel, PlainWall, TubeSection

@@ -9,13 +9,11 @@ import pandas as pd
 import pytest
 from bubblefit.errors import SOLVER, Note
 from bubblefit.experiments.cylinder import report
-from bubblefit.experiments.cylinder.predicted import (
-    BendingMeasures,
-    BendingRun,
-    CylinderOutcome,
-    measured_table,
-)
+from bubblefit.experiments.cylinder.curve import CurvePoint
+from bubblefit.experiments.cylinder.measures import BendingMeasures
+from bubblefit.experiments.cylinder.predicted import CylinderOutcome, measured_table
 from bubblefit.experiments.cylinder.report import bending_charts
+from bubblefit.experiments.cylinder.run import BendingRun
 from bubblefit.experiments.kinds import Output
 from bubblefit.readers.bending import BendingCurve, BendingError
 from bubblefit.solvers.base import EARLY, SNAP
@@ -25,8 +23,8 @@ from ...cylinder_cases import ENDS
 from ...drawings import caught
 
 MEASURES = BendingMeasures(
-    stiffness=4.256, loads={"20 mm": 86.4, "a long way": None}, knee=(61.0, 251.0),
-    limit=(120.0, 502.6), wrinkles=(33.0, 140.0), straightness=(0.99, 0.02),
+    stiffness=4.256, loads={"20 mm": 86.4, "a long way": None}, knee=CurvePoint(61.0, 251.0),
+    limit=CurvePoint(120.0, 502.6), wrinkles=CurvePoint(33.0, 140.0), straightness=(0.99, 0.02),
     body_strain=(0.011, 0.022), anywhere_strain=(0.033, 0.044), pressure_rise=1.6, reached=150.0,
     error=BendingError(3.1, -1.2, 0.0519, 17, 4),
 )  # fmt: skip
@@ -204,14 +202,14 @@ def banded() -> CylinderOutcome:
 def test_it_opens_with_stiffness_and_knee_and_their_bands(banded, tmp_path, undrawn):
     """1 sigma of 8 N at 20 mm and 4 N at the knee; the rigid wall is 5 N/mm and 300 N."""
     sigma = np.interp(WAY, [0.0, 40.0, 61.0, 80.0], [0.0, 16.0, 4.0, 4.0])
-    rigid = replace(MEASURES, stiffness=5.0, knee=(50.0, 300.0))
+    rigid = replace(MEASURES, stiffness=5.0, knee=CurvePoint(50.0, 300.0))
     banded.__dict__["measures"] = {0: MEASURES, 1: rigid, 2: replace(MEASURES, knee=None)}
     banded.__dict__["spreads"] = {0: sigma}
     off = 1.96 * np.array([8.0 / 20.0, np.interp(61.0, WAY, sigma)])
-    found = banded.measured(0, "stiffness"), banded.measured(0, "knee")
+    found = banded.with_band(0, "stiffness"), banded.with_band(0, "knee")
     assert found[0] == pytest.approx((4.256, 4.256 - off[0], 5.0 + off[0]))
     assert found[1] == pytest.approx((251.0, 251.0 - off[1], 300.0 + off[1]))
-    assert banded.measured(2, "knee") is None and banded.measured(3, "stiffness") is None
+    assert banded.with_band(2, "knee") is None and banded.with_band(3, "stiffness") is None
     shown = report.show_outcome(banded, Output(tmp_path))
     first = shown.parts[0]
     assert first.title == "Stiffness, knee and limit point" and len(first.rows) == 2

@@ -8,7 +8,7 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.cylinder.test import CylinderTest
 from bubblefit.materials.card import MaterialCard
 from bubblefit.materials.law import HypoelasticLaw
-from bubblefit.meshes.cylinder_model import DEFLECTION, FRAMES, Collar
+from bubblefit.meshes.cylinder_model import DEFAULTS, Collar
 from bubblefit.project.project import read_project
 from bubblefit.runs.predictions import predict
 from bubblefit.runs.validation import validate
@@ -63,7 +63,9 @@ def test_the_example_is_table_6_1_with_tables_3_2_and_5_4():
         collar = (295.0, 147.0) if test.diameter == 250 else (240.0, 145.0)
         assert (test.collar.inner_diameter, test.collar.length) == collar
         assert (test.length, test.supports.span) == (3000.0, 2000.0)
-        assert len(test.deflections) == FRAMES and test.deflections[-1] == DEFLECTION
+        assert (
+            len(test.deflections) == DEFAULTS.frames and test.deflections[-1] == DEFAULTS.deflection
+        )
         assert list(test.reading.places.values()) == [40.0, 100.0, 240.0]
         assert test.reading.slope_over == 20.0
         assert test.measured == ()

@@ -1,0 +1,242 @@
+"""Numbers of a curve of load over deflection, alone and beside measured ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...meshes.cylinder_model import CurveReading
+from ...readers.bending import BendingCurve
+from ..kinds import Array
+
+#: Relative difference of deflections that is rounding.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class CurveCriteria:
+    """What stiffness, knee, limit point and straightness mean."""
+
+    stiffness_frames: int = 3  # the initial stiffness is the slope of at least so many frames
+    knee_slope: float = 0.5  # of the initial stiffness
+    knee_positions: int = 20  # at which the slope is looked at, in each stretch of `slope_over`
+    limit_fall: float = 0.005  # of the largest load, by which the load falls after a limit point
+    straight_share: float = 0.5  # of the load at the knee, up to which a line is compared
+    #: Shares of the reference load between which stiffness is compared with measured curves: their
+    #: first newtons are friction of rig and wall.
+    secant_from: float = 0.1
+    secant_to: float = 0.35
+
+
+CRITERIA = CurveCriteria()
+#: What is compared with measured curves beside loads; none of it is the stiffness or the knee of
+#: `BendingMeasures`, which begin at zero load.
+CURVE_PROPERTIES = ("secant stiffness", "secant knee", "limit point")
+
+
+class CurvePoint(NamedTuple):
+    """A point of a curve: deflection in mm, load in N."""
+
+    deflection: float
+    load: float
+
+
+def initial_stiffness(d: Array, load: Array, over: float) -> float | None:
+    """Return the slope of the straight line through the first frames.
+
+    Parameters
+    ----------
+    d, load : (frames,) arrays
+        Deflection in mm, load in N.
+    over : float
+        Deflection up to which frames count, mm.
+
+    Returns
+    -------
+    float or None
+        N/mm; None of a single frame.
+    """
+    count = max(int((d <= over * (1 + ROUNDING)).sum()), CRITERIA.stiffness_frames)
+    if len(d) < 2:
+        return None
+    return float(np.polyfit(d[:count], load[:count], 1)[0])
+
+
+def secant_stiffness(d: Array, load: Array, reference: float) -> float | None:
+    """Return the slope between two shares of a load (`CurveCriteria`).
+
+    Parameters
+    ----------
+    d, load : (frames,) arrays
+        Deflection in mm, load in N.
+    reference : float
+        Deflection of the load that the shares are of, mm.
+
+    Returns
+    -------
+    float or None
+        N/mm; None where the load does not rise.
+    """
+    reference_load = float(np.interp(reference, d, load))
+    rising = np.maximum.accumulate(load)
+    shares = CRITERIA.secant_from, CRITERIA.secant_to
+    low, high = (float(np.interp(share * reference_load, rising, d)) for share in shares)
+    if not (reference_load > 0 and high > low):
+        return None
+    return (CRITERIA.secant_to - CRITERIA.secant_from) * reference_load / (high - low)
+
+
+def knee_point(d: Array, load: Array, stiffness: float | None, over: float) -> CurvePoint | None:
+    """Return the first point where the slope has fallen to half of a stiffness.
+
+    Parameters
+    ----------
+    d, load : (frames,) arrays
+        Deflection in mm, load in N.
+    stiffness : float or None
+        N/mm.
+    over : float
+        Stretch of deflection over which the slope is taken, mm.
+
+    Returns
+    -------
+    CurvePoint or None
+        None where it does not fall so far, or without a stiffness.
+    """
+    half = 0.5 * over
+    if stiffness is None or not stiffness > 0 or d[-1] < 2 * over:
+        return None
+    count = round(CRITERIA.knee_positions * (d[-1] / over - 1)) + 1
+    positions = np.linspace(half, d[-1] - half, max(2, count))
+    slope = (np.interp(positions + half, d, load) - np.interp(positions - half, d, load)) / over
+    knee_slope = CRITERIA.knee_slope * stiffness
+    softer = np.flatnonzero(slope <= knee_slope)
+    if not len(softer):
+        return None
+    i = int(softer[0])
+    deflection = float(positions[i])
+    if i:
+        share = (slope[i - 1] - knee_slope) / (slope[i - 1] - slope[i])
+        deflection = float(positions[i - 1] + share * (positions[i] - positions[i - 1]))
+    return CurvePoint(deflection, float(np.interp(deflection, d, load)))
+
+
+def limit_point(d: Array, load: Array) -> CurvePoint | None:
+    """Return the point of the largest load, where the load falls afterwards.
+
+    Parameters
+    ----------
+    d, load : (frames,) arrays
+        Deflection in mm, load in N.
+    """
+    top = int(np.argmax(load))
+    if not load[top:].min() < (1 - CRITERIA.limit_fall) * load[top]:
+        return None
+    return CurvePoint(float(d[top]), float(load[top]))
+
+
+def loads_at(d: Array, load: Array, places: Mapping[str, float]) -> dict[str, float | None]:
+    """Return the load (N) at places (mm) by name; None at those not reached."""
+    end = d[-1] * (1 + ROUNDING)
+    return {
+        name: float(np.interp(place, d, load)) if place <= end else None
+        for name, place in places.items()
+    }
+
+
+def straightness(d: Array, load: Array, knee_load: float) -> tuple[float, float] | None:
+    """Return how straight a curve is up to half of a load.
+
+    Parameters
+    ----------
+    d, load : (frames,) arrays
+        Deflection in mm, load in N.
+    knee_load : float
+        N.
+
+    Returns
+    -------
+    r_squared, largest_deviation : float
+        Of a straight line through these frames, and over their last load. None of fewer than four
+        frames.
+    """
+    beyond = np.flatnonzero(load > CRITERIA.straight_share * knee_load)
+    count = int(beyond[0]) if len(beyond) else len(d)
+    if count < CRITERIA.stiffness_frames + 1:
+        return None
+    x, y = d[:count], load[:count]
+    deviation = y - np.polyval(np.polyfit(x, y, 1), x)
+    total = float(((y - y.mean()) ** 2).sum())
+    if not total > 0:
+        return None
+    r_squared = 1.0 - float((deviation**2).sum()) / total
+    return r_squared, float(np.abs(deviation).max() / y[-1])
+
+
+@dataclass(frozen=True)
+class MeasuredComparison:
+    """A run beside the mean of the measured repetitions.
+
+    Parameters
+    ----------
+    reference : float
+        Deflection whose load `CurveCriteria` takes shares of, mm.
+    pairs : mapping of str to (float, float) or None
+        Predicted and measured secant stiffness (N/mm), secant knee (where the slope is half of
+        that), limit point and "load at PLACE" (N).
+    """
+
+    reference: float
+    pairs: Mapping[str, tuple[float, float] | None]
+
+    @property
+    def ratios(self) -> Mapping[str, float | None]:
+        """Return predicted over measured by quantity."""
+        return {name: pair and pair[0] / pair[1] for name, pair in self.pairs.items()}
+
+
+def against_measured(
+    reading: CurveReading, d: Array, load: Array, measured: Sequence[BendingCurve]
+) -> MeasuredComparison | None:
+    """Return a curve beside what was measured, knee beside knee and limit point beside limit point.
+
+    Parameters
+    ----------
+    reading : CurveReading
+        Places of loads, and the stretch of slopes.
+    d, load : (frames,) arrays
+        Predicted deflection in mm and load in N.
+    measured : sequence of BendingCurve
+        Repetitions; without any there is no comparison.
+    """
+    if not measured:
+        return None
+    curves = [(d, load), *((c.deflection, c.load) for c in measured)]
+    reached = min(float(x[-1]) for x, _ in curves)
+    labelled = {f"load at {name}": place for name, place in reading.places.items()}
+    places = {n: place for n, place in labelled.items() if place <= reached * (1 + ROUNDING)}
+    reference = max(places.values(), default=reached)
+    predicted, *repetitions = (
+        _compared_values(x, y, reference, reading.slope_over) | loads_at(x, y, places)
+        for x, y in curves
+    )
+    pairs: dict[str, tuple[float, float] | None] = dict.fromkeys([*CURVE_PROPERTIES, *labelled])
+    for name, value in predicted.items():
+        readings = [r for repetition in repetitions if (r := repetition[name]) is not None]
+        is_complete = value is not None and len(readings) == len(repetitions)
+        pairs[name] = (float(value or 0.0), float(np.mean(readings))) if is_complete else None
+    return MeasuredComparison(reference, pairs)
+
+
+def _compared_values(
+    d: Array, load: Array, reference: float, slope_over: float
+) -> dict[str, float | None]:
+    """Return the `CURVE_PROPERTIES` of a curve."""
+    stiffness = secant_stiffness(d, load, reference)
+    knee = knee_point(d, load, stiffness, slope_over)
+    limit = limit_point(d, load)
+    values = stiffness, knee and knee.load, limit and limit.load
+    return dict(zip(CURVE_PROPERTIES, values, strict=True))

@@ -1,0 +1,143 @@
+"""Numbers of one run of a bent cylinder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...meshes.mesh import Mesh, surface_strain
+from ...readers.bending import BendingCurve, BendingError, model_error
+from ..kinds import Array
+from .curve import (
+    CurvePoint,
+    MeasuredComparison,
+    against_measured,
+    initial_stiffness,
+    knee_point,
+    limit_point,
+    loads_at,
+    straightness,
+)
+from .run import BendingRun, Model
+
+#: Wrinkled beyond the inflated state: share of the surface. The bodies press up to 0.8 % together
+#: where they touch, from the first millimetres on, long before the beam wrinkles beside the collar.
+WRINKLED_SHARE = 0.01
+
+#: Log strains along warp and fill.
+StrainPair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class BendingMeasures:
+    """Numbers of one run that ended; None where there is no such number.
+
+    Parameters
+    ----------
+    stiffness : float or None
+        Initial stiffness, N/mm.
+    loads : mapping of str to float or None
+        N by place.
+    knee, limit, wrinkles : CurvePoint or None
+        Where the slope has halved, of the largest load before a fall, where wrinkles appear.
+    straightness : (float, float) or None
+        See `straightness`.
+    body_strain, anywhere_strain : (float, float)
+        See `inflation_strain`.
+    pressure_rise : float
+        kPa.
+    reached : float
+        Largest deflection, mm.
+    error : BendingError or None
+        Against measured readings.
+    against : MeasuredComparison or None
+        Beside measured curves.
+    """
+
+    stiffness: float | None
+    loads: Mapping[str, float | None]
+    knee: CurvePoint | None
+    limit: CurvePoint | None
+    wrinkles: CurvePoint | None
+    straightness: tuple[float, float] | None
+    body_strain: StrainPair
+    anywhere_strain: StrainPair
+    pressure_rise: float
+    reached: float
+    error: BendingError | None
+    against: MeasuredComparison | None = None
+
+    def describe(self, point: CurvePoint | None) -> str:
+        """Return load and deflection of a knee or limit point, or up to where there is none."""
+        if point is None:
+            return f"none up to {self.reached:g} mm"
+        deflection, load = point
+        return f"{load:.0f} N, {deflection:.0f} mm"
+
+
+def bending_measures(
+    model: Model, run: BendingRun, measured: Sequence[BendingCurve]
+) -> BendingMeasures:
+    """Return the numbers of a run of a model, beside measured repetitions."""
+    d, load, over = run.deflection, run.load, model.reading.slope_over
+    stiffness = initial_stiffness(d, load, over)
+    knee = knee_point(d, load, stiffness, over)
+    body, anywhere = inflation_strain(model.mesh, run.inflated)
+    return BendingMeasures(
+        stiffness=stiffness,
+        loads=loads_at(d, load, model.reading.places),
+        knee=knee,
+        limit=limit_point(d, load),
+        wrinkles=wrinkle_onset(run),
+        straightness=straightness(d, load, knee.load if knee else float(load.max())),
+        body_strain=body,
+        anywhere_strain=anywhere,
+        pressure_rise=1e3 * float(run.pressure[-1] - run.pressure[0]),
+        reached=float(d[-1]),
+        error=model_error(measured, d, load),
+        against=against_measured(model.reading, d, load, measured),
+    )
+
+
+def wrinkle_onset(run: BendingRun) -> CurvePoint | None:
+    """Return the first frame in which more of the surface is wrinkled than when inflated."""
+    if not len(run.wrinkled):
+        return None
+    frames = np.flatnonzero(run.wrinkled > run.wrinkled[0] + WRINKLED_SHARE)
+    if not len(frames):
+        return None
+    return CurvePoint(float(run.deflection[frames[0]]), float(run.load[frames[0]]))
+
+
+def inflation_strain(mesh: Mesh, inflated: Array) -> tuple[StrainPair, StrainPair]:
+    """Return the largest strains of the inflated tube along warp and fill.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With element sets `body`, and `seam` and `caps` where there are any.
+    inflated : (nodes, 3) array
+        Displacement, mm.
+
+    Returns
+    -------
+    body, anywhere : (float, float)
+        Log strains of the quads that touch neither seam nor caps, and of the whole tube.
+    """
+    strain = surface_strain(mesh, inflated)[:, :2]
+    excluded_nodes = np.zeros(len(mesh.points), dtype=bool)
+    for name in ("seam", "caps"):
+        if name in mesh.element_sets:
+            excluded_nodes[mesh.quads[mesh.element_sets[name]]] = True
+    body = mesh.element_sets["body"]
+    free = body[~excluded_nodes[mesh.quads[body]].any(axis=1)]
+    tube = np.concatenate([body, mesh.element_sets.get("seam", body[:0])])
+
+    def largest(quads: NDArray[np.intp]) -> StrainPair:
+        warp, fill = strain[quads].max(axis=0)
+        return float(warp), float(fill)
+
+    return largest(free if len(free) else body), largest(tube)

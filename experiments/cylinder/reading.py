@@ -1,0 +1,267 @@
+"""Read the section [[cylinder]]: keys that fit the model, walls of beams, measured loads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...meshes.beam_model import BeamModel, BraidedWall, PlainWall, TubeSection
+from ...meshes.cylinder_model import (
+    DEFAULTS,
+    Collar,
+    Cord,
+    Gas,
+    RigidSupports,
+    curve_reading,
+    usual_collar,
+)
+from ...readers.bending import BendingCurve, read_bending_curves
+from ...readers.sections import whole_in_base_units
+from ..kinds import Place, listed_files, named_format
+from .section import BentSection, CordSection, CylinderSection, MeasuredSection, WallSection
+from .test import GRAVITY, CylinderTest
+
+#: mm of an element, unless the file says otherwise.
+ELEMENT_SIZE = 25.0
+#: kg/m^2 of one layer: beyond, it is given in g/m^2.
+LARGEST_MASS_PER_AREA = 50.0
+#: Keys that may be left out, and what is then as usual.
+ASSUMPTIONS = {
+    "span": f"span ({RigidSupports().span:g} mm)",
+    "seam_width": f"seam width ({DEFAULTS.seam_width:g} mm)",
+    "length": f"length ({DEFAULTS.length:g} mm)",
+    "collar": "collar",
+    "support_diameter": f"diameter of the supports ({RigidSupports().diameter:g} mm)",
+}
+#: Keys of the section by names of the models' fields.
+KEYS = {"supports.span": "span", "supports.diameter": "support_diameter", "size": "element_size"}
+#: Keys of one model alone.
+MODEL_KEYS = {
+    "membrane": (
+        "length",
+        "seam_width",
+        "symmetry",
+        "support_diameter",
+        "saddle",
+        "mass_per_area",
+        "collar",
+        "cap_warp",
+        "gas",
+    ),
+    "beam": (
+        "wall",
+        "load_spacing",
+        "load_width",
+        "roller_below_axis",
+        "mass_per_length",
+        "friction",
+    ),
+}
+#: Keys of a plain wall of a beam, and of a braided one.
+PLAIN_KEYS = ("axial", "hoop", "shear")
+BRAID_KEYS = ("angle", "yarn", "yarn_shear", "bladder", "bladder_shear")
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What membranes and beams have in common; deflections : mm."""
+
+    name: str
+    place: Place
+    diameter: float
+    deflections: tuple[float, ...]
+    reads_files: bool
+    cords: tuple[Cord, ...]
+
+
+def read(section: BentSection, place: Place, name: str) -> CylinderTest:
+    """Read the section of a test.
+
+    Parameters
+    ----------
+    section : BentSection
+        In the project's units.
+    place : Place
+        Where the section stands, for messages and files.
+    name : str
+        Of the test.
+
+    Raises
+    ------
+    InputError
+        If keys do not belong to the model, or make none; if measured files cannot be read.
+    """
+    is_beam = isinstance(section, CylinderSection) and section.model == "beam"
+    other_model = "membrane" if is_beam else "beam"
+    for key in MODEL_KEYS[other_model]:
+        if key in section.model_fields_set:
+            problem = f'is a key of model = "{other_model}"; take it out or change model'
+            raise place.error(key, problem)
+    converted = whole_in_base_units(section, place.scales)
+    shared = Shared(
+        name=name,
+        place=place,
+        diameter=converted.diameter,
+        deflections=_deflections(converted),
+        reads_files=bool(section.measured.files),
+        cords=tuple(_cord(c, place, f"cord[{i}]") for i, c in enumerate(converted.cord)),
+    )
+    if isinstance(section, CylinderSection) and is_beam:
+        return _beam(section, shared)
+    return _membrane(section, converted, shared)
+
+
+def _deflections(section: BentSection) -> tuple[float, ...]:
+    """Return the frames (mm) of a section in base units."""
+    if section.deflections is not None:
+        return tuple(section.deflections)
+    end = section.deflection or DEFAULTS.deflection
+    steps = np.linspace(0.0, end, (section.frames or DEFAULTS.frames) + 1)
+    return tuple(steps[1:].tolist())
+
+
+def _membrane(section: BentSection, converted: BentSection, shared: Shared) -> CylinderTest:
+    """Return the test of a membrane; refuse one that makes no model."""
+    place = shared.place
+    usual = RigidSupports()
+    mass = converted.mass_per_area or 0.0
+    if mass > LARGEST_MASS_PER_AREA:
+        raise place.error("mass_per_area", f"expected kg/m^2, 0.9 for 900 g/m^2; got {mass:g}")
+    seam_width = converted.seam_width
+    with place.naming(keys=KEYS):
+        collar, saddle = (
+            None if ring is None else Collar(**ring.model_dump(exclude_none=True))
+            for ring in (converted.collar, converted.saddle)
+        )
+        test = CylinderTest(
+            **vars(shared),
+            pressure=converted.pressure,
+            length=converted.length or DEFAULTS.length,
+            seam_width=DEFAULTS.seam_width if seam_width is None else seam_width,
+            size=converted.element_size or ELEMENT_SIZE,
+            symmetry=converted.symmetry,
+            cap_warp=converted.cap_warp,
+            supports=RigidSupports(
+                converted.span or usual.span,
+                converted.support_diameter or usual.diameter,
+                saddle,
+            ),
+            mass_per_area=mass,
+            collar=collar or usual_collar(converted.diameter),
+            gas=Gas(**converted.gas.model_dump(exclude_none=True)),
+            reading=curve_reading(converted.diameter, converted.places, converted.slope_over),
+        )
+        test.model()
+    assumed = [words for key, words in ASSUMPTIONS.items() if getattr(converted, key) is None]
+    return replace(test, measured=read_measured(section.measured, place), assumed=tuple(assumed))
+
+
+def _cord(section: CordSection, place: Place, key: str) -> Cord:
+    """Return a cord of a section; InputError names its key."""
+    table = section.table(place, key)
+    with place.naming(key):
+        return Cord(table=table, **section.model_dump(exclude={"stiffness", "strain", "force"}))
+
+
+def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | BraidedWall:
+    """Return the wall at a pressure (in the project's unit), straight between those listed."""
+    listed = section.pressure or [pressure]
+    if not (np.diff(listed) > 0).all():
+        raise place.error("wall.pressure", f"expected each above the last, got {listed}")
+    if not listed[0] * (1 - 1e-9) <= pressure <= listed[-1] * (1 + 1e-9):
+        ends = f"{listed[0]:g} to {listed[-1]:g}"
+        raise place.error("pressure", f"{pressure:g} lies outside wall.pressure, {ends}")
+    is_braid = section.yarn is not None
+    keys, foreign_keys = (BRAID_KEYS, PLAIN_KEYS) if is_braid else (PLAIN_KEYS, BRAID_KEYS)
+    missing = [key for key in keys if getattr(section, key) is None]
+    misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
+    if missing or misplaced:
+        problem = f"expected {', '.join(PLAIN_KEYS)}, or of a braid {', '.join(BRAID_KEYS)}"
+        raise place.error(f"wall.{(missing or misplaced)[0]}", problem)
+    optional = "across" if is_braid else "poisson"
+    values = {
+        key: _at_pressure(section, key, listed, pressure, place)
+        for key in (*keys, optional)
+        if getattr(section, key) is not None
+    }
+    with place.naming("wall"):
+        if is_braid:
+            return BraidedWall(**values)
+        return PlainWall(**values, wrinkles=section.wrinkles)
+
+
+def _at_pressure(
+    section: WallSection, key: str, listed: Sequence[float], pressure: float, place: Place
+) -> float:
+    """Return a value of a wall that is one number, or a number for each listed pressure."""
+    value = getattr(section, key)
+    if not isinstance(value, list):
+        return float(value)
+    if len(value) != len(listed):
+        raise place.error(f"wall.{key}", f"expected {len(listed)}, one a pressure, got {value}")
+    return float(np.interp(pressure, listed, value))
+
+
+def _beam(section: CylinderSection, shared: Shared) -> CylinderTest:
+    """Return the test of a beam; refuse one that makes no model."""
+    place = shared.place
+    converted = whole_in_base_units(section, place.scales)
+    if section.wall is None:
+        raise place.error("wall", 'a beam (model = "beam") needs its stiffness per width; add it')
+    wall = _wall(section.wall, section.pressure, place)
+    for i, cord in enumerate(shared.cords):
+        if not cord.bonded:
+            problem = "one that slides is for a membrane; a beam takes bonded = true"
+            raise place.error(f"cord[{i}].bonded", problem)
+    with place.naming(keys={**KEYS, "angle": "wall.angle"}):
+        tube = TubeSection(0.5 * converted.diameter, converted.pressure, wall, shared.cords)
+        beam = BeamModel(
+            section=tube,
+            span=converted.span or RigidSupports().span,
+            deflections=list(shared.deflections),
+            load_spacing=converted.load_spacing or 0.0,
+            load_width=converted.load_width or 0.0,
+            roller_below=converted.roller_below_axis or 0.0,
+            weight=1e-3 * GRAVITY * (converted.mass_per_length or 0.0),
+            friction=converted.friction or 0.0,
+            size=converted.element_size or ELEMENT_SIZE,
+            reading=curve_reading(converted.diameter, converted.places, converted.slope_over),
+        )
+    assumed = [ASSUMPTIONS["span"]] if section.span is None else []
+    assumed.append("constant pressure while bending")
+    if section.mass_per_length is None:
+        assumed.append("weightless tube")
+    return CylinderTest(
+        **vars(shared),
+        pressure=beam.pressure,
+        length=beam.span,
+        seam_width=0.0,
+        size=beam.size,
+        symmetry="quarter",
+        cap_warp="x",
+        supports=beam.supports,
+        collar=beam.collar,
+        gas=Gas(),
+        reading=beam.reading,
+        beam=beam,
+        measured=read_measured(section.measured, place),
+        assumed=tuple(assumed),
+    )
+
+
+def read_measured(section: MeasuredSection, place: Place) -> tuple[BendingCurve, ...]:
+    """Read every repetition in the files of a section; none where it lists none."""
+    folder = place.folder(section.folder)
+    options: dict[str, Any] = {
+        "deflection": section.deflection.channel,
+        "load": section.load.channel,
+        "format": named_format(place, "measured.format", "machine table", section.format),
+    }
+    for key in ("repetition", "preload", "zero", "comment", "decimal"):
+        options[key] = getattr(section, key)
+    curves: list[BendingCurve] = []
+    for file, key, _ in listed_files(place, folder, {None: section.files or []}, "measured.files"):
+        if place.has(file, key):
+            curves += read_bending_curves(file, **options)
+    return tuple(curves)

@@ -1,0 +1,71 @@
+"""A run of a bent cylinder as the arrays that are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ...errors import SolverFailure
+from ...meshes.beam_model import BeamModel
+from ...meshes.cylinder_model import CylinderModel
+from ...solvers.base import History
+from ..kinds import Array, RunRecord
+
+Model = CylinderModel | BeamModel
+
+
+@dataclass(frozen=True, eq=False)
+class BendingRun:
+    """A run that did not fail, of the whole cylinder; frame 0 is the inflated one.
+
+    Parameters
+    ----------
+    deflection, load, pressure, volume : (frames,) arrays
+        mm, N, MPa (gauge), mm^3.
+    inflated, bent : (nodes, 3) arrays
+        Displacement at the first and at the last frame, mm.
+    wrinkled : (frames,) array
+        Share of the surface that is wrinkled, or empty.
+    """
+
+    deflection: Array
+    load: Array
+    pressure: Array
+    volume: Array
+    inflated: Array
+    bent: Array
+    wrinkled: Array
+
+
+def run_of(record: RunRecord) -> BendingRun | None:
+    """Return the run of a record; None where it failed."""
+    return None if record.failure else BendingRun(**record.arrays)
+
+
+def arrays_of(model: Model, history: History) -> Mapping[str, Array]:
+    """Return the arrays of a history that are stored, by the names of `BendingRun`.
+
+    Raises
+    ------
+    SolverFailure
+        If there is no gas, or if there are fewer frames than requested without a reason.
+    """
+    deflection = np.array([0.0, *model.deflections])
+    reached = len(history.load)
+    if reached < len(deflection) and not history.early:
+        where = f"at {deflection[reached - 1]:g} of {deflection[-1]:g} mm"
+        raise SolverFailure(f"the results end {where}, and do not say why", "")
+    if history.cavity_pressure is None or history.cavity_volume is None:
+        raise SolverFailure("the results have no gas pressure or no volume", "")
+    run = BendingRun(
+        deflection=deflection[:reached],
+        load=np.asarray(history.load, dtype=float),
+        pressure=np.asarray(history.cavity_pressure, dtype=float),
+        volume=np.asarray(history.cavity_volume, dtype=float),
+        inflated=history.displacement[0],
+        bent=history.displacement[-1],
+        wrinkled=np.asarray(() if history.wrinkled is None else history.wrinkled, dtype=float),
+    )
+    return {field.name: getattr(run, field.name) for field in fields(run)}

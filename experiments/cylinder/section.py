@@ -1,0 +1,119 @@
+"""Section [[cylinder]] of a project: a bent membrane, or a beam of a wall given per width."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Unit
+from ..kinds import ChannelSection, MemberSection
+
+Frames = Annotated[int, Field(ge=1, le=10000)]
+FileNames = Annotated[list[str], Field(min_length=1)]
+Lengths = Annotated[list[Length], Field(min_length=1)]
+NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
+
+
+class SaddleSection(Section):
+    """A shell around the cylinder in which it lies, in place of a round support."""
+
+    inner_diameter: Length
+    length: Length
+    fillet: Length | None = None
+
+
+class CollarSection(SaddleSection):
+    """The ring that bends the cylinder, or two of them; by its diameter unless given."""
+
+    spacing: NotNegative | None = None
+
+
+class GasSection(Section):
+    """The gas that fills the cylinder."""
+
+    ambient: Pressure | None = None
+    temperature: Positive | None = None
+    density: Positive | None = None
+    constant: Literal["mass", "pressure"] = "mass"
+
+
+NoUnit = Annotated[float, Field(ge=0, le=1e18)]
+#: One number for all pressures, or one for each of `pressure`.
+ByPressure = Positive | Annotated[list[Positive], Field(min_length=1)]
+
+
+class CordSection(MemberSection):
+    """A cord along the cylinder: force by strain, or stiffness EA (N); N and plain strains."""
+
+    angle: NoUnit
+    bonded: bool = True
+    initial_force: NoUnit | None = None
+
+
+class WallSection(Section):
+    """The wall of a beam, N/mm of width by pressure: plain (axial ...) or braided (yarn ...)."""
+
+    pressure: Annotated[list[Pressure], Field(min_length=1)] | None = None
+    axial: ByPressure | None = None
+    hoop: ByPressure | None = None
+    shear: ByPressure | None = None
+    poisson: NoUnit | list[NoUnit] | None = None
+    wrinkles: bool = True
+    angle: ByPressure | None = None
+    yarn: ByPressure | None = None
+    yarn_shear: ByPressure | None = None
+    bladder: ByPressure | None = None
+    bladder_shear: ByPressure | None = None
+    across: NoUnit | list[NoUnit] | None = None
+
+
+class MeasuredSection(Section):
+    """Measured loads: a file a repetition, or a column that tells repetitions apart."""
+
+    files: FileNames | None = None
+    folder: str = ""
+    format: str | None = None
+    deflection: ChannelSection = ChannelSection.model_construct()
+    load: ChannelSection = ChannelSection.model_construct()
+    repetition: str | None = None
+    preload: Number = 0.0
+    zero: Literal["none", "first", "line"] = "none"
+    comment: str = "#"
+    decimal: Literal[".", ","] | None = None
+
+
+class BentSection(Section):
+    """Keys of a membrane that is inflated, laid on two supports and bent."""
+
+    name: Name | None = None
+    cord: list[CordSection] = Field(default_factory=list)
+    diameter: Length
+    pressure: Pressure
+    length: Length | None = None
+    seam_width: NotNegative | None = None
+    element_size: Length | None = None
+    symmetry: Literal["full", "quarter"] = "quarter"
+    span: Length | None = None
+    support_diameter: Length | None = None
+    saddle: SaddleSection | None = None
+    mass_per_area: NoUnit | None = None
+    collar: CollarSection | None = None
+    deflection: Length | None = None
+    frames: Frames | None = None
+    deflections: Lengths | None = None
+    places: Lengths | None = None
+    slope_over: Length | None = None
+    cap_warp: Literal["x", "y"] = "x"
+    gas: GasSection = GasSection.model_construct()
+    measured: MeasuredSection = MeasuredSection.model_construct()
+
+
+class CylinderSection(BentSection):
+    """Section [[cylinder]]: inflated, laid on two supports, bent by a collar or two loads."""
+
+    model: Literal["membrane", "beam"] = "membrane"
+    wall: WallSection | None = None
+    load_spacing: NotNegative | None = None
+    load_width: NotNegative | None = None
+    roller_below_axis: NotNegative | None = None
+    mass_per_length: NoUnit | None = None
+    friction: NoUnit | None = None
