@@ -278,8 +278,9 @@ def has_same_force(cord: Any, other_cord: Any) -> bool:
     for name in ("initial_force", "prestrain", "tension_only", "bonded"):
         if getattr(cord, name) != getattr(other_cord, name):
             return False
-    tables = [[c.table.strain, c.table.force] for c in (cord, other_cord)]
-    return np.array_equal(*tables)
+    table, other_table = cord.table, other_cord.table
+    same_strain = np.array_equal(table.strain, other_table.strain)
+    return same_strain and np.array_equal(table.force, other_table.force)
 
 
 @dataclass(frozen=True)

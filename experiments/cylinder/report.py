@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -302,7 +302,8 @@ def openings(outcome: CylinderOutcome) -> Table:
             continue
         stiffness = outcome.with_band(i, "stiffness")
         cells = [f"{stiffness[0]:.3g}" if stiffness else None, _to(stiffness, ".3g")]
-        for name in ("knee", "limit"):
+        points: tuple[Literal["knee", "limit"], ...] = ("knee", "limit")
+        for name in points:
             cells += _point_cells(outcome, i, name)
         rows.append(_unbroken([run.test.name, run.card, *cells]))
     header = ["test", "card", "stiffness, N/mm", "its band"]
@@ -316,7 +317,9 @@ def openings(outcome: CylinderOutcome) -> Table:
     return Table("Stiffness, knee and limit point", header, rows, note, text=(1,))
 
 
-def _point_cells(outcome: CylinderOutcome, number: int, name: str) -> list[str | None]:
+def _point_cells(
+    outcome: CylinderOutcome, number: int, name: Literal["knee", "limit"]
+) -> list[str | None]:
     """Return load, band and deflection of the knee or the limit of a run."""
     measures, load = outcome.measures.get(number), outcome.with_band(number, name)
     if measures is None:
