@@ -88,7 +88,8 @@ def _whole_lines(text):
     lines, before = [], ""
     for line in text.splitlines():
         # What was broken did not fit.
-        full = len(before) + 1 + len(line.strip().partition(" ")[0]) > WIDTH
+        word = re.match(r"\S*(?: %\S*)?", line.strip())[0]
+        full = len(before) + 1 + len(word) > WIDTH
         if full and re.match(r" {4,6}\S", line) and lines:
             lines[-1] += f" {line.strip()}"
         else:

@@ -206,7 +206,7 @@ def test_mesh_of_a_bubble(bubble, drawn, golden):
     check_convergence(drawn[-1], table, "elements")
     names = {s.name for s in drawn[-1].charts[0].series[:-2]}
     assert names == set(model["quantities"])
-    golden("study-mesh", SECONDS.sub(r"\1  N", done), bubble)
+    golden("study-mesh", SECONDS.sub(r"\1  N", done), bubble, done)
     assert "--overwrite" in study(*run, cwd=bubble, code=2)
 
 
