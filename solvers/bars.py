@@ -47,12 +47,14 @@ def difference(stresses: tuple[float, ...]) -> float:
     return max(abs(s / bar.stress - 1) for bar, s in zip(BARS, stresses, strict=True))
 
 
-def checked_stresses(stresses: tuple[float, ...], who: str, solver: str) -> tuple[float, ...]:
-    """Return end stresses (MPa) of BARS; SolverFailure beyond TOLERANCE, of `who` ran them."""
+def checked_stresses(
+    stresses: tuple[float, ...], solver_in_words: str, solver: str
+) -> tuple[float, ...]:
+    """Return end stresses (MPa) of BARS; SolverFailure beyond TOLERANCE, of `solver_in_words` ran them."""
     for bar, stress in zip(BARS, stresses, strict=True):
         if not abs(stress / bar.stress - 1) < TOLERANCE:
             problem = f"{bar.model} {bar.direction} bar: {stress:.4g} MPa, not {bar.stress}"
-            raise SolverFailure(f"{who} does not carry the law ({problem})", solver)
+            raise SolverFailure(f"{solver_in_words} does not carry the law ({problem})", solver)
     return stresses
 
 
@@ -78,15 +80,15 @@ def stress_of(model: UniaxialModel, history: History) -> float:
 
 def strip_stresses(solver: Solver) -> tuple[float, ...]:
     """Return the end stresses (MPa) of BARS by a solver's own strips; SolverFailure if none."""
-    found = []
+    stresses = []
     for bar in BARS:
         model = bar_model(bar)
         history = solver.run(model, bar_law(bar.model))
         if len(history.load) != INCREMENTS:
             problem = f"{len(history.load)} frames of a strip of {INCREMENTS} elongations"
             raise SolverFailure(problem, solver.name)
-        found.append(stress_of(model, history))
-    return tuple(found)
+        stresses.append(stress_of(model, history))
+    return tuple(stresses)
 
 
 def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> History:
@@ -98,10 +100,12 @@ def homogeneous_history(model: UniaxialModel, strain: Array, force: Array) -> Hi
     sets = model.mesh.node_sets
     along = 0 if abs(model.warp[1]) > 0.999 else 1
     middle = points[sets["symmetry_x"], 0].mean(), points[sets["top"], 1].mean()
-    grown = np.expm1(strain[:, [1 - along, along]])
-    moved = np.zeros((len(strain), len(points), 3))
-    moved[..., :2] = grown[:, None] * (points[:, :2] - middle)
-    whole = np.vstack([np.zeros(3), strain])
+    elongation = np.expm1(strain[:, [1 - along, along]])
+    displacement = np.zeros((len(strain), len(points), 3))
+    displacement[..., :2] = elongation[:, None] * (points[:, :2] - middle)
+    strain_from_rest = np.vstack([np.zeros(3), strain])
     up = np.outer(force / model.load_factor, [0, 1, 0])
     reactions = {"top": up, model.pulled: -up}
-    return History(force, moved, whole.min(axis=0), whole.max(axis=0), reactions)
+    return History(
+        force, displacement, strain_from_rest.min(axis=0), strain_from_rest.max(axis=0), reactions
+    )

@@ -39,9 +39,9 @@ STRAIN_DATA, STRESS_DATA = "log_strain_1_2_12", "stress_1_2_12_MPa"
 
 def parameters_of(law: HypoelasticLaw, model: Any = None) -> tuple[str, ...]:
     """Return the parameters of derivatives: entries of beta, nu12, and the model's `parameters`."""
-    own = getattr(model, "parameters", ())
+    of_model = getattr(model, "parameters", ())
     remembered = () if law.memory is None else NAMES
-    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *remembered, *own)
+    return (*(f"beta_{i}" for i in range(law.form.size)), "nu12", *remembered, *of_model)
 
 
 def instability(unstable: Sequence[str] | None) -> str:
@@ -119,7 +119,7 @@ class History:
         path, reported = self._steps()
         shape = (len(mesh.quads), 3) if at == "elements" else (len(mesh.quads), 4, 3)
         fabric = stress = np.zeros((int(np.prod(shape[:-1])), 3))
-        every = []
+        stresses = []
         for u in path:
             strain = self._strained(u, at).reshape(-1, 3)
             if self.relaxed:
@@ -128,8 +128,8 @@ class History:
                 )
             else:
                 stress, _, fabric = law.follow(fabric, strain, stress)
-            every.append(stress.reshape(shape))
-        return np.array(every)[reported]
+            stresses.append(stress.reshape(shape))
+        return np.array(stresses)[reported]
 
     def to_meshio(self, frame: int = -1) -> meshio.Mesh:
         """Return the deformed mesh of a frame, with displacement, strain and stress as its data."""
@@ -139,17 +139,17 @@ class History:
     def _strained(self, u: Array, at: Places) -> Array:
         """Return the strain of one displacement (nodes, 3)."""
         mesh = self.mesh
-        rest = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
+        stress_free = np.asarray(getattr(self.model, "stress_free", mesh.points), dtype=float)
         warp = getattr(self.model, "warp", mesh.warp)
         stretch = getattr(self.model, "stretch", None)
         if at not in ("elements", "points"):
             raise InputError(None, "at", f"expected 'elements' or 'points', got {at!r}")
-        sheet = replace(mesh, points=rest)
-        moved = mesh.points + u - rest
+        sheet = replace(mesh, points=stress_free)
+        displacement = mesh.points + u - stress_free
         if at == "elements":
             middle = None if stretch is None else stretch.mean(axis=1)
-            return surface_strain(sheet, moved, warp, middle)
-        return log_strain(sheet, [moved], X if warp is None else warp, stretch)[0]
+            return surface_strain(sheet, displacement, warp, middle)
+        return log_strain(sheet, [displacement], X if warp is None else warp, stretch)[0]
 
     def _steps(self) -> tuple[Array, list[int]]:
         """Return displacements from increment to increment, and the place of each frame there."""
@@ -303,8 +303,10 @@ def check_carries(solver: Solver, law: HypoelasticLaw) -> None:
         )
         raise InputError(None, "form", problem)
     if law.memory is not None and not getattr(solver, "remembers", False):
-        lost = f"with {solver.name} unloading, permanent set and hysteresis are lost"
-        problem = f"a law with a memory is for the solver membrane; {lost}: use the card without it"
+        losses = f"with {solver.name} unloading, permanent set and hysteresis are lost"
+        problem = (
+            f"a law with a memory is for the solver membrane; {losses}: use the card without it"
+        )
         raise InputError(None, "memory", problem)
 
 
@@ -313,8 +315,8 @@ def analysis_of(analyses: Mapping[type, T], model: object, solver: str) -> T:
     for kind in type(model).__mro__:
         if kind in analyses:
             return analyses[kind]
-    known = ", ".join(kind.__name__ for kind in analyses)
-    raise SolverFailure(f"cannot run a {type(model).__name__}, only: {known}", solver)
+    model_names = ", ".join(kind.__name__ for kind in analyses)
+    raise SolverFailure(f"cannot run a {type(model).__name__}, only: {model_names}", solver)
 
 
 # Announcements: messages while something runs. Without a listener they are logged as warnings; a
@@ -332,9 +334,9 @@ class Announcement:
 Listener = Callable[[Announcement], None]
 
 
-def _log(said: Announcement) -> None:
-    if said.words:
-        log.warning("%s", said.words)
+def _log(announcement: Announcement) -> None:
+    if announcement.words:
+        log.warning("%s", announcement.words)
 
 
 _listener: ContextVar[Listener] = ContextVar("listener", default=_log)
@@ -350,9 +352,9 @@ def announce(words: str, of: str = "") -> None:
     pass_on(Announcement(words, of))
 
 
-def pass_on(said: Announcement) -> None:
+def pass_on(announcement: Announcement) -> None:
     """Send the announcement of another process to the listener."""
-    _listener.get()(said)
+    _listener.get()(announcement)
 
 
 def log_strain(

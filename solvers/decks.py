@@ -53,7 +53,7 @@ def render(
         folders.insert(0, folder)
     files = dict(instead or {})
     loaders: list[jinja2.BaseLoader] = [
-        jinja2.FunctionLoader(lambda wanted: _of_file(files, wanted)),
+        jinja2.FunctionLoader(lambda template: _of_file(files, template)),
         jinja2.FileSystemLoader(folders),
     ]
     decks = environment(jinja2.ChoiceLoader(loaders))
@@ -71,10 +71,10 @@ def render(
         raise
     except Exception as error:  # whatever the template's expressions do
         where, line = _place(error, folders[0] / name, [str(file) for file in files.values()])
-        known = ""
+        variables = ""
         if isinstance(error, jinja2.UndefinedError):
-            known = f"; there are: {', '.join(sorted(context))}"
-        raise InputError(where, f"line {line}", f"{error}{known}") from None
+            variables = f"; there are: {', '.join(sorted(context))}"
+        raise InputError(where, f"line {line}", f"{error}{variables}") from None
     _check_inside(text, folders[0] / name)
     return text
 
@@ -89,12 +89,12 @@ def _check_inside(text: str, template: Path) -> None:
         # A keyword's line that ends with a comma is continued in the next one.
         keyword = line.startswith("*") or keyword
         included = _INCLUDE.match(line)
-        found = [included] if included else list(_VALUE.finditer(line)) if keyword else []
+        file_names = [included] if included else list(_VALUE.finditer(line)) if keyword else []
         keyword = keyword and line.endswith(",")
-        for one in found:
-            if _ELSEWHERE.search(one["file"]):
+        for file_name in file_names:
+            if _ELSEWHERE.search(file_name["file"]):
                 problem = (
-                    f"line {number} of the deck names a file elsewhere, {one['file'].strip()!r}; "
+                    f"line {number} of the deck names a file elsewhere, {file_name['file'].strip()!r}; "
                     'put its text into the deck: {% include "NAME" %}'
                 )
                 raise InputError(template, "", problem)
@@ -121,11 +121,11 @@ def _e20(values: float | Sequence[float]) -> str:
     return "".join(f"{number:20.12E}" for number in numbers)
 
 
-def _of_file(files: Mapping[str, Path], wanted: str) -> tuple[str, str, None] | None:
+def _of_file(files: Mapping[str, Path], name: str) -> tuple[str, str, None] | None:
     """Return text, name and None as Jinja2 asks a loader; None where no file is given."""
-    if wanted not in files:
+    if name not in files:
         return None
-    path = files[wanted]
+    path = files[name]
     with reading(path):
         text = content_of(path, LARGEST_WRITTEN).decode("utf-8").replace("\r\n", "\n")
     # The next block begins on a line of its own.
@@ -142,8 +142,8 @@ def _place(error: BaseException, default: Path, files: Sequence[str] = ()) -> tu
 
 def in_words(name: str, version: str, **settings: object) -> str:
     """Return a solver, its version and the settings that matter, in one line."""
-    said = [f"{name} {version}".rstrip(), *(f"{key}={value}" for key, value in settings.items())]
-    return "; ".join(said)
+    parts = [f"{name} {version}".rstrip(), *(f"{key}={value}" for key, value in settings.items())]
+    return "; ".join(parts)
 
 
 def templates_mark(folder: Path | None) -> str:
@@ -156,7 +156,9 @@ def templates_mark(folder: Path | None) -> str:
         name = waiting.pop()
         if name.as_posix() not in marks:
             marks[name.as_posix()] = checksum(folder / name)
-            waiting += [other for other in _included(folder / name) if (folder / other).is_file()]
+            waiting += [
+                included for included in _included(folder / name) if (folder / included).is_file()
+            ]
     return hashlib.sha256(repr(sorted(marks.items())).encode()).hexdigest()
 
 
@@ -202,5 +204,5 @@ def _included(template: Path) -> list[Path]:
         tree = environment(jinja2.BaseLoader()).parse(content.decode("utf-8"))
     except (jinja2.TemplateSyntaxError, UnicodeDecodeError):
         return []
-    found = jinja2.meta.find_referenced_templates(tree)
-    return [Path(name) for name in found if name is not None]
+    names = jinja2.meta.find_referenced_templates(tree)
+    return [Path(name) for name in names if name is not None]

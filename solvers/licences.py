@@ -37,18 +37,18 @@ SOON_S, LATER_S, LOOK_S = 0.02, 1.0, 1.0
 _clients: dict[tuple[str, int], Any] = {}
 
 
-def licensed(solver: base.Solver, name: str, given: Mapping[str, Any]) -> base.Solver:
+def licensed(solver: base.Solver, name: str, options: Mapping[str, Any]) -> base.Solver:
     """Let every run of a solver hold a licence where these are counted; return it; name : of these.
 
     Its runs raise as the solver, and as `held`.
     """
-    settings = licence_settings(name, {k: v for k, v in given.items() if k != SCHEDULER})
+    settings = licence_settings(name, {k: v for k, v in options.items() if k != SCHEDULER})
     if not solver.external or (settings.licences is None and settings.wait <= 0):
         return solver
 
     def with_one(run: Callable[..., T]) -> Callable[..., T]:
         def run_licensed(*given_to_run: Any, **named: Any) -> T:
-            with held(solver.name, settings, given.get(SCHEDULER)):
+            with held(solver.name, settings, options.get(SCHEDULER)):
                 return patiently(lambda: run(*given_to_run, **named), solver.name, settings)
 
         return run_licensed
@@ -93,7 +93,7 @@ def held(name: str, settings: LicenceSettings, scheduler: str | None = None) -> 
 
 def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
     """Run; where a licence was denied, try again in time, after longer and random pauses."""
-    begun = time.monotonic()
+    start = time.monotonic()
     pause = settings.licence_retry
     tries = 1
     while True:
@@ -101,10 +101,10 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
             return run()
         except SolverFailure as failure:
             log = f"{failure.reason}\n{failure.log_tail}".lower()
-            words = (one.lower() in log for one in settings.licence_denied)
+            words = (phrase.lower() in log for phrase in settings.licence_denied)
             if not (isinstance(failure, LicenceDenied) or any(words)):
                 raise
-            left = begun + settings.wait - time.monotonic()
+            left = start + settings.wait - time.monotonic()
             if left <= 0:
                 reason = failure.reason
                 if tries > 1:
@@ -112,13 +112,13 @@ def patiently(run: Callable[[], T], name: str, settings: LicenceSettings) -> T:
                 raise LicenceDenied(
                     reason, name, failure.exit_number, failure.log_tail, failure.scratch
                 ) from None
-            said = failure.reason
+            refusal = failure.reason
             scratch = failure.scratch
         if scratch is not None:
             remove(scratch)  # only that of the last try is kept
         seconds = min(pause * random.uniform(0.5, 1.5), left)  # noqa: S311 (no secret)
         base.announce(
-            f"{name}: {said}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
+            f"{name}: {refusal}; trying again in {seconds:.3g} s, for {left:.0f} s more at most"
         )
         time.sleep(seconds)
         pause = min(GROWTH * pause, MOST * settings.licence_retry)
@@ -218,9 +218,9 @@ def leased(name: str, count: int, address: str, waiting: Callable[[], None]) -> 
         problem = f"the cluster counts another number of them already ({error})"
         raise InputError(None, f"solver.{name}.licences", problem) from None
     except OSError as error:
-        said = BubblefitError(f"{address}: the Dask scheduler leases no licence: {error}")
-        said.exit_code = 4
-        raise said from None
+        failure = BubblefitError(f"{address}: the Dask scheduler leases no licence: {error}")
+        failure.exit_code = 4
+        raise failure from None
     try:
         yield
     finally:

@@ -60,10 +60,10 @@ def grip_pulls(
 def direct(model: UniaxialModel) -> Array | None:
     """Return the pulls when the gauge lies between the grips themselves, along the pull."""
     lower, upper = (3 * node + np.arange(3) for node in model.mesh.node_sets["gauge"])
-    held = np.isin(np.concatenate([lower[[0, 2]], upper]), model.fixed).all()
+    is_gripped = np.isin(np.concatenate([lower[[0, 2]], upper]), model.fixed).all()
     ends = model.mesh.points[model.mesh.node_sets["gauge"]]
     along = ends[0, 0] == ends[1, 0] and ends[0, 1] < ends[1, 1]
-    if held and along and lower[1] in model.driven:
+    if is_gripped and along and lower[1] in model.driven:
         return np.array(model.elongations)
     return None
 
@@ -85,8 +85,8 @@ def corrected(model: UniaxialModel, pulls: Array, opened: Array, solver: str) ->
     pull = np.insert(pulls, 0, 0.0)
     levels = np.array(model.elongations)
     steep = (pull[-1] - pull[-2]) / (gauge[-1] - gauge[-2])
-    inside = spline(np.minimum(levels, gauge[-1]))
-    return _onward(inside + steep * np.maximum(levels - gauge[-1], 0.0))
+    pull_at_levels = spline(np.minimum(levels, gauge[-1]))
+    return _onward(pull_at_levels + steep * np.maximum(levels - gauge[-1], 0.0))
 
 
 def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
@@ -94,8 +94,8 @@ def _over_gauge(opened: Array, values: Array, solver: str) -> Any:
     gauge = np.insert(opened, 0, 0.0)
     if not (np.diff(gauge) > 0).all():
         raise SolverFailure("the gauge gets shorter while the grips move apart", solver)
-    whole = np.concatenate([np.zeros((1, *values.shape[1:])), values])
-    return scipy.interpolate.CubicSpline(gauge, whole)
+    values_from_rest = np.concatenate([np.zeros((1, *values.shape[1:])), values])
+    return scipy.interpolate.CubicSpline(gauge, values_from_rest)
 
 
 def at_elongations(opened: Array, model: UniaxialModel, values: Array, solver: str) -> Array:
@@ -144,8 +144,8 @@ def strip_history(
 
     corners = np.ascontiguousarray(at_levels(u))
     low, high = extremes(log_strain(model.mesh, corners, model.warp))
-    held = (*model.supports, model.pulled)
-    sums = {name: at_levels(forces[:, sets[name]].sum(axis=1)) for name in held}
+    supported_sets = (*model.supports, model.pulled)
+    sums = {name: at_levels(forces[:, sets[name]].sum(axis=1)) for name in supported_sets}
     load = -model.load_factor * sums[model.pulled][:, 1]
     return History(load, corners, low, high, sums, iterations=iterations, path=corners)
 
@@ -165,8 +165,8 @@ def inflated_history(
     """
     sums: dict[str, Array] = {}
     if forces is not None:
-        held = [name for name in model.supports if name in sets]
-        sums = {name: forces[:, sets[name]].sum(axis=1) for name in held}
+        supported_sets = [name for name in model.supports if name in sets]
+        sums = {name: forces[:, sets[name]].sum(axis=1) for name in supported_sets}
     low, high = extremes(log_strain(replace(model.mesh, points=model.stress_free), u))
     path = u + (model.stress_free - model.mesh.points)
     keep = model.reported
@@ -235,14 +235,14 @@ def without_cords(model: CylinderModel | BubbleModel, program: str) -> None:
     if isinstance(model, BubbleModel):
         return
     pumped = model.gas.constant == "pressure"
-    own = {
+    membrane_only = {
         "saddle": model.supports.saddle,
         "collar.spacing": model.collar.spacing,
         "mass_per_area": model.weight,
         "gas.constant": pumped,
     }
-    for key, said in own.items():
-        if said:
+    for key, setting in membrane_only.items():
+        if setting:
             raise InputError(None, key, f"is for the solver membrane, {program}'s deck has none")
 
 
@@ -258,8 +258,8 @@ def may_touch(model: CylinderModel, places: Array) -> tuple[NDArray[np.bool_], N
 def volumes(model: CylinderModel, displacements: Array) -> Array:
     """Return (frames,) mm^3 inside the middle surface of the whole cylinder."""
     mesh = model.mesh
-    inside = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
-    return model.copies * np.array(inside)
+    quarter_volumes = [enclosed_volume(mesh.points + u, mesh.quads) for u in displacements]
+    return model.copies * np.array(quarter_volumes)
 
 
 def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBody:
@@ -277,13 +277,13 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
     return _body(around, across, place)
 
 
-def collar_body(collar: Collar, cylinder: Array, above: float) -> RigidBody:
-    """Return the upper part of the collar on x, z >= 0, `above` (mm) the cylinder's points (n, 3).
+def collar_body(collar: Collar, cylinder: Array, clearance: float) -> RigidBody:
+    """Return the upper part of the collar on x, z >= 0, `clearance` (mm) the cylinder's points (n, 3).
 
     It goes down that far until one of its faces, chords of the ring, meets the cylinder.
     """
     body = _ring(collar)
-    up = above - way_down(body.faces, cylinder)
+    up = clearance - way_down(body.faces, cylinder)
     return replace(body, points=body.points + np.array([0.0, up, 0.0]))
 
 
@@ -291,13 +291,15 @@ def way_down(faces: Array, points: Array) -> float:
     """Return how far (mm) flat faces (n, 4, 3) around z go down to points (m, 3) inside."""
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    least = np.inf
+    smallest_way = np.inf
     for face, n in zip(faces, normal, strict=True):
-        beside = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
+        below_face = (points[:, 2] >= face[:, 2].min()) & (points[:, 2] <= face[:, 2].max())
         # Across its axis the ring is convex: a point beyond no face's plane is inside.
-        if n[1] < 0.0 and beside.any():
-            least = min(least, float(((points[beside] - face.mean(axis=0)) @ n).min() / -n[1]))
-    return least
+        if n[1] < 0.0 and below_face.any():
+            smallest_way = min(
+                smallest_way, float(((points[below_face] - face.mean(axis=0)) @ n).min() / -n[1])
+            )
+    return smallest_way
 
 
 def _ring(collar: Collar) -> RigidBody:

@@ -97,9 +97,9 @@ def run_process(
     about twenty times a second. InputError : it cannot be started. Unwanted : see `unless`. An
     interruption kills the program as well, and where this process is killed outright, a shell does.
     """
-    begun = time.monotonic()
+    start = time.monotonic()
     timed_out = False
-    kept: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
+    inherited: dict[str, Any] = {"pass_fds": _kept_open.get()} if os.name == "posix" else {}
     with log.open("wb") as output, _watched() as watch_group:
         try:
             process = subprocess.Popen(
@@ -110,7 +110,7 @@ def run_process(
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,
-                **kept,
+                **inherited,
             )
         except OSError as error:
             problem = f"cannot be started: {error.strerror}; name another program"
@@ -123,7 +123,7 @@ def run_process(
                     process.wait(POLL_S)
                     break
                 except subprocess.TimeoutExpired:
-                    if timeout is not None and time.monotonic() - begun > timeout:
+                    if timeout is not None and time.monotonic() - start > timeout:
                         timed_out = True
                         break
                 if not GROUPS:
@@ -134,7 +134,7 @@ def run_process(
         finally:
             # Also after a clean end: what a wrapper script left behind must not go on writing.
             _kill(process, tree)
-    return Outcome(process.returncode, timed_out, time.monotonic() - begun)
+    return Outcome(process.returncode, timed_out, time.monotonic() - start)
 
 
 class Watch(Generic[T]):
@@ -185,12 +185,14 @@ def number_rows(path: Path) -> list[list[float]]:
     return [row for row in rows if all(map(math.isfinite, row))]
 
 
-def program_at(path: Path, field: str, what: str) -> Path:
+def program_at(path: Path, field: str, description: str) -> Path:
     """Return the absolute path of a program, as runs are in a scratch folder; InputError: none."""
     if not path.is_file():
-        raise InputError(path, field, f"there is no such file; name the {what} to run")
+        raise InputError(path, field, f"there is no such file; name the {description} to run")
     if not os.access(path, os.X_OK):
-        raise InputError(path, field, f"is not executable; chmod +x it, or name another {what}")
+        raise InputError(
+            path, field, f"is not executable; chmod +x it, or name another {description}"
+        )
     return path.absolute()
 
 
@@ -218,9 +220,9 @@ def _kill(process: subprocess.Popen[bytes], tree: "set[psutil.Process]") -> None
         tree |= _started_by(process.pid)
         with suppress(psutil.Error):
             tree.add(psutil.Process(process.pid))
-        for one in tree:
+        for child in tree:
             with suppress(psutil.Error):
-                one.kill()
+                child.kill()
     process.wait()
 
 
@@ -233,14 +235,14 @@ def _started_by(number: int) -> "set[psutil.Process]":
 @contextmanager
 def _watched() -> Iterator[Callable[[int], None]]:
     """Yield a function that lets a shell kill a process group once this process is killed."""
-    read, held = os.pipe()
+    read, write_end = os.pipe()
     watcher = None
 
     def watch(group: int) -> None:
         # A library may have made SIGPIPE deadly: nothing is written that nobody reads.
         with suppress(OSError):
             if watcher is not None:
-                os.write(held, f"{group}\n".encode())
+                os.write(write_end, f"{group}\n".encode())
 
     try:
         with suppress(OSError):  # no such shell
@@ -255,7 +257,7 @@ def _watched() -> Iterator[Callable[[int], None]]:
         if watcher is not None:
             watcher.kill()
             watcher.wait()
-        os.close(held)
+        os.close(write_end)
 
 
 # Dask
@@ -272,7 +274,7 @@ def connected(address: str) -> Iterator[Any]:
     """Yield a client of the scheduler, Dask's logs silenced; InputError where none answers."""
     distributed = dask()
     loggers = [logging.getLogger(name) for name in LOGGERS]
-    before = [logger.level for logger in loggers]
+    levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
@@ -287,7 +289,7 @@ def connected(address: str) -> Iterator[Any]:
         finally:
             client.close(timeout=ANSWER_S)
     finally:
-        for logger, level in zip(loggers, before, strict=True):
+        for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
 
 

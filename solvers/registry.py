@@ -102,29 +102,31 @@ def solver_settings(path: Path, tables: Mapping[str, Any]) -> dict[str, dict[str
 
     tables : [solver] of the project `path`. Of a plug-in's only keys of licences are checked here.
     """
-    found: dict[str, dict[str, Any]] = {}
+    options: dict[str, dict[str, Any]] = {}
     for name, section in solver_sections().items():
         try:
             settings = section.model_validate(tables.get(name, {}))
         except ValidationError as error:
             raise first_error(path, error, section, f"solver.{name}") from None
-        advice = " or ".join(f"--{one.name}" for one in section.overrides if one.look)
+        advice = " or ".join(
+            f"--{override.name}" for override in section.overrides if override.look
+        )
         advice = advice and f"say it on the command line ({advice}), or "
         check_programs(path, name, tables.get(name, {}), section.started, advice)
-        found[name] = settings.given(path.parent)
-    for name in sorted(tables.keys() - found.keys()):
-        if name not in SOLVERS and name not in (known := solver_names()):
-            problem = f"no solver of this name is installed; there are: {', '.join(known)}"
+        options[name] = settings.given(path.parent)
+    for name in sorted(tables.keys() - options.keys()):
+        if name not in SOLVERS and name not in (names := solver_names()):
+            problem = f"no solver of this name is installed; there are: {', '.join(names)}"
             raise InputError(path, f"solver.{name}", problem)
         if not isinstance(tables[name], Mapping):
             raise InputError(path, f"solver.{name}", "expected a table of the solver's settings")
         check_programs(path, name, tables[name], _started(name))
-        licences, own = split(tables[name])
+        licences, solver_options = split(tables[name])
         if SCHEDULER in licences:  # who answers there can run code here: only the user may name it
             raise InputError(path, f"solver.{name}.{SCHEDULER}", "say --scheduler instead")
         counts = licence_settings(name, licences, path)
-        found[name] = own | counts.model_dump(exclude_unset=True)
-    return found
+        options[name] = solver_options | counts.model_dump(exclude_unset=True)
+    return options
 
 
 def _started(name: str) -> tuple[str, ...]:
@@ -142,23 +144,25 @@ def solver_named(name: str, cache: RunCache | None = None, /, **options: Any) ->
     cache : None: everything is run. InputError : none of that name, a wrong option. SolverFailure :
     a plug-in that does not work; names its distribution.
     """
-    licences, own = split(options)
+    licences, solver_options = split(options)
     if name in SOLVERS:  # a plug-in cannot take the place of one of ours
-        made = SOLVERS[name](**own)
+        solver_alone = SOLVERS[name](**solver_options)
     elif (plug_in := _plug_in_named(name)) is not None:
-        made = _made(plug_in, own)
+        solver_alone = _made(plug_in, solver_options)
     else:
         raise InputError(None, "solver", f"{name!r} is not one of: {', '.join(solver_names())}")
     # The project's settings override the site's.
-    solver = licensed(made, name, {**getattr(made, "site_licences", {}), **licences})
-    return solver if cache is None else with_cache(solver, cache, counted(name, own))
+    solver = licensed(
+        solver_alone, name, {**getattr(solver_alone, "site_licences", {}), **licences}
+    )
+    return solver if cache is None else with_cache(solver, cache, counted(name, solver_options))
 
 
 def counted(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of a solver that may change a result; of a plug-in all but licences."""
-    _, own = split(options)
+    _, solver_options = split(options)
     section = solver_sections().get(name)
-    return dict(own) if section is None else section.counted(own)
+    return dict(solver_options) if section is None else section.counted(solver_options)
 
 
 def usable_solver(
@@ -181,9 +185,9 @@ def usable_solver(
     if solver.external:
         place = (options or {}).get("scratch")
         sweep_left(None if place is None else Path(place))
-        found = checked(name, solver)
-        if not (found.available and found.carries_law):
-            raise SolverFailure(found.advice or "is not usable", name)
+        check = checked(name, solver)
+        if not (check.available and check.carries_law):
+            raise SolverFailure(check.advice or "is not usable", name)
     return solver
 
 
@@ -198,31 +202,33 @@ def checked(name: str, solver: Solver) -> SolverCheck:
 
 def command_line() -> list[Override]:
     """Return every solver's options, each once, with the values of each solver in its help."""
-    found: dict[str, Override] = {}
+    overrides: dict[str, Override] = {}
     values: dict[str, list[str]] = {}
     for name, section in solver_sections().items():
-        for one in section.overrides:
-            found.setdefault(one.name, one)
-            if one.values:
-                values.setdefault(one.name, []).append(f"{one.values} ({name})")
+        for override in section.overrides:
+            overrides.setdefault(override.name, override)
+            if override.values:
+                values.setdefault(override.name, []).append(f"{override.values} ({name})")
     return [
-        replace(one, what=f"{one.what}: {', '.join(values[one.name])}.") if one.values else one
-        for one in found.values()
+        replace(override, what=f"{override.what}: {', '.join(values[override.name])}.")
+        if override.values
+        else override
+        for override in overrides.values()
     ]
 
 
 def overridden(
     name: str,
     options: Mapping[str, Any],
-    given: Mapping[str, Any],
+    command_options: Mapping[str, Any],
     settings: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return the options of the solver `name`, overridden by the command line; InputError.
 
-    given : by the name of an option of `command_line`. settings : each "KEY=VALUE", the value as in
+    command_options : by the name of an option of `command_line`. settings : each "KEY=VALUE", the value as in
     a project file (text needs no quotes); paths are relative to the current folder.
     """
-    mine = {option: value for option, value in given.items() if value is not None}
+    mine = {option: value for option, value in command_options.items() if value is not None}
     for option in mine:
         if option not in options:
             raise InputError(None, f"--{option}", f"means nothing to the solver {name!r}")
@@ -241,8 +247,8 @@ def overridden(
         try:
             mine[key] = section.model_validate({key: mine[key]}).given(Path.cwd())[key]
         except ValidationError as error:
-            found = first_error(None, error, section)
-            raise InputError(None, f"--{ANY} {found.field}", found.problem) from None
+            problem = first_error(None, error, section)
+            raise InputError(None, f"--{ANY} {problem.field}", problem.problem) from None
     return {**options, **mine}
 
 
@@ -250,10 +256,10 @@ def diagnose(**programs: Path | str | None) -> list[Diagnosis]:
     """Diagnose the embedded solver, our others (programs : by option), then every plug-in."""
     ours = [make for make in SOLVERS.values() if isinstance(make, Offer)]
     ours.sort(key=lambda offer: offer.program is not None)  # the embedded ones have no program
-    found = []
+    diagnoses = []
     for offer in ours:
-        found += offer.diagnose(programs.get(offer.program.name) if offer.program else None)
-    return [*found, *(_plug_in(one) for one in plug_ins(GROUP))]
+        diagnoses += offer.diagnose(programs.get(offer.program.name) if offer.program else None)
+    return [*diagnoses, *(_plug_in(plug_in) for plug_in in plug_ins(GROUP))]
 
 
 def _plug_in(plug_in: PlugIn) -> Diagnosis:

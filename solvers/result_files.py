@@ -63,12 +63,12 @@ def last_frame(file: Any, types: Cells) -> meshio.Mesh:
         if not cells or cells[-1][0] != name:
             cells.append((name, []))
         cells[-1][1].append(place if order is None else place[list(order)])
-    found = meshio.Mesh(mesh.points, [(name, np.array(rows)) for name, rows in cells])
+    result = meshio.Mesh(mesh.points, [(name, np.array(rows)) for name, rows in cells])
     for frame in file.frames():
-        found.point_data = dict(frame.fields)
+        result.point_data = dict(frame.fields)
         names = ("time", "step", "increment")
-        found.field_data = {name: np.array([getattr(frame, name)]) for name in names}
-    return found
+        result.field_data = {name: np.array([getattr(frame, name)]) for name in names}
+    return result
 
 
 class _MeshioReader(MetaPathFinder):

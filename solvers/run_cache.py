@@ -122,8 +122,8 @@ class RunCache:
         except FileNotFoundError:
             return None
         except (Damaged, OSError) as error:
-            why = error.strerror if isinstance(error, OSError) else str(error)
-            base.announce(f"{path} is dropped from the cache of runs and run again: {why}")
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            base.announce(f"{path} is dropped from the cache of runs and run again: {reason}")
             with suppress(OSError):
                 path.unlink()
             return None
@@ -162,22 +162,22 @@ class RunCache:
 
     def entries(self) -> list[Entry]:
         """Return every run that is there, the least recently used first."""
-        found = []
+        entries = []
         for path in self._files(SUFFIX):
             with suppress(OSError):  # gone meanwhile
                 about = path.stat()
-                found.append(Entry(path, about.st_size, about.st_mtime))
-        return sorted(found, key=lambda entry: (entry.used, entry.path))
+                entries.append(Entry(path, about.st_size, about.st_mtime))
+        return sorted(entries, key=lambda entry: (entry.used, entry.path))
 
     def prune(self, size: int | None = None, older: float | None = None) -> list[Entry]:
         """Drop the least recently used runs to `size` bytes, those `older` (s) too; OutputError."""
         entries = self.entries()
-        now = time.time()
+        current_time = time.time()
         left = sum(entry.size for entry in entries)
-        gone = []
+        dropped = []
         for entry in entries:
             if (size is not None and left > size) or (
-                older is not None and now - entry.used > older
+                older is not None and current_time - entry.used > older
             ):
                 try:
                     entry.path.unlink(missing_ok=True)
@@ -185,41 +185,41 @@ class RunCache:
                     problem = f"cannot be removed: {error.strerror}"
                     raise OutputError(f"{entry.path}: {problem}") from None
                 left -= entry.size
-                gone.append(entry)
+                dropped.append(entry)
         for path in self._files(CUT):
             with suppress(OSError):
-                if now - path.stat().st_mtime > OLD:
+                if current_time - path.stat().st_mtime > OLD:
                     path.unlink()
         self._held = left
-        return gone
+        return dropped
 
-    def _bound(self, more: int) -> None:
-        """Make room where the runs, `more` bytes of them just written, are beyond the limit."""
+    def _bound(self, added_bytes: int) -> None:
+        """Make room where the runs, `added_bytes` bytes of them just written, are beyond the limit."""
         self._written += 1
         if self._held is None or self._written % LOOK == 0:
             self._held = sum(entry.size for entry in self.entries())
         else:
-            self._held += more
+            self._held += added_bytes
         if self._held > (limit := self.limit):
             with suppress(OutputError):
-                gone = self.prune(int(ROOM * limit))
-                log.info("%d runs dropped from %s", len(gone), self.folder)
+                dropped = self.prune(int(ROOM * limit))
+                log.info("%d runs dropped from %s", len(dropped), self.folder)
 
     def _file(self, key: str) -> Path:
         return self.folder / key[:2] / f"{key}{SUFFIX}"
 
     def _files(self, suffix: str) -> Iterator[Path]:
         # Files that are being written are hidden.
-        wanted = f"[0-9a-f][0-9a-f]/{'.' if suffix == CUT else '[0-9a-f]'}*{suffix}"
-        return self.folder.glob(wanted)
+        pattern = f"[0-9a-f][0-9a-f]/{'.' if suffix == CUT else '[0-9a-f]'}*{suffix}"
+        return self.folder.glob(pattern)
 
 
-def run_cache(said: bool | str | Path = True) -> RunCache | None:
-    """Return the cache in use, None if off; said : by the project, below the environment."""
+def run_cache(setting: bool | str | Path = True) -> RunCache | None:
+    """Return the cache in use, None if off; setting : by the project, below the environment."""
     named = os.environ.get(VARIABLE, "")
-    if said is False or named.lower() == OFF:
+    if setting is False or named.lower() == OFF:
         return None
-    place = named or (str(said) if said is not True else "")
+    place = named or (str(setting) if setting is not True else "")
     return _cache_in(Path(place).expanduser().absolute() if place else cache_folder() / "runs")
 
 
@@ -262,8 +262,8 @@ def to_bytes(history: base.History, key: str, seconds: float) -> bytes:
     }
     content = io.BytesIO()
     np.savez_compressed(content, words=np.array(json.dumps(words)), **arrays)
-    whole = content.getvalue()
-    return TITLE + hashlib.sha256(whole).digest() + whole
+    payload = content.getvalue()
+    return TITLE + hashlib.sha256(payload).digest() + payload
 
 
 def from_bytes(content: bytes, key: str) -> base.History:
@@ -279,20 +279,20 @@ def from_bytes(content: bytes, key: str) -> base.History:
             words = json.loads(str(arrays["words"]))
             if words["key"] != key:
                 raise Damaged("it is of another run")
-            there: dict[str, Any] = {
+            fields: dict[str, Any] = {
                 name: np.array(arrays[name]) for name in arrays.files if name != "words"
             }
         reactions = {
-            name.removeprefix("reactions of "): there.pop(name)
-            for name in list(there)
+            name.removeprefix("reactions of "): fields.pop(name)
+            for name in list(fields)
             if name.startswith("reactions of ")
         }
         return base.History(
-            **there,
+            **fields,
             reactions=reactions,
             iterations=int(words["iterations"]),
             unstable=None if words["unstable"] is None else tuple(words["unstable"]),
-            remarks=tuple(Note(NoteKind(kind), said, of) for kind, said, of in words["remarks"]),
+            remarks=tuple(Note(NoteKind(kind), text, of) for kind, text, of in words["remarks"]),
             early=str(words["early"]),
             seconds=float(words["seconds"]),
             from_cache=True,
@@ -334,14 +334,14 @@ def once(solver: base.Solver, cache: RunCache, options: Mapping[str, Any]) -> ba
         history = None if key is None else cache.read(key)
         if history is not None:
             return history
-        given: dict[str, Any] = {"scratch": scratch, "timeout": timeout}
-        begun = time.perf_counter()
-        ended = run(model, law, **{name: v for name, v in given.items() if v is not None})
-        if key is not None and isinstance(ended, base.History):
-            seconds = time.perf_counter() - begun
-            cache.write(key, ended, seconds)
-            ended = replace(ended, seconds=seconds)
-        return ended
+        optional: dict[str, Any] = {"scratch": scratch, "timeout": timeout}
+        start = time.perf_counter()
+        result = run(model, law, **{name: v for name, v in optional.items() if v is not None})
+        if key is not None and isinstance(result, base.History):
+            seconds = time.perf_counter() - start
+            cache.write(key, result, seconds)
+            result = replace(result, seconds=seconds)
+        return result
 
     solver.run = run_once  # type: ignore[method-assign]
     return solver
@@ -355,8 +355,8 @@ def key_of(
         files = solver.programs if isinstance(solver, base.ProgramSolver) else ()
         program = [program_mark(path) for path in files]
         code = code_mark(type(solver).__module__)
-        own = (solver.name, solver.identity, dict(options), program, code)
-        return digest_of("run", own, model, law)
+        solver_key = (solver.name, solver.identity, dict(options), program, code)
+        return digest_of("run", solver_key, model, law)
     except (TypeError, BubblefitError) as error:  # the run raises the latter again
         log.info("runs of %s are not kept: %s", solver.name, error)
         return None

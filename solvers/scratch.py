@@ -65,11 +65,11 @@ def run_folder(
     try:
         yield folder
     except SolverFailure as failure:
-        kept = put_aside(folder)
-        log.info("failed run kept in %s", kept)
-        tail = failure.log_tail or log_tail(kept / logs)
+        kept_folder = put_aside(folder)
+        log.info("failed run kept in %s", kept_folder)
+        tail = failure.log_tail or log_tail(kept_folder / logs)
         kind = type(failure)
-        raise kind(failure.reason, solver, failure.exit_number, tail, kept) from None
+        raise kind(failure.reason, solver, failure.exit_number, tail, kept_folder) from None
     except BaseException:
         remove(folder)  # interrupted, or never begun: there is nothing to inspect
         raise
@@ -101,23 +101,23 @@ def default_parent() -> Path:
 def put_aside(folder: Path) -> Path:
     """Move a failed run out of memory onto the disk, unless that is full; return its place."""
     lock = _under_way.pop(folder, None)
-    own = None
-    kept = folder
+    claim_file = None
+    kept_folder = folder
     if folder.parent == MEMORY:
         target = Path(tempfile.gettempdir()) / folder.name
         try:
             target.mkdir(mode=0o700)
-            own = claim(target)  # a copy that is cut off can be swept
+            claim_file = claim(target)  # a copy that is cut off can be swept
             leave = shutil.ignore_patterns(OWNER)
             shutil.copytree(folder, target, ignore=leave, dirs_exist_ok=True)
-            kept = target
+            kept_folder = target
         except (OSError, shutil.Error):
             clear(target)
-        release(target, own)
-        if kept is target:
+        release(target, claim_file)
+        if kept_folder is target:
             clear(folder)
     release(folder, lock)
-    return kept
+    return kept_folder
 
 
 def remove(folder: Path) -> None:
@@ -158,11 +158,11 @@ def _undisturbed() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    before = {n: signal.signal(n, lambda number, _: came.append(number)) for n in _INTERRUPTIONS}
+    handlers = {n: signal.signal(n, lambda number, _: came.append(number)) for n in _INTERRUPTIONS}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             # None: whoever set it was no Python, and cannot be set again.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
         if came:
@@ -205,16 +205,16 @@ def clear(folder: Path) -> None:
 
 def sweep(places: Iterable[Path]) -> list[Path]:
     """Remove and return the folders that dead processes of this user and machine left there."""
-    gone = []
+    abandoned = []
     for place in dict.fromkeys(places):
         with suppress(OSError):
             for folder in place.glob(PATTERN):
                 if _left(folder):
                     clear(folder)
-                    gone.append(folder)
-    for folder in gone:
+                    abandoned.append(folder)
+    for folder in abandoned:
         log.info("%s was left by a process that is gone, and is removed", folder)
-    return gone
+    return abandoned
 
 
 def _left(folder: Path) -> bool:
@@ -235,14 +235,14 @@ def _left(folder: Path) -> bool:
         with suppress(OSError):  # no locks here
             if not filelock.lock_descriptor(number, blocking=False):
                 return False
-        said = os.read(number, 1000).decode(errors="replace").split("\n")
+        owner = os.read(number, 1000).decode(errors="replace").split("\n")
     finally:
         os.close(number)
-    if len(said) != len(_self()):
+    if len(owner) != len(_self()):
         return old  # cut off as it was written
-    (machine, boot, process, started), own = said, _self()
-    if boot != own[1]:
-        return machine == own[0]  # before a restart; or of another machine
+    (machine, boot, process, started), this_process = owner, _self()
+    if boot != this_process[1]:
+        return machine == this_process[0]  # before a restart; or of another machine
     return not (process.isdigit() and started == _started(int(process)))
 
 

@@ -53,9 +53,9 @@ class SolverSettings(Section):
     @classmethod
     def counted(cls, options: Mapping[str, Any]) -> dict[str, Any]:
         """Return the options that may change a result and are no files."""
-        looks = (one.name for one in cls.overrides if one.look)
-        others = {*cls.uncounted, *cls.paths, *cls.programs, *looks}
-        return {key: value for key, value in options.items() if key not in others}
+        looks = (override.name for override in cls.overrides if override.look)
+        uncounted = {*cls.uncounted, *cls.paths, *cls.programs, *looks}
+        return {key: value for key, value in options.items() if key not in uncounted}
 
     def given(self, folder: Path) -> dict[str, Any]:
         """Return the solver's options; paths are relative to `folder`, that of the project."""
@@ -79,17 +79,19 @@ def check_programs(
     def known(value: Any) -> bool:
         return isinstance(value, str) and bool(_KNOWN.fullmatch(value))
 
-    said = [key for key in started if key in table and not known(table[key])]
+    program_keys = [key for key in started if key in table and not known(table[key])]
     allowed = [
         Path(f).expanduser() for f in os.environ.get(PROGRAMS_FROM, "").split(os.pathsep) if f
     ]
-    if not said or any(path.resolve().is_relative_to(folder.resolve()) for folder in allowed):
+    if not program_keys or any(
+        path.resolve().is_relative_to(folder.resolve()) for folder in allowed
+    ):
         return
     problem = (
         "says what is run, and a project may come from somebody else; "
         f"{advice}{PROGRAMS_FROM}={path.absolute().parent} lets the projects there say it"
     )
-    raise InputError(path, f"solver.{solver}.{said[0]}", problem)
+    raise InputError(path, f"solver.{solver}.{program_keys[0]}", problem)
 
 
 class LicenceSettings(Section):
@@ -123,21 +125,23 @@ class ExternalSettings(SolverSettings, LicenceSettings):
 
 def split(options: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the options of licences (None: not given), and the others."""
-    known = (*KEYS, SCHEDULER)
-    own = {key: options[key] for key in known if options.get(key) is not None}
-    return own, {key: value for key, value in options.items() if key not in known}
+    licence_keys = (*KEYS, SCHEDULER)
+    licence_options = {key: options[key] for key in licence_keys if options.get(key) is not None}
+    return licence_options, {
+        key: value for key, value in options.items() if key not in licence_keys
+    }
 
 
 def licence_settings(
-    name: str, given: Mapping[str, Any], path: Path | None = None
+    name: str, options: Mapping[str, Any], path: Path | None = None
 ) -> LicenceSettings:
     """Return checked settings of solver `name`, folders beside the project `path`; InputError."""
-    plain = {key: str(v) if isinstance(v, Path) else v for key, v in given.items()}
+    plain = {key: str(v) if isinstance(v, Path) else v for key, v in options.items()}
     try:
         settings = LicenceSettings.model_validate(plain)
     except ValidationError as error:
-        found = first_error(path or Path(), error, LicenceSettings)
-        raise InputError(path, f"solver.{name}.{found.field}", found.problem) from None
+        problem = first_error(path or Path(), error, LicenceSettings)
+        raise InputError(path, f"solver.{name}.{problem.field}", problem.problem) from None
     if settings.licence_folder is not None and path is not None:
         folder = str(beside(path.parent, settings.licence_folder))
         settings = settings.model_copy(update={"licence_folder": folder})
@@ -165,10 +169,10 @@ class Offer:
     @property
     def program(self) -> Override | None:
         """Return the option that names its program, where it has one."""
-        return next((one for one in self.settings.overrides if one.look), None)
+        return next((override for override in self.settings.overrides if override.look), None)
 
     def diagnose(self, named: Path | str | None = None) -> list[Diagnosis]:
         """Diagnose every installation of it on this machine, each on the bars."""
         module = importlib.import_module(f"{self.package}.solver")
-        found: list[Diagnosis] = module.diagnose(named)
-        return found
+        diagnoses: list[Diagnosis] = module.diagnose(named)
+        return diagnoses

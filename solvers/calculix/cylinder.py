@@ -105,10 +105,10 @@ def solid_mesh(model: CylinderModel) -> SolidMesh:
     base = np.concatenate([inner[quads], outer[quads]], axis=1)
     upon = np.concatenate([outer[quads[seam]], last[quads[seam]]], axis=1)
     elements = np.concatenate([base, upon])
-    outside = numbers.copy()
-    outside[seam] = len(quads) + np.arange(len(seam))
+    outer_nodes = numbers.copy()
+    outer_nodes[seam] = len(quads) + np.arange(len(seam))
     tube = np.setdiff1d(np.arange(len(elements)), caps)
-    sets = {"tube": tube, "caps": caps, "inside": numbers, "outside": outside}
+    sets = {"tube": tube, "caps": caps, "inside": numbers, "outside": outer_nodes}
     through = np.stack([inner, outer, last])
     node_sets = {
         name: np.unique(through[:, nodes][through[:, nodes] >= 0])

@@ -40,20 +40,20 @@ def shell_mesh(mesh: Mesh, element: str) -> ShellMesh:
         return ShellMesh(points, quads, mesh.node_sets, len(points))
     # Edge k of a quad joins corners k and k + 1: the order of S8R's midsides.
     ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2), axis=2)
-    edges, which, used = np.unique(
+    edges, edge_of, used = np.unique(
         ends.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
     )
     midsides = points[edges].mean(axis=1)
     border = used == 1
     sets = {}
     for name, nodes in mesh.node_sets.items():
-        inside = border & np.isin(edges, nodes).all(axis=1)
-        sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(inside)])
+        is_in_set = border & np.isin(edges, nodes).all(axis=1)
+        sets[name] = np.concatenate([nodes, len(points) + np.flatnonzero(is_in_set)])
         if name == "rim":
             form = rim_form(points[nodes, :2])
-            own = np.flatnonzero(inside)
-            midsides[own, :2] /= rim_share(form, midsides[own, :2])[:, None]
-    elements = np.concatenate([quads, len(points) + which.reshape(quads.shape)], axis=1)
+            midside_rows = np.flatnonzero(is_in_set)
+            midsides[midside_rows, :2] /= rim_share(form, midsides[midside_rows, :2])[:, None]
+    elements = np.concatenate([quads, len(points) + edge_of.reshape(quads.shape)], axis=1)
     return ShellMesh(np.concatenate([points, midsides]), elements, sets, len(points))
 
 
@@ -82,7 +82,11 @@ def deck_files(
     elements = (mesh.elements + 1).tolist()
     listed = {"element": element, "points": nodes, "elements": elements}
     for key, sets in (("node_sets", mesh.node_sets), ("element_sets", element_sets)):
-        listed[key] = {n.upper(): (own + 1).tolist() for n, own in sets.items() if len(own)}
+        listed[key] = {
+            n.upper(): (folder_of_mesh + 1).tolist()
+            for n, folder_of_mesh in sets.items()
+            if len(folder_of_mesh)
+        }
     kind, own_mesh = ("solids", "solids.inp.j2") if element_sets else ("shells", "mesh.inp.j2")
     common = {
         "version": __version__,
@@ -97,10 +101,10 @@ def deck_files(
         "time_incrementation": TIME_INCREMENTATION,
     }
     # By our template where the user's decks do not have that of the mesh too.
-    own = folder if folder is not None and (folder / own_mesh).is_file() else None
+    folder_of_mesh = folder if folder is not None and (folder / own_mesh).is_file() else None
     return {
         "job.inp": render("calculix", deck, {**common, **context}, folder),
-        MESH_FILE: render("calculix", own_mesh, listed, own),
+        MESH_FILE: render("calculix", own_mesh, listed, folder_of_mesh),
     }
 
 
@@ -175,10 +179,10 @@ def _shape(x: Array, nodes: int) -> tuple[Array, Array]:
         rise[along, k] = -x[along] * (1 + sign * x[across])
         rise[across, k] = 0.5 * sign * (1 - x[along] ** 2)
     # A midside takes half from each of the corners beside it.
-    beside = 0.5 * (np.eye(4) + np.roll(np.eye(4), 1, axis=0))  # corner x midside
+    between = 0.5 * (np.eye(4) + np.roll(np.eye(4), 1, axis=0))  # corner x midside
     return (
-        np.concatenate([values - beside @ middle, middle]),
-        np.concatenate([slopes - rise @ beside.T, rise], axis=1),
+        np.concatenate([values - between @ middle, middle]),
+        np.concatenate([slopes - rise @ between.T, rise], axis=1),
     )
 
 
@@ -213,11 +217,11 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
     times = [0.0]
     places = [np.zeros_like(back)]
     for i in range(len(model.increments)):
-        moved = back.copy()
+        displaced = back.copy()
         if model.rim_motion is not None:
-            moved += _with_midsides(shells, model, model.rim_motion[i])
+            displaced += _with_midsides(shells, model, model.rim_motion[i])
         times += [i + FIRST_OF_STEP, i + 1.0]
-        places += [places[-1], moved]
+        places += [places[-1], displaced]
     return [
         {
             "node": int(node) + 1,
@@ -231,12 +235,14 @@ def rim_paths(shells: ShellMesh, model: BubbleModel) -> list[dict[str, object]]:
 
 def _with_midsides(shells: ShellMesh, model: BubbleModel, motion: Array) -> Array:
     """Return (nodes, 3) mm: a midside of the rim moves as the middle of its two ends does."""
-    moved = np.zeros_like(shells.points)
-    moved[model.mesh.node_sets["rim"]] = motion
+    displacement = np.zeros_like(shells.points)
+    displacement[model.mesh.node_sets["rim"]] = motion
     if shells.elements.shape[1] == 8:
         ends = shells.elements[:, :4]
-        moved[shells.elements[:, 4:]] = 0.5 * (moved[ends] + moved[np.roll(ends, -1, axis=1)])
-    return moved
+        displacement[shells.elements[:, 4:]] = 0.5 * (
+            displacement[ends] + displacement[np.roll(ends, -1, axis=1)]
+        )
+    return displacement
 
 
 def tilt_remarks(shells: ShellMesh) -> tuple[Note, ...]:

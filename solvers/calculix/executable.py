@@ -62,15 +62,15 @@ def find_ccx(named: Path | str | None = None) -> Executable:
 
 def every_ccx(named: Path | str | None = None) -> list[Executable]:
     """Return all there are, each once, in the order in which `find_ccx` prefers them."""
-    seen: set[Path] = set()
-    found = []
+    resolved_paths: set[Path] = set()
+    executables = []
     for path, origin in _places(named):
         real = path.resolve()
-        if real in seen:
+        if real in resolved_paths:
             continue
-        seen.add(real)
-        found.append(Executable(path, version_of(path), carries_external(path), origin))
-    return found
+        resolved_paths.add(real)
+        executables.append(Executable(path, version_of(path), carries_external(path), origin))
+    return executables
 
 
 def carries_external(path: Path) -> bool | None:
@@ -87,12 +87,12 @@ def carries_external(path: Path) -> bool | None:
 def version_of(path: Path) -> str:
     """Return what `ccx -v` says, "?" when it says nothing of the kind."""
     with suppress(OSError, subprocess.SubprocessError):
-        done = subprocess.run(
+        process = subprocess.run(
             [path, "-v"], capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
         )
-        said = re.search(rb"Version\s+(\S+)", done.stdout)
-        if said:
-            return said[1].decode(errors="replace")
+        version = re.search(rb"Version\s+(\S+)", process.stdout)
+        if version:
+            return version[1].decode(errors="replace")
     return "?"
 
 
@@ -118,10 +118,10 @@ def _places(named: Path | str | None) -> Iterator[tuple[Path, str]]:
 
 def _program(path: Path | str, field: str) -> Path:
     """Return the path of a program that somebody named; a bare name is looked up on the PATH."""
-    given = Path(os.path.expanduser(path))
-    if os.sep not in str(path) and (found := shutil.which(given)):
-        return Path(found)
-    return program_at(given, field, "ccx")
+    program = Path(os.path.expanduser(path))
+    if os.sep not in str(path) and (on_path := shutil.which(program)):
+        return Path(on_path)
+    return program_at(program, field, "ccx")
 
 
 def _runs(path: Path) -> bool:
@@ -146,8 +146,12 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
     """Return one line on why a run did not end well; None when it says that it did."""
     log = folder / f"{job}.log"
     text = log_tail(log, 400)
-    done = increments(folder / f"{job}.sta")
-    reached = f"after step {done[-1].step}, increment {done[-1].increment}" if done else "at once"
+    finished = increments(folder / f"{job}.sta")
+    reached = (
+        f"after step {finished[-1].step}, increment {finished[-1].increment}"
+        if finished
+        else "at once"
+    )
     if outcome.timed_out:
         return f"did not end within {timeout:g} s: killed {reached}"
     full = disk_full(folder, text.splitlines(), outcome)
@@ -160,7 +164,11 @@ def reason(folder: Path, job: str, outcome: Outcome, timeout: float | None) -> s
         where = f" in element {jacobian[1]}" if jacobian[1] else ""
         return f"negative Jacobian{where} {reached}"
     if _TOO_SMALL.search(text):
-        at = f"step {done[-1].step}, increment {done[-1].increment + 1}" if done else "increment 1"
+        at = (
+            f"step {finished[-1].step}, increment {finished[-1].increment + 1}"
+            if finished
+            else "increment 1"
+        )
         return f"did not converge at {at}: the increments became too small or too many"
     error = _ERROR.search(text)
     if error:

@@ -51,13 +51,13 @@ class FrdFile:
         self.mesh = self._header()
         self._first = self._at
 
-    def frames(self, ended: bool = True) -> Iterator[ResultFrame]:
-        """Yield every increment in order; `ended`: with its mark; if not, all whole results."""
+    def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
+        """Yield every increment in order; `is_complete`: with its mark; if not, all whole results."""
         self._at = self._first
         self._held = 0
         frame: ResultFrame | None = None
         step = increment = 0
-        while ended or self._at < len(self._data):
+        while is_complete or self._at < len(self._data):
             line = self._line()
             if line.startswith("9999", 1):
                 break
@@ -115,16 +115,16 @@ class FrdFile:
             raise self._wrong(f"{name} of {components} components")
         numbers, values = self._rows(count, components, flag)
         place = np.searchsorted(self.mesh.numbers, numbers)
-        known = place < len(self.mesh.numbers)
-        if not known.all() or (self.mesh.numbers[place] != numbers).any():
+        is_node = place < len(self.mesh.numbers)
+        if not is_node.all() or (self.mesh.numbers[place] != numbers).any():
             raise self._wrong(f"{name} at a node that the mesh does not have")
         # Results at few nodes are padded: so much is no result but a header that says it is.
         self._held += 8 * len(self.mesh.numbers) * max(components, 1)
         if self._held > max(ROOM, 100 * len(self._data)):
             raise self._wrong(f"{name} of {components} components is more than the file can hold")
-        whole = np.full((len(self.mesh.numbers), components), np.nan)
-        whole[place] = values
-        frame.fields[name] = whole
+        rows = np.full((len(self.mesh.numbers), components), np.nan)
+        rows[place] = values
+        frame.fields[name] = rows
 
     def _rows(self, count: int, width: int, flag: int) -> tuple[NDArray[np.int64], Array]:
         """Return node numbers (count,) and values (count, width) of one block."""
@@ -163,7 +163,7 @@ class FrdFile:
             raise self._wrong(str(error)) from None
 
     def _elements(self, count: int, flag: int) -> list[tuple[int, NDArray[np.int64]]]:
-        found = []
+        blocks = []
         for _ in range(count):
             if flag in (FLOAT, DOUBLE):
                 kind = int(np.frombuffer(self._take(16), "<i4")[1])
@@ -176,10 +176,10 @@ class FrdFile:
                     text += self._line()[3:]
                 places = range(0, digits * self._nodes(kind), digits)
                 nodes = np.array([self._int(text[i : i + digits]) for i in places])
-            found.append((kind, nodes))
+            blocks.append((kind, nodes))
         if flag not in (FLOAT, DOUBLE):
             self._end_of_block()
-        return found
+        return blocks
 
     def _nodes(self, kind: int) -> int:
         if kind not in NODES:

@@ -84,8 +84,8 @@ def constants(
     """
     normal_modulus = max(float(law.E1(0.0)), float(law.E2(0.0)), LEAST)
     transverse_shear = max(float(law.G12(0.0)), LEAST)
-    whole = -float(whole_until) if whole_until else float(whole_times)
-    shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), whole)
+    cylinder_mark = -float(whole_until) if whole_until else float(whole_times)
+    shape = (normal_modulus, transverse_shear, float(angle), float(normal_axis), cylinder_mark)
     moduli = (float(law_number(law)), sum(piece_constants(law, coupled=True)[:3]))
     return (law.nu12, law.area_power, *shape, *moduli)
 
@@ -94,13 +94,13 @@ def compiler() -> list[str]:
     """Return the C compiler as a command: $CC, else cc or gcc; SolverFailure: there is none."""
     named = shlex.split(os.environ.get("CC", ""))
     for command in [named] if named else [["cc"], ["gcc"]]:
-        found = shutil.which(command[0])
-        if found is not None:
-            return [found, *command[1:]]
-    wanted = f"the C compiler {named[0]!r} that CC names" if named else "a C compiler (cc)"
+        executable = shutil.which(command[0])
+        if executable is not None:
+            return [executable, *command[1:]]
+    description = f"the C compiler {named[0]!r} that CC names" if named else "a C compiler (cc)"
     advice = "install gcc, or name a compiler in the environment variable CC"
     raise SolverFailure(
-        f"the material library needs {wanted}, which is not there; {advice}", "calculix"
+        f"the material library needs {description}, which is not there; {advice}", "calculix"
     )
 
 
@@ -131,11 +131,11 @@ def material_library(cache: Path | None = None) -> Path:
 
 
 def _compile(command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, errors="replace")
-    if done.returncode != 0:
-        tail = "\n".join((done.stderr or done.stdout).splitlines()[-25:])
+    process = subprocess.run(command, capture_output=True, text=True, errors="replace")
+    if process.returncode != 0:
+        tail = "\n".join((process.stderr or process.stdout).splitlines()[-25:])
         problem = f"{command[0]} does not compile the material library {SOURCE.name}"
-        raise SolverFailure(problem, "calculix", done.returncode, tail)
+        raise SolverFailure(problem, "calculix", process.returncode, tail)
 
 
 def calculix(card: MaterialCard, options: NoOptions) -> Export:

@@ -68,7 +68,7 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
         if (file.mesh.numbers[place] != np.arange(1, nodes + 1)).any():
             raise InputError(path, "nodes", f"are not the deck's {nodes}")
         frames = {round(f.time): f for f in file.frames() if abs(f.time - round(f.time)) < NEAR}
-        found = []
+        fields = []
         for step in range(1, count + 1):
             for name in ("DISP", "FORC"):
                 values = frames[step].fields.get(name) if step in frames else None
@@ -76,11 +76,11 @@ def whole_times(path: Path, count: int, nodes: int) -> tuple[Array, Array]:
                     at = f"step {step} of {count}"
                     problem = f"holds no {name} at every node"
                     raise InputError(path, at, problem)
-                found.append(values[place])
+                fields.append(values[place])
     except InputError as error:
         raise SolverFailure(f"no usable results: {error}", "calculix") from None
-    whole = np.array(found).reshape(count, 2, nodes, 3)
-    return whole[:, 0], whole[:, 1]
+    displacement = np.array(fields).reshape(count, 2, nodes, 3)
+    return displacement[:, 0], displacement[:, 1]
 
 
 def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: Run) -> History:
@@ -91,8 +91,8 @@ def analyse_bubble(model: BubbleModel, law: HypoelasticLaw, setup: Setup, run: R
     sheet = without_stress(shells, model)
 
     def history(frd: Path, iterations: int) -> History:
-        found = bubble_history(frd, model, sheet, iterations)
-        return replace(found, remarks=(*found.remarks, *tilt_remarks(sheet)))
+        inflation = bubble_history(frd, model, sheet, iterations)
+        return replace(inflation, remarks=(*inflation.remarks, *tilt_remarks(sheet)))
 
     return run(files, history)
 

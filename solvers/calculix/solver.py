@@ -102,11 +102,11 @@ class CalculixSolver:
     def check(self) -> SolverCheck:
         """Return whether there is a ccx that can load the law; its version."""
         try:
-            found = self.executable()
+            executable = self.executable()
         except SolverFailure as failure:
             return SolverCheck(self.name, False, "", False, failure.reason)
-        carries = found.external is not False
-        return SolverCheck(self.name, True, found.version, carries, "" if carries else ADVICE)
+        carries = executable.external is not False
+        return SolverCheck(self.name, True, executable.version, carries, "" if carries else ADVICE)
 
     def executable(self) -> Executable:
         """Return the ccx that runs, looked for once."""
@@ -154,8 +154,8 @@ class CalculixSolver:
             command: list[str | Path] = [program, "-i", JOB]
             outcome = run_process(command, folder, log_file, timeout, environment, watch)
             problem = reason(folder, JOB, outcome, timeout)
-            done = increments(sta)
-            iterations = sum(i.iterations for i in done)
+            finished = increments(sta)
+            iterations = sum(i.iterations for i in finished)
             if problem is None:
                 return read(frd, iterations)
             log.info("stopped early: %s", problem)
@@ -163,7 +163,7 @@ class CalculixSolver:
             if rescue is None or not collapsed(folder, JOB, outcome):
                 raise failure
             try:
-                return rescue(frd, iterations, {(i.step, i.increment) for i in done}, problem)
+                return rescue(frd, iterations, {(i.step, i.increment) for i in finished}, problem)
             except SolverFailure:
                 # Why it stopped says more than what its results then lack.
                 raise failure from None
@@ -202,8 +202,8 @@ def _tried(ccx: Executable) -> Diagnosis:
         advice = f"cannot load material libraries; {ADVICE}"
     else:
         try:
-            found = strip_stresses(CalculixSolver(ccx.path, timeout=SECONDS))
-            stresses = checked_stresses(found, str(ccx.path), "calculix")
+            bar_stresses = strip_stresses(CalculixSolver(ccx.path, timeout=SECONDS))
+            stresses = checked_stresses(bar_stresses, str(ccx.path), "calculix")
             usable = True
             off = difference(stresses)
         except BubblefitError as error:

@@ -75,8 +75,14 @@ def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings)
     warp = WARP if model.mesh.warp is None else model.mesh.warp
     fabric = fabric_context(model.mesh, warp, model.thickness)
     sets = {name: dofs for name, dofs in model.supports.items() if name in model.mesh.node_sets}
-    held = supports(sets, settings.element)
-    cases = [("inflation", len(model.increments), [*(one["name"] for one in held), "pressure"])]
+    supported = supports(sets, settings.element)
+    cases = [
+        (
+            "inflation",
+            len(model.increments),
+            [*(condition["name"] for condition in supported), "pressure"],
+        )
+    ]
     tables = [time_table(1, "load", (0.0, *model.increments))]
     named = node_sets(model.mesh, list(sets))
     pressure = pressure_context(settings)
@@ -89,7 +95,7 @@ def bubble_deck(model: BubbleModel, law: HypoelasticLaw, settings: MarcSettings)
         named,
         cases,
         tables,
-        held,
+        supported,
         pressure=pressure,
     )
 
@@ -134,30 +140,30 @@ def strip_deck(
     fabric = fabric_context(mesh, model.warp, model.thickness)
     # In its plane a strip neither bends nor twists.
     flat = (2,) if settings.element == MEMBRANE else (2, 3, 4, 5)
-    held = [*supports(model.supports, MEMBRANE), fixed("flat", FLAT, flat)]
+    supported = [*supports(model.supports, MEMBRANE), fixed("flat", FLAT, flat)]
     pull = fixed("pull", model.pulled.lower(), (1,), (-1.0,), table=1)
     sets = node_sets(mesh, list(dict.fromkeys([*model.supports, model.pulled])))
     sets.append(named_set("node", FLAT, np.arange(len(mesh.points))))
-    cases = [("pull", len(pulls), [*(one["name"] for one in held), "pull"])]
+    cases = [("pull", len(pulls), [*(condition["name"] for condition in supported), "pull"])]
     tables = [time_table(1, "load", (0.0, *pulls.tolist()))]
-    deck = "uniaxial.dat.j2", "Strip", settings, law, fabric, sets, cases, tables, held
-    return deck_text(*deck, fixed=[*held, pull])
+    deck = "uniaxial.dat.j2", "Strip", settings, law, fabric, sets, cases, tables, supported
+    return deck_text(*deck, fixed=[*supported, pull])
 
 
 def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
     """Return vectors by name at times 1 to `count`, (nodes, components); SolverFailure: not all."""
     try:
-        found = by_time(path, mesh)
+        frames = by_time(path, mesh)
         for time in range(1, count + 1):
-            if time not in found:
+            if time not in frames:
                 raise InputError(path, f"time {time} of {count}", f"holds no {MOVED} of x, y and z")
     except InputError as error:
         raise SolverFailure(f"no usable results: {error}", "marc") from None
-    return [found[time] for time in range(1, count + 1)]
+    return [frames[time] for time in range(1, count + 1)]
 
 
-def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, Array]]:
-    """Return vectors by name at whole times, `ended` as `T19File.frames`; InputError: damaged."""
+def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
+    """Return vectors by name at whole times, `is_complete` as `T19File.frames`; InputError: damaged."""
     file = T19File(path)
     nodes = len(mesh.points)
     if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):
@@ -165,13 +171,17 @@ def by_time(path: Path, mesh: Mesh, ended: bool = True) -> dict[int, dict[str, A
     size = float(np.abs(mesh.points).max())
     if np.abs(file.mesh.points - mesh.points).max() > NEAR_PLACE * size:
         raise InputError(path, "nodes", "are not where the deck has them: of another job?")
-    found: dict[int, dict[str, Array]] = {}
-    for frame in file.frames(ended):
+    frames: dict[int, dict[str, Array]] = {}
+    for frame in file.frames(is_complete):
         time = round(frame.time)
-        moved = frame.fields.get(MOVED)
-        if abs(frame.time - time) < NEAR_TIME and moved is not None and moved.shape[1] >= 3:
-            found[time] = frame.fields
-    return found
+        displacement = frame.fields.get(MOVED)
+        if (
+            abs(frame.time - time) < NEAR_TIME
+            and displacement is not None
+            and displacement.shape[1] >= 3
+        ):
+            frames[time] = frame.fields
+    return frames
 
 
 def displacements(frames: Sequence[Mapping[str, Array]]) -> Array:
@@ -192,8 +202,10 @@ def bubble_history(path: Path, model: BubbleModel, iterations: int) -> History:
     forces = reactions(frames)
     sets = model.mesh.node_sets
     remarks = () if forces is not None else (Note(NO_REACTIONS, NO_FORCES),)
-    given = None if forces is None else forces[model.reported]
-    return inflated_history(model, displacements(frames), given, sets, iterations, remarks)
+    reported_forces = None if forces is None else forces[model.reported]
+    return inflated_history(
+        model, displacements(frames), reported_forces, sets, iterations, remarks
+    )
 
 
 # The inflated cylinder: inflation alone, and with bending
@@ -211,8 +223,10 @@ UP = [0.0, 1.0, 0.0]
 def contact_bodies(model: CylinderModel, inflated: Array) -> list[dict[str, Any]]:
     """Return support and collar, patches (n, 12) towards the cylinder; InputError: it is whole."""
     mesh = model.mesh
-    found = bodies(model, mesh.points + inflated, mesh.node_sets["support_bottom"], "Marc's deck")
-    named = zip(("support", "collar"), (SUPPORT_PATH, COLLAR_PATH), found, strict=True)
+    rigid_bodies = bodies(
+        model, mesh.points + inflated, mesh.node_sets["support_bottom"], "Marc's deck"
+    )
+    named = zip(("support", "collar"), (SUPPORT_PATH, COLLAR_PATH), rigid_bodies, strict=True)
     return [
         {"name": n, "path": path, "direction": UP, "patches": body.faces.reshape(-1, 12).tolist()}
         for n, path, body in named
@@ -248,8 +262,8 @@ def cylinder_deck(
     steps = len(model.increments)
     fabric = fabric_context(mesh, np.asarray(mesh.warp), model.thickness)
     guided = supports(model.guides, settings.element)
-    names = [one["name"] for one in guided]
-    held = [*guided, fixed("hold", HELD, (1,))]
+    names = [condition["name"] for condition in guided]
+    supported = [*guided, fixed("hold", HELD, (1,))]
     load = [0.0, *model.inflation]
     tables = []
     bending = dict[str, Any]()
@@ -271,7 +285,7 @@ def cylinder_deck(
         tables.append(time_table(COLLAR_PATH, "collar_path", collar))
     tables.insert(0, time_table(1, "load", load))
     sets = node_sets(mesh, [*model.guides, HELD])
-    deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, held
+    deck = "cylinder.dat.j2", "Cylinder", settings, law, fabric, sets, cases, tables, supported
     return deck_text(*deck, pressure=pressure_context(settings), **bending)
 
 
@@ -287,33 +301,33 @@ def inflated(path: Path, model: CylinderModel) -> Array:
 
 
 def cylinder_history(
-    path: Path, model: CylinderModel, iterations: int, ended: bool = True
+    path: Path, model: CylinderModel, iterations: int, is_complete: bool = True
 ) -> History:
     """Return the inflated cylinder, then every reported deflection; `load` of the collar in N.
 
-    The cavity's pressure is that of a constant mass in the volume found. ended : if not, the
+    The cavity's pressure is that of a constant mass in the volume found. is_complete : if not, the
     history ends with the last whole increment. SolverFailure: nothing usable, or not to the end.
     """
     filled = len(model.inflation)
-    wanted = {filled: 0.0} | {
+    expected_times = {filled: 0.0} | {
         filled + APPROACH + 1 + int(i): d
         for i, d in zip(model.reported, model.deflections, strict=True)
     }
     try:
-        found = by_time(path, model.mesh, ended)
+        frames = by_time(path, model.mesh, is_complete)
     except InputError as error:
         raise SolverFailure(f"no usable results: {error}", "marc") from None
-    times = [time for time in wanted if time in found]
+    times = [time for time in expected_times if time in frames]
     # An increment that is missing ends the history there.
-    whole = list(wanted)[: len(times)] == times
-    if len(times) < 2 or not whole or (ended and len(times) < len(wanted)):
-        problem = f"{path}: holds {len(times)} of {len(wanted)} frames"
+    without_gaps = list(expected_times)[: len(times)] == times
+    if len(times) < 2 or not without_gaps or (is_complete and len(times) < len(expected_times)):
+        problem = f"{path}: holds {len(times)} of {len(expected_times)} frames"
         raise SolverFailure(f"no usable results: {problem}", "marc")
-    u = displacements([found[time] for time in times])
-    forces, remarks = _forces(model, [found[time] for time in times])
+    u = displacements([frames[time] for time in times])
+    forces, remarks = _forces(model, [frames[time] for time in times])
     early = ""
-    if len(times) < len(wanted):
-        last = wanted[times[-1]]
+    if len(times) < len(expected_times):
+        last = expected_times[times[-1]]
         early = f"the run stopped early; the last increment is at {last:g} mm of deflection"
         remarks.append(Note(EARLY, early))
     mesh = model.mesh
@@ -351,24 +365,26 @@ def _forces(
     name = CONTACT if all(CONTACT in frame for frame in frames[1:]) else REACTION
     if any(name not in frame for frame in frames[1:]):
         raise SolverFailure(NO_FORCES, "marc")
-    found = {body: np.zeros((len(frames), 3)) for body in ("supports", "collar")}
+    reactions = {body: np.zeros((len(frames), 3)) for body in ("supports", "collar")}
     for body, nodes in touching(model).items():
         # Along x and z the forces of a quarter cancel against those of the others. The inflated
         # cylinder has not touched the bodies yet.
-        found[body][1:, 1] = [model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]]
+        reactions[body][1:, 1] = [
+            model.copies * frame[name][nodes, 1].sum() for frame in frames[1:]
+        ]
     words = (
         f"the collar's force is the sum of {name!r}, which is not confirmed (bubblefit docs marc)"
     )
     remarks = [Note(UNCONFIRMED, words)]
-    collar = found["collar"][-1, 1]
-    supports = found["supports"][-1, 1]
+    collar = reactions["collar"][-1, 1]
+    supports = reactions["supports"][-1, 1]
     if abs(collar + supports) > BALANCE * abs(collar):
         words = (
             f"collar ({-collar:.4g} N) and supports ({supports:.4g} N) do not balance at the end: "
             "see run 5 in `bubblefit docs marc`"
         )
         remarks.append(Note(UNBALANCED, words))
-    return found, remarks
+    return reactions, remarks
 
 
 def analyse_cylinder(
@@ -384,5 +400,5 @@ def analyse_cylinder(
         cylinder_deck(model, law, settings, shape),
         filling + APPROACH + bending,
         lambda t19, n: cylinder_history(t19, model, n),
-        lambda t19, n: cylinder_history(t19, model, n, ended=False),
+        lambda t19, n: cylinder_history(t19, model, n, is_complete=False),
     )

@@ -66,21 +66,21 @@ def fixed(
     name: str, members: str, dofs: Sequence[int], values: Sequence[float] = (), table: int = 0
 ) -> dict[str, Any]:
     """Return a condition of FIXED DISP on a node set; `dofs` from 0, zero without `values`."""
-    given = list(values) or [0.0] * len(dofs)
+    amounts = list(values) or [0.0] * len(dofs)
     return {
         "name": name,
         "set": members,
         "dofs": [dof + 1 for dof in dofs],
-        "amounts": given,
-        "tables": [table if value else 0 for value in given],
+        "amounts": amounts,
+        "tables": [table if value else 0 for value in amounts],
     }
 
 
-def supports(held: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
+def supports(dofs_by_set: Mapping[str, Sequence[int]], element: int) -> list[dict[str, Any]]:
     """Return conditions `fix_SET` from directions held at zero by node set."""
     return [
         fixed(f"fix_{name.lower()}", name.lower(), dofs if element == MEMBRANE else held_dofs(dofs))
-        for name, dofs in held.items()
+        for name, dofs in dofs_by_set.items()
     ]
 
 
@@ -103,7 +103,7 @@ def deck_text(
     **context: Any,
 ) -> str:
     """Return the deck, `context` for its template; InputError: a template, or as `law_context`."""
-    whole = {
+    variables = {
         "version": __version__,
         "title": f"{title}, {len(fabric['elements'])} elements {settings.element}",
         "element": settings.element,
@@ -116,12 +116,12 @@ def deck_text(
         **schedule(settings, cases),
         "time_tables": tables,
         "fixed": held,
-        "start": {"name": "start", "conditions": [one["name"] for one in held]},
+        "start": {"name": "start", "conditions": [condition["name"] for condition in held]},
         **context,
     }
     folder = Path(settings.templates) if settings.templates is not None else None
     instead = {f"{name}.dat.j2": Path(file) for name, file in settings.include.items()}
-    return render("marc", template, whole, folder, instead)
+    return render("marc", template, variables, folder, instead)
 
 
 FABRIC = "fabric"
@@ -177,27 +177,33 @@ def fabric_context(mesh: Mesh, warp: Array, thickness: Array | float) -> dict[st
 
     def groups(values: Array, name: str) -> list[tuple[str, int]]:
         """Return the set of elements with the same row of `values`, and one of them."""
-        _, which = np.unique(values, axis=0, return_inverse=True)
-        which = which.ravel()
-        count = int(which.max()) + 1
+        _, group_of = np.unique(values, axis=0, return_inverse=True)
+        group_of = group_of.ravel()
+        count = int(group_of.max()) + 1
         if count == 1:
             return [(FABRIC, 0)]
-        found = []
+        named_groups = []
         for number in range(count):
-            members = np.flatnonzero(which == number)
-            found.append((f"{name}_{number + 1}", int(members[0])))
-            sets.append(named_set("element", found[-1][0], members))
-        return found
+            members = np.flatnonzero(group_of == number)
+            named_groups.append((f"{name}_{number + 1}", int(members[0])))
+            sets.append(named_set("element", named_groups[-1][0], members))
+        return named_groups
 
     layer = np.broadcast_to(np.asarray(thickness, float), len(quads))
     thick = groups(layer[:, None], "layer")
-    layers = [{"set": name, "thickness": float(layer[one])} for name, one in thick]
+    layers = [
+        {"set": name, "thickness": float(layer[first_element])} for name, first_element in thick
+    ]
     along, across = fabric_frames(mesh, warp)
     # Adding zero turns -0 into 0.
     rows = np.asarray(np.round(np.hstack([along, across]), SAME) + 0.0, float)
     frames = [
-        {"set": name, "warp": rows[one, :3].tolist(), "fill": rows[one, 3:].tolist()}
-        for name, one in groups(rows, "frame")
+        {
+            "set": name,
+            "warp": rows[first_element, :3].tolist(),
+            "fill": rows[first_element, 3:].tolist(),
+        }
+        for name, first_element in groups(rows, "frame")
     ]
     points = np.asarray(mesh.points, float).tolist()
     elements = (quads + 1).tolist()

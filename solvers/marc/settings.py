@@ -99,8 +99,8 @@ class MarcSettings(ExternalSettings):
         return {"marc": None, **values}
 
 
-def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSettings:
-    """Return settings, those `given` over the site's file (named or BUBBLEFIT_MARC); InputError."""
+def marc_settings(command_options: Mapping[str, Any], named: str | None = None) -> MarcSettings:
+    """Return settings, those `command_options` over the site's file (named or BUBBLEFIT_MARC); InputError."""
     site = named or os.environ.get(VARIABLE, "")
     values: dict[str, Any] = {}
     if site.endswith(".toml"):
@@ -108,20 +108,22 @@ def marc_settings(given: Mapping[str, Any], named: str | None = None) -> MarcSet
     elif site:
         values = {"executable": str(_beside(Path(), site)) if os.sep in site else site}
     # The command line gives paths as such.
-    mine: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    mine: dict[str, Any] = {
+        name: value for name, value in command_options.items() if value is not None
+    }
     mine |= {name: str(value) for name, value in mine.items() if isinstance(value, Path)}
     if named is not None:
         mine.pop("executable", None)
-    both = {**values, **mine}
+    options = {**values, **mine}
     for name in ("include", "environment"):
-        both[name] = {**(values.get(name) or {}), **(mine.get(name) or {})}
-    if isinstance(both.get("element"), str) and both["element"].isdigit():
-        both["element"] = int(both["element"])  # --element 75
+        options[name] = {**(values.get(name) or {}), **(mine.get(name) or {})}
+    if isinstance(options.get("element"), str) and options["element"].isdigit():
+        options["element"] = int(options["element"])  # --element 75
     try:
-        settings = MarcSettings.model_validate(both)
+        settings = MarcSettings.model_validate(options)
     except ValidationError as error:
-        found = first_error(Path(), error, MarcSettings)
-        raise InputError(None, f"solver.marc.{found.field}", found.problem) from None
+        problem = first_error(Path(), error, MarcSettings)
+        raise InputError(None, f"solver.marc.{problem.field}", problem.problem) from None
     _check_files(settings)
     return settings
 
@@ -133,8 +135,8 @@ def site_settings(path: Path) -> dict[str, Any]:
         settings = MarcSettings.model_validate(content)
     except ValidationError as error:
         raise first_error(path, error, MarcSettings) from None
-    given = settings.given(path.absolute().parent)
-    return {name: value for name, value in given.items() if value is not None}
+    options = settings.given(path.absolute().parent)
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def _check_files(settings: MarcSettings) -> None:
@@ -148,9 +150,9 @@ def _check_files(settings: MarcSettings) -> None:
         raise InputError(Path(settings.templates), "templates", "there is no such folder")
 
 
-def _beside(folder: Path, given: str) -> Path:
+def _beside(folder: Path, path: str) -> Path:
     # Absolute: runs happen in a scratch folder.
-    return (folder / os.path.expanduser(given)).absolute()
+    return (folder / os.path.expanduser(path)).absolute()
 
 
 OFFER = Offer("marc", __package__, "MarcSolver", MarcSettings)

@@ -97,8 +97,8 @@ class MarcSolver:
     @property
     def programs(self) -> tuple[Path, ...]:
         """Return run_marc; none where only the site's modules know where it is."""
-        found = find_marc(self.settings)
-        return () if found is None else (found,)
+        program = find_marc(self.settings)
+        return () if program is None else (program,)
 
     @property
     def keep(self) -> bool:
@@ -135,18 +135,18 @@ class MarcSolver:
         early = ""
         source: str | None = None
         if settings.law == "hypela2":
-            own = settings.own_state
+            own_state = settings.own_state
             symmetric = settings.symmetric
-            source = hypela2_source({1: law}, own_state=own, symmetric=symmetric)
+            source = hypela2_source({1: law}, own_state=own_state, symmetric=symmetric)
         parent = scratch or (None if settings.scratch is None else Path(settings.scratch))
 
         def once(deck: str, units: int, read: Reader[T], rescue: Reader[T] | None = None) -> T:
             nonlocal repeats, early
-            given = deck, units, source, settings, read, rescue
-            found, end = run_job(*given, parent, timeout, self.progress)
+            job = deck, units, source, settings, read, rescue
+            history, end = run_job(*job, parent, timeout, self.progress)
             repeats += end.repeated
             early = early or end.problem or ""
-            return found
+            return history
 
         history = analysis_of(ANALYSES, model, self.name)(model, law, settings, once)
         remarks = [*history.remarks]
@@ -155,8 +155,8 @@ class MarcSolver:
         if repeats:
             words = f"{repeats} increments were repeated after they did not converge"
             remarks.append(Note(REPEATED, words))
-        why = f"{history.early}: {early}" if history.early and early else history.early
-        return replace(history, remarks=tuple(remarks), early=why)
+        reason = f"{history.early}: {early}" if history.early and early else history.early
+        return replace(history, remarks=tuple(remarks), early=reason)
 
 
 SECONDS = 600.0
@@ -260,10 +260,10 @@ def find_marc(settings: MarcSettings) -> Path | None:
         return program_at(Path(os.path.expanduser(settings.executable)), "marc", "run_marc")
     if settings.modules:
         return _in_modules(settings)
-    found = shutil.which(settings.executable)
-    if found is None:
+    program = shutil.which(settings.executable)
+    if program is None:
         raise SolverFailure(f"there is no {settings.executable} on the PATH; {ADVICE}", "marc")
-    return Path(found)
+    return Path(program)
 
 
 def _in_modules(settings: MarcSettings) -> Path | None:
@@ -271,16 +271,18 @@ def _in_modules(settings: MarcSettings) -> Path | None:
     ask = with_modules(
         settings.modules, ["/bin/sh", "-c", 'command -v "$1"', "sh", settings.executable]
     )
-    said = None
+    process = None
     with suppress(OSError, subprocess.SubprocessError):
-        said = subprocess.run(ask, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL)
-    if said is None or said.returncode != 0:
-        lines = said.stderr.decode(errors="replace").strip().splitlines() if said else []
-        why = f" ({lines[-1]})" if lines else ""
+        process = subprocess.run(
+            ask, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+        )
+    if process is None or process.returncode != 0:
+        lines = process.stderr.decode(errors="replace").strip().splitlines() if process else []
+        reason = f" ({lines[-1]})" if lines else ""
         names = ", ".join(settings.modules)
-        problem = f"modules {names} give no {settings.executable}{why}; {ADVICE}"
+        problem = f"modules {names} give no {settings.executable}{reason}; {ADVICE}"
         raise SolverFailure(problem, "marc")
-    path = said.stdout.decode(errors="replace").strip().splitlines()
+    path = process.stdout.decode(errors="replace").strip().splitlines()
     return Path(path[-1]) if path else None
 
 
@@ -303,9 +305,9 @@ def exit_number(*files: Path) -> int | None:
     return None
 
 
-def repeated(done: list[Increment]) -> int:
+def repeated(finished: list[Increment]) -> int:
     """Return how many increments were tried again after they did not converge."""
-    numbers = [one.increment for one in done]
+    numbers = [increment.increment for increment in finished]
     return len(numbers) - len(set(numbers))
 
 
@@ -349,8 +351,10 @@ class Ending:
     @property
     def collapse(self) -> bool:
         """Return whether Marc itself gave up: what it wrote until then is a result."""
-        said = self.problem is not None and self.problem.startswith(MEANINGS[NO_SMALLER])
-        return self.number == NO_SMALLER and said
+        is_step_too_small = self.problem is not None and self.problem.startswith(
+            MEANINGS[NO_SMALLER]
+        )
+        return self.number == NO_SMALLER and is_step_too_small
 
 
 def ending(
@@ -361,15 +365,17 @@ def ending(
     screen : file with what run_marc printed. time : total, at a good end. Return codes are not
     asked: scripts around Marc give any.
     """
-    done = increments(folder / f"{job}.sts")
+    finished = increments(folder / f"{job}.sts")
     number = exit_number(
         *(folder / f"{job}.{end}" for end in ("sts", "log", "out")), folder / screen
     )
     texts = [folder / f"{job}.out", folder / f"{job}.log", folder / screen]
-    errors, licence_lines, turned, complaints = _lines(texts)
+    errors, licence_lines, inverted_element, complaints = _lines(texts)
     full = disk_full(folder, complaints, outcome)
-    reached = f"after increment {done[-1].increment}" if done else "before the first increment"
-    licence = bool(licence_lines) and not done
+    reached = (
+        f"after increment {finished[-1].increment}" if finished else "before the first increment"
+    )
+    licence = bool(licence_lines) and not finished
     problem = None
     if outcome.timed_out:
         problem = f"did not end within {timeout:g} s: killed {reached}"
@@ -381,24 +387,26 @@ def ending(
     elif outcome.exit_code < 0 or (outcome.signal_name and number is None):
         problem = f"killed by {outcome.signal_name} {reached}"
     elif number is None:
-        what = "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
-        problem = f"{what}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
-    elif turned is not None:
-        problem = f"an element was turned inside out{turned}, {reached}"
+        complaint = (
+            "said no exit number" if (folder / f"{job}.sts").exists() else f"wrote no {job}.sts"
+        )
+        problem = f"{complaint}, {reached}; run_marc returned {outcome.exit_code}: is this Marc?"
+    elif inverted_element is not None:
+        problem = f"an element was turned inside out{inverted_element}, {reached}"
     elif number != NORMAL:
         meaning = MEANINGS.get(number, "did not end well")
         problem = f"{meaning}, {reached}"
-    elif not done or done[-1].time < time - NEAR * max(1.0, time):
-        at = done[-1].time if done else 0.0
+    elif not finished or finished[-1].time < time - NEAR * max(1.0, time):
+        at = finished[-1].time if finished else 0.0
         problem = f"ended at time {at:g} of {time:g}, {reached}"
-    said = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
+    excerpt = "\n".join(errors or licence_lines) or log_tail(folder / f"{job}.log")
     return Ending(
         problem,
         number,
-        said,
+        excerpt,
         licence and problem is not None,
-        sum(one.iterations for one in done),
-        repeated(done),
+        sum(increment.iterations for increment in finished),
+        repeated(finished),
     )
 
 
@@ -408,22 +416,22 @@ def _lines(files: list[Path]) -> tuple[list[str], list[str], str | None, list[st
     errors = list[str]()
     refusals = list[str]()
     full = list[str]()
-    turned: str | None = None
+    inverted_element: str | None = None
     for file in files:
         with suppress(OSError), file.open(encoding="latin-1") as text:
             for line in text:  # the .out of a long job is large
-                found = _INSIDE_OUT.search(line)
-                if found is not None and turned is None:
-                    turned = f" (element {found[1]})" if found[1] else ""
-                said = " ".join(line.split())
-                for lines, meant in (
+                match = _INSIDE_OUT.search(line)
+                if match is not None and inverted_element is None:
+                    inverted_element = f" (element {match[1]})" if match[1] else ""
+                plain = " ".join(line.split())
+                for lines, is_meant in (
                     (full, any(words.lower() in line.lower() for words in WORDS)),
                     (errors, _ERROR.search(line)),
                     (refusals, _LICENCE.search(line) and _REFUSED.search(line)),
                 ):
-                    if meant and said not in lines and len(lines) < MOST_LINES:
-                        lines.append(said)
-    return errors, refusals, turned, full
+                    if is_meant and plain not in lines and len(lines) < MOST_LINES:
+                        lines.append(plain)
+    return errors, refusals, inverted_element, full
 
 
 def run_job(
@@ -475,10 +483,10 @@ def run_job(
 
 def set_earlier_aside(folder: Path) -> None:
     """Rename what is older than the deck: a site's script may copy old files into the folder."""
-    begun = (folder / f"{JOB}.dat").stat().st_mtime_ns
+    start = (folder / f"{JOB}.dat").stat().st_mtime_ns
     for name in WRITTEN:
         path = folder / f"{JOB}.{name}"
-        if path.is_file() and path.stat().st_mtime_ns < begun:
+        if path.is_file() and path.stat().st_mtime_ns < start:
             log.warning(
                 "%s is older than the deck, and is left aside as %s", path, path.name + EARLIER
             )

@@ -74,10 +74,10 @@ class Records:
 
     def begin(self) -> tuple[int, int]:
         """Return number and version of the block that begins here."""
-        found = _BEGIN.match(self.line())
-        if found is None:
+        match = _BEGIN.match(self.line())
+        if match is None:
             raise self.wrong("expected the beginning of a block (=beg=)")
-        return int(found[1]), int(found[2])
+        return int(match[1]), int(match[2])
 
     def skip(self) -> None:
         """Go to the end of a block that is of no interest."""
@@ -135,8 +135,8 @@ class T19File:
         self.mesh = self._model()
         self._first = self._file.at
 
-    def frames(self, ended: bool = True) -> Iterator[ResultFrame]:
-        """Yield every increment in order; `ended`: with its mark; if not, all whole ones."""
+    def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
+        """Yield every increment in order; `is_complete`: with its mark; if not, all whole ones."""
         self._file.at = self._first
         while True:
             try:
@@ -147,7 +147,7 @@ class T19File:
                     raise self._file.wrong(f"expected **** or ++++, got {mark[:20]!r}")
                 frame = self._frame()
             except InputError:
-                if ended:
+                if is_complete:
                     raise
                 return
             yield frame
@@ -213,9 +213,9 @@ class T19File:
             values = self._file.reals(len(self.mesh.numbers) * components)
             frame.fields[name] = values.reshape(-1, components)
 
-    def _element(self, most: int) -> tuple[int, NDArray[np.int64]]:
-        record = self._file.integers(3 + most)
-        if not 1 <= record[2] <= most:
+    def _element(self, max_nodes: int) -> tuple[int, NDArray[np.int64]]:
+        record = self._file.integers(3 + max_nodes)
+        if not 1 <= record[2] <= max_nodes:
             raise self._file.wrong(f"an element of {record[2]} nodes")
         return record[1], np.array(record[3 : 3 + record[2]], dtype=np.int64)
 
