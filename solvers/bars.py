@@ -50,7 +50,7 @@ def difference(stresses: tuple[float, ...]) -> float:
 def checked_stresses(
     stresses: tuple[float, ...], solver_in_words: str, solver: str
 ) -> tuple[float, ...]:
-    """Return end stresses (MPa) of BARS; SolverFailure beyond TOLERANCE, of `solver_in_words` ran them."""
+    """Return end stresses (MPa) of BARS; SolverFailure where one is off by more than TOLERANCE."""
     for bar, stress in zip(BARS, stresses, strict=True):
         if not abs(stress / bar.stress - 1) < TOLERANCE:
             problem = f"{bar.model} {bar.direction} bar: {stress:.4g} MPa, not {bar.stress}"

@@ -93,8 +93,9 @@ def _check_inside(text: str, template: Path) -> None:
         keyword = keyword and line.endswith(",")
         for file_name in file_names:
             if _ELSEWHERE.search(file_name["file"]):
+                elsewhere = file_name["file"].strip()
                 problem = (
-                    f"line {number} of the deck names a file elsewhere, {file_name['file'].strip()!r}; "
+                    f"line {number} of the deck names a file elsewhere, {elsewhere!r}; "
                     'put its text into the deck: {% include "NAME" %}'
                 )
                 raise InputError(template, "", problem)

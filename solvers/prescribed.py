@@ -278,9 +278,9 @@ def support_body(supports: RigidSupports, radius: float, top: float) -> RigidBod
 
 
 def collar_body(collar: Collar, cylinder: Array, clearance: float) -> RigidBody:
-    """Return the upper part of the collar on x, z >= 0, `clearance` (mm) the cylinder's points (n, 3).
+    """Return the upper part of the collar on x, z >= 0, above the cylinder's points (n, 3).
 
-    It goes down that far until one of its faces, chords of the ring, meets the cylinder.
+    It stands `clearance` (mm) above where one of its faces, chords of the ring, meets the cylinder.
     """
     body = _ring(collar)
     up = clearance - way_down(body.faces, cylinder)

@@ -225,8 +225,8 @@ def overridden(
 ) -> dict[str, Any]:
     """Return the options of the solver `name`, overridden by the command line; InputError.
 
-    command_options : by the name of an option of `command_line`. settings : each "KEY=VALUE", the value as in
-    a project file (text needs no quotes); paths are relative to the current folder.
+    command_options : by the name of an option of `command_line`. settings : each "KEY=VALUE", the
+    value as in a project file (text needs no quotes); paths are relative to the current folder.
     """
     mine = {option: value for option, value in command_options.items() if value is not None}
     for option in mine:

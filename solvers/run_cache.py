@@ -194,7 +194,7 @@ class RunCache:
         return dropped
 
     def _bound(self, added_bytes: int) -> None:
-        """Make room where the runs, `added_bytes` bytes of them just written, are beyond the limit."""
+        """Make room where the runs are beyond the limit; `added_bytes` were just written."""
         self._written += 1
         if self._held is None or self._written % LOOK == 0:
             self._held = sum(entry.size for entry in self.entries())

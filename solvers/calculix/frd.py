@@ -52,7 +52,10 @@ class FrdFile:
         self._first = self._at
 
     def frames(self, is_complete: bool = True) -> Iterator[ResultFrame]:
-        """Yield every increment in order; `is_complete`: with its mark; if not, all whole results."""
+        """Yield every increment in order.
+
+        is_complete : the file has its mark of an end; if not, all whole results are read.
+        """
         self._at = self._first
         self._held = 0
         frame: ResultFrame | None = None

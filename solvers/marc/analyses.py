@@ -163,7 +163,10 @@ def whole_times(path: Path, mesh: Mesh, count: int) -> list[dict[str, Array]]:
 
 
 def by_time(path: Path, mesh: Mesh, is_complete: bool = True) -> dict[int, dict[str, Array]]:
-    """Return vectors by name at whole times, `is_complete` as `T19File.frames`; InputError: damaged."""
+    """Return vectors by name at whole times; InputError for a damaged file.
+
+    is_complete : as of `T19File.frames`.
+    """
     file = T19File(path)
     nodes = len(mesh.points)
     if not np.array_equal(file.mesh.numbers, np.arange(1, nodes + 1)):

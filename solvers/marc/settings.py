@@ -100,7 +100,7 @@ class MarcSettings(ExternalSettings):
 
 
 def marc_settings(command_options: Mapping[str, Any], named: str | None = None) -> MarcSettings:
-    """Return settings, those `command_options` over the site's file (named or BUBBLEFIT_MARC); InputError."""
+    """Return the settings of the site's file (named or BUBBLEFIT_MARC), overridden by options."""
     site = named or os.environ.get(VARIABLE, "")
     values: dict[str, Any] = {}
     if site.endswith(".toml"):
