@@ -80,16 +80,16 @@ class CardCertainty:
         self, law: HypoelasticLaw, count: int, random: "np.random.Generator"
     ) -> list[HypoelasticLaw]:
         """Return `count` random laws of positive moduli; ValueError if hardly any draw is one."""
-        drawn: list[HypoelasticLaw] = []
+        laws: list[HypoelasticLaw] = []
         for _ in range(TRIES * count):
-            if len(drawn) == count:
+            if len(laws) == count:
                 break
-            other = self.shifted(law, random.standard_normal(len(self.directions)))
-            if positive(other):
-                drawn.append(other)
-        if len(drawn) < count:
+            law_drawn = self.shifted(law, random.standard_normal(len(self.directions)))
+            if positive(law_drawn):
+                laws.append(law_drawn)
+        if len(laws) < count:
             raise ValueError("hardly any law of this card's certainty has positive moduli")
-        return drawn
+        return laws
 
 
 def band_at(
@@ -119,9 +119,9 @@ def certainty_of(
         ]
         + [crimp[:, free] / (crimp @ law.beta)[:, None]]
     )
-    _, sizes, turned = np.linalg.svd(relative @ spread.T, full_matrices=False)
-    kept = turned[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
-    return CardCertainty(np.asarray(kept @ spread), words, bands or {})
+    _, sizes, directions = np.linalg.svd(relative @ spread.T, full_matrices=False)
+    significant = directions[(sizes > SMALLEST * sizes[0]) & (sizes > 0)][: spread.shape[1]]
+    return CardCertainty(np.asarray(significant @ spread), words, bands or {})
 
 
 def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
@@ -145,8 +145,8 @@ def positive(law: HypoelasticLaw) -> bool:
 
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
     named = ", ".join(tests)
-    also = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
-    return f"{also}; {values} values of {named}; the form of the law is taken for right"
+    sources = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
+    return f"{sources}; {values} values of {named}; the form of the law is taken for right"
 
 
 #: MPa per unit.
@@ -214,10 +214,10 @@ def thickness_difference(card: MaterialCard, thickness: float) -> str | None:
     share = thickness / card.thickness - 1
     if abs(share) < SAME_THICKNESS:
         return None
-    more = "stiffer" if share > 0 else "softer"
+    comparative = "stiffer" if share > 0 else "softer"
     return (
         f"the card was fitted for a thickness of {card.thickness:g} mm, this is {thickness:g} mm: "
-        f"with the card's moduli the fabric is {100 * abs(share):.2g} % {more}"
+        f"with the card's moduli the fabric is {100 * abs(share):.2g} % {comparative}"
     )
 
 
@@ -259,7 +259,10 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
     ]
     header = "".join(f"# {line}\n" for line in words)
     bands = {
-        name: [[float(f"{v:.7g}") for v in own] for own in (strain, *(end / scale for end in ends))]
+        name: [
+            [float(f"{v:.7g}") for v in values]
+            for values in (strain, *(end / scale for end in ends))
+        ]
         for name, (strain, *ends) in (sure.bands if sure is not None else {}).items()
     }
     tables = _table_text("certainty.band", bands) + _table_text("pieces", pieces)
@@ -268,7 +271,7 @@ def write_card(card: MaterialCard, path: Path, unit: ModulusUnit = "GPa") -> Non
 
 def _table_text(name: str, table: Mapping[str, Any]) -> str:
     """Return a table of the card, if it holds anything: a line a key, not a line a number."""
-    lines = [f"{key} = {json.dumps(own, ensure_ascii=False)}" for key, own in table.items()]
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in table.items()]
     return "\n".join(["", f"[{name}]", *lines, ""]) if table else ""
 
 
@@ -349,9 +352,9 @@ def read_card(path: Path | str) -> MaterialCard:
 
 def _card(content: Mapping[str, Any]) -> MaterialCard:
     name, settings = _form(content)
-    rest = {key: value for key, value in content.items() if key not in settings}
+    plain_keys = {key: value for key, value in content.items() if key not in settings}
     try:
-        file = CardFile.model_validate(rest)
+        file = CardFile.model_validate(plain_keys)
     except ValidationError as error:
         raise first_error(None, error, CardFile) from None
     mpa = [b * UNITS[file.unit] for b in file.beta]
@@ -424,7 +427,7 @@ def _form(content: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
         raise InputError(None, "law", f"expected {LAW!r}, got {text!r}")
     if not isinstance(name, str):
         raise InputError(None, "form", f"expected the name of a form, got {name!r}")
-    own = base.form_settings(name)
-    if not own and name not in base.form_names():
+    setting_keys = base.form_settings(name)
+    if not setting_keys and name not in base.form_names():
         base.form_named(name, {}, [base.UNLIMITED] * 3)  # says what there is
-    return name, {key: content[key] for key in own if key in content}
+    return name, {key: content[key] for key in setting_keys if key in content}

@@ -70,19 +70,21 @@ class DesignersConstants:
     @property
     def stiffness(self) -> Array:
         """Return A (2, 2) of n = A eps, kN/m; raise InputError unless nu_warp nu_fill < 1."""
-        rest = 1.0 - self.nu_warp * self.nu_fill
-        if not rest > 0:
-            problem = f"nu_warp nu_fill is {1 - rest:.3g}; expected below 1"
+        determinant = 1.0 - self.nu_warp * self.nu_fill
+        if not determinant > 0:
+            problem = f"nu_warp nu_fill is {1 - determinant:.3g}; expected below 1"
             raise InputError(None, "constants", problem)
         a = np.array([[self.warp, self.nu_warp * self.warp], [self.nu_fill * self.fill, self.fill]])
-        return np.asarray(a / rest)
+        return np.asarray(a / determinant)
 
     @property
     def reciprocal(self) -> bool:
         """Return whether a strain energy belongs to them."""
-        one = self.nu_warp / self.fill
-        other = self.nu_fill / self.warp
-        return abs(one - other) <= SAME * max(abs(one), abs(other), 1e-300)
+        warp_by_fill = self.nu_warp / self.fill
+        fill_by_warp = self.nu_fill / self.warp
+        return abs(warp_by_fill - fill_by_warp) <= SAME * max(
+            abs(warp_by_fill), abs(fill_by_warp), 1e-300
+        )
 
     @property
     def stable(self) -> bool:
@@ -114,8 +116,8 @@ class LinearPath:
 
     @property
     def unloaded(self) -> tuple[bool, bool]:
-        least = UNLOADED * float(np.abs(self.load).max())
-        warp, fill = np.abs(self.load) < least
+        threshold = UNLOADED * float(np.abs(self.load).max())
+        warp, fill = np.abs(self.load) < threshold
         return bool(warp), bool(fill)
 
 
@@ -130,9 +132,9 @@ def line_of(ratio: str, load: ArrayLike, strain: ArrayLike) -> LinearPath:
     # With an offset of their own, as the first reading is no better than the others.
     about = s - s.mean()
     slopes = about @ np.column_stack([n, eps]) / float(about @ about)
-    whole = slopes * float(s.max())
+    changes = slopes * float(s.max())
     off = (eps - eps.mean(axis=0)) - np.outer(about, slopes[2:])
-    return LinearPath(ratio, whole[:2], whole[2:], np.sqrt(np.mean(off**2, axis=0)))
+    return LinearPath(ratio, changes[:2], changes[2:], np.sqrt(np.mean(off**2, axis=0)))
 
 
 @dataclass(frozen=True)
@@ -176,46 +178,46 @@ def evaluate(paths: Sequence[LinearPath], options: Options = USUAL) -> Evaluatio
         problem = "these ratios do not settle the constants: two that differ are needed at least"
         raise InputError(None, "ratios", problem)
     c, *_ = np.linalg.lstsq(matrix, right, rcond=None)
-    whole = np.array([[c[0], c[2]], [c[-1], c[1]]])
+    matrix_of_form = np.array([[c[0], c[2]], [c[-1], c[1]]])
     if options.minimise == "load":
-        constants = DesignersConstants.of_stiffness(whole)
+        constants = DesignersConstants.of_stiffness(matrix_of_form)
     else:
-        constants = DesignersConstants.of_compliance(whole)
+        constants = DesignersConstants.of_compliance(matrix_of_form)
     squares = 0.0
     rms = {}
     count = 0
     for path in paths:
         off = 100.0 * np.outer(SHARES, path.strain - constants.strain(path.load))
-        which = np.array(options.counts(path))
-        squares += float((off[:, which] ** 2).sum())
-        count += int(which.sum())
+        counted = np.array(options.counts(path))
+        squares += float((off[:, counted] ** 2).sum())
+        count += int(counted.sum())
         rms[path.ratio] = float(np.sqrt(np.mean(off**2)))
     return Evaluation(options, constants, count, squares, rms)
 
 
 def evaluate_others(paths: Sequence[LinearPath], options: Options) -> list[Evaluation]:
     """Return the evaluations by all other options that the paths settle."""
-    found = []
-    for other in every_option(paths):
+    evaluations = []
+    for choice in every_option(paths):
         with suppress(InputError):
-            found += [evaluate(paths, other)] if other != options else []
-    return found
+            evaluations += [evaluate(paths, choice)] if choice != options else []
+    return evaluations
 
 
 def every_option(paths: Sequence[LinearPath]) -> list[Options]:
     """Return the choices of laboratories, and ratios about 1:1 alone where there are others."""
     kinds: tuple[Minimise, ...] = ("strain", "load")
-    found = [
+    choices = [
         Options(unloaded, reciprocal, minimise)
         for minimise, unloaded, reciprocal in product(kinds, (False, True), (True, False))
     ]
-    there = {path.ratio for path in paths}
-    for few in (("1:1", "1:2"), ("1:1", "2:1"), ("1:1", "2:1", "1:2")):
-        if set(few) < there:
-            found.append(Options(False, True, "strain", few))
+    measured = {path.ratio for path in paths}
+    for subset in (("1:1", "1:2"), ("1:1", "2:1"), ("1:1", "2:1", "1:2")):
+        if set(subset) < measured:
+            choices.append(Options(False, True, "strain", subset))
     if not any(any(path.unloaded) for path in paths):
-        found = [o for o in found if not o.unloaded]  # they would be the same
-    return found
+        choices = [o for o in choices if not o.unloaded]  # they would be the same
+    return choices
 
 
 def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array]:
@@ -224,17 +226,17 @@ def _rows(paths: Collection[LinearPath], options: Options) -> tuple[Array, Array
     # All points of a straight line say the same: one row with the root of their squares' sum.
     weight = float(np.sqrt((SHARES**2).sum()))
     for path in paths:
-        given = path.load
-        wanted = path.strain
+        source = path.load
+        target = path.strain
         if options.minimise == "load":
-            given, wanted = wanted, given
+            source, target = target, source
         for yarn, counts in enumerate(options.counts(path)):
             if counts:
                 row = np.zeros(4)
-                row[yarn] = given[yarn]
-                row[2 + yarn] = given[1 - yarn]
+                row[yarn] = source[yarn]
+                row[2 + yarn] = source[1 - yarn]
                 rows.append(weight * row)
-                right.append(weight * wanted[yarn])
+                right.append(weight * target[yarn])
     return np.array(rows).reshape(-1, 4), np.array(right)
 
 
@@ -249,8 +251,8 @@ def shares(ratio: str) -> tuple[float, float]:
     >>> shares("1:2"), shares("2/1")
     ((0.5, 1.0), (1.0, 0.5))
     """
-    found = _RATIO.match(ratio)
-    pair = [float(text.replace(",", ".")) for text in found.groups()] if found else [0.0]
+    match = _RATIO.match(ratio)
+    pair = [float(text.replace(",", ".")) for text in match.groups()] if match else [0.0]
     if not 0 < max(pair) < math.inf:
         problem = f"expected a load ratio such as 2:1 (warp to fill), got {ratio[:40]!r}"
         raise InputError(None, "ratio", problem)
@@ -303,16 +305,18 @@ def constants_of_law(
     gammas = np.linspace(0.0, shear_strain, SHEARS)
     shear = law.G12(gammas) * thickness
     mean = float(np.trapezoid(shear, gammas) / shear_strain)
-    asked = evaluate(lines, options)
-    asked = replace(asked, constants=replace(asked.constants, shear=mean))
-    others = tuple(evaluate_others(lines, options))
-    lost = {}
+    chosen = evaluate(lines, options)
+    chosen = replace(chosen, constants=replace(chosen.constants, shear=mean))
+    alternatives = tuple(evaluate_others(lines, options))
+    rms_lost = {}
     largest = {}
     for name, (load, strain) in curves.items():
-        off = (strain - strain[0]) - asked.constants.strain(load - load[0])
-        lost[name] = float(100 * np.sqrt(np.mean(off**2)))
+        off = (strain - strain[0]) - chosen.constants.strain(load - load[0])
+        rms_lost[name] = float(100 * np.sqrt(np.mean(off**2)))
         largest[name] = float(100 * np.abs(strain).max())
-    return LawConstants(asked, others, lost, largest, (float(shear.min()), float(shear.max())))
+    return LawConstants(
+        chosen, alternatives, rms_lost, largest, (float(shear.min()), float(shear.max()))
+    )
 
 
 def _curve(
@@ -325,32 +329,33 @@ def _curve(
         ]
     )
     loads = np.outer(larger, shares(ratio))
-    found = biaxial_response(law, loads, thickness)
-    if found.reached < len(larger):
+    response = biaxial_response(law, loads, thickness)
+    if response.reached < len(larger):
         problem = (
-            f"the law carries no more than {larger[max(found.reached - 1, 0)]:.3g} kN/m at ratio "
+            "the law carries no more than "
+            f"{larger[max(response.reached - 1, 0)]:.3g} kN/m at ratio "
             f"{ratio}: choose a lower stress range"
         )
         raise InputError(None, "loads", problem)
     keep = larger >= lowest
-    return loads[keep], found.elongation[keep]
+    return loads[keep], response.elongation[keep]
 
 
 #: The constants of an evaluation with a spread.
 CONSTANTS = ("warp", "fill", "nu_warp", "nu_fill")
 
 
-def row_of(one: Evaluation) -> dict[str, Any]:
+def row_of(evaluation: Evaluation) -> dict[str, Any]:
     """Return options and constants of both forms: E and A (direct form) in kN/m, squares in %^2."""
-    c = one.constants
-    o = one.options
+    c = evaluation.constants
+    o = evaluation.options
     direct = c.stiffness if c.nu_warp * c.nu_fill < 1 else np.full((2, 2), np.nan)
     return {
         "minimise": o.minimise,
         "reciprocal": o.reciprocal,
         "unloaded_yarns": o.unloaded,
         "ratios": " ".join(o.ratios) or "all",
-        "paths": one.paths,
+        "paths": evaluation.paths,
         "E_warp_kN_per_m": c.warp,
         "E_fill_kN_per_m": c.fill,
         "nu_warp": c.nu_warp,
@@ -359,14 +364,14 @@ def row_of(one: Evaluation) -> dict[str, Any]:
         "A_fill_kN_per_m": direct[1, 1],
         "A_warp_fill_kN_per_m": direct[0, 1],
         "A_fill_warp_kN_per_m": direct[1, 0],
-        "squares_percent2": one.squares,
+        "squares_percent2": evaluation.squares,
     }
 
 
 def spread_of(evaluations: Iterable[Evaluation]) -> dict[str, tuple[float, float]]:
     """Return least and largest of each of `CONSTANTS` over the evaluations."""
-    every = [one.constants for one in evaluations]
+    constants = [evaluation.constants for evaluation in evaluations]
     return {
-        name: (min(getattr(c, name) for c in every), max(getattr(c, name) for c in every))
+        name: (min(getattr(c, name) for c in constants), max(getattr(c, name) for c in constants))
         for name in CONSTANTS
     }

@@ -73,14 +73,14 @@ class PlainWall:
         high = 1.0
         for _ in range(60):
             strain = 0.5 * (low + high)
-            held = 2 * math.pi * radius * self.pull(np.array([strain]), pressure, radius)[0][0]
-            held += sum(
+            pull = 2 * math.pi * radius * self.pull(np.array([strain]), pressure, radius)[0][0]
+            pull += sum(
                 float(c.table.pull(strain + c.prestrain, c.tension_only)[0])
                 if c.initial_force is None
                 else c.initial_force
                 for c in cords
             )
-            low, high = (strain, high) if held < pressure * math.pi * radius**2 else (low, strain)
+            low, high = (strain, high) if pull < pressure * math.pi * radius**2 else (low, strain)
         return 0.5 * (low + high)
 
 
@@ -114,13 +114,13 @@ class BraidedWall:
         s = math.sin(math.radians(self.angle))
         to_yarn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s],
                             [-2 * c * s, 2 * c * s, c * c - s * s]])  # fmt: skip
-        one = to_yarn.T @ np.diag([self.yarn, self.across, self.yarn_shear]) @ to_yarn
+        ply = to_yarn.T @ np.diag([self.yarn, self.across, self.yarn_shear]) @ to_yarn
         mirror = np.diag([1.0, 1.0, -1.0])
         nu = 0.5 * self.bladder / self.bladder_shear - 1.0
         plane = self.bladder / (1.0 - nu**2)
         sheet = np.array([[plane, nu * plane, 0.0], [nu * plane, plane, 0.0], [0.0, 0.0, 0.0]])
         sheet[2, 2] = self.bladder_shear
-        return np.asarray(one + mirror @ one @ mirror + sheet)
+        return np.asarray(ply + mirror @ ply @ mirror + sheet)
 
     @property
     def axial(self) -> float:
@@ -179,30 +179,30 @@ class TubeSection:
     def starts(self) -> list[float]:
         """Return the forces (N) of the cords in the inflated tube."""
         wall = self.wall
-        held = self.wall.at_rest(self.pressure, self.radius, self.cords)
+        wall_strain = self.wall.at_rest(self.pressure, self.radius, self.cords)
         free = [c for c in self.cords if c.initial_force is None]
-        given = sum(c.initial_force or 0.0 for c in self.cords)
+        initial_forces = sum(c.initial_force or 0.0 for c in self.cords)
         forces = []
         for c in self.cords:
             if c.initial_force is not None:
                 forces.append(c.initial_force)
             elif isinstance(wall, BraidedWall):
                 thrust = wall.left_to_cords(self.pressure, self.radius)
-                forces.append((thrust - given) / len(free))
+                forces.append((thrust - initial_forces) / len(free))
             else:
-                forces.append(float(c.table.pull(held + c.prestrain, c.tension_only)[0]))
+                forces.append(float(c.table.pull(wall_strain + c.prestrain, c.tension_only)[0]))
         return forces
 
     @cached_property
     def _at_rest(self) -> tuple[float, list[float]]:
-        rest = self.wall.at_rest(self.pressure, self.radius, self.cords)
-        own = zip(self.cords, self.starts, strict=True)
+        wall_strain = self.wall.at_rest(self.pressure, self.radius, self.cords)
+        cords_and_forces = zip(self.cords, self.starts, strict=True)
         braided = isinstance(self.wall, BraidedWall)
-        return rest, [
+        return wall_strain, [
             c.table.strain_at(force)
             if braided or c.initial_force is not None
-            else rest + c.prestrain
-            for c, force in own
+            else wall_strain + c.prestrain
+            for c, force in cords_and_forces
         ]
 
     @cached_property
@@ -220,11 +220,11 @@ class TubeSection:
 
     def resultants(self, strain: Array, curvature: Array) -> tuple[Array, Array, Array]:
         """Return N (m,) N, M (m,) N mm sagging, derivatives (m, 2, 2); curvature in 1/mm."""
-        rest, starts = self._at_rest
+        wall_strain, starts = self._at_rest
         turn = 2 * math.pi / AROUND * (0.5 + np.arange(AROUND))
         heights = self.radius * np.cos(turn)
         force, slope = self.wall.pull(
-            rest + strain[:, None] - curvature[:, None] * heights, self.pressure, self.radius
+            wall_strain + strain[:, None] - curvature[:, None] * heights, self.pressure, self.radius
         )
         width = 2 * math.pi * self.radius / AROUND
         fibres = [heights]
@@ -232,10 +232,10 @@ class TubeSection:
         slopes = [width * slope]
         for cord, start in zip(self.cords, starts, strict=True):
             height = self.radius * math.cos(math.radians(cord.angle))
-            own = cord.table.pull(start + strain - curvature * height, cord.tension_only)
+            cord_pull = cord.table.pull(start + strain - curvature * height, cord.tension_only)
             fibres.append(np.array([height]))
-            pulls.append(own[0][:, None])
-            slopes.append(own[1][:, None])
+            pulls.append(cord_pull[0][:, None])
+            slopes.append(cord_pull[1][:, None])
         y = np.concatenate(fibres)
         f = np.hstack(pulls)
         k = np.hstack(slopes)

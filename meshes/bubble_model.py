@@ -14,10 +14,10 @@ from .mesh import GAUSS_VALUES, Array, Mesh, keep_levels, places_of
 THICKNESS = "thickness"
 
 
-def changes_anything(known: Sequence[str], values: Mapping[str, float]) -> bool:
-    unknown = [name for name in values if name not in known]
+def changes_anything(names: Sequence[str], values: Mapping[str, float]) -> bool:
+    unknown = [name for name in values if name not in names]
     if unknown:
-        raise InputError(None, "parameters", f"{unknown} not among {tuple(known)}")
+        raise InputError(None, "parameters", f"{unknown} not among {tuple(names)}")
     return any(values.values())
 
 
@@ -80,12 +80,12 @@ class SheetCord:
         """Return whether it lies in the plane of symmetry across x (0) or y (1)."""
         return bool(np.abs(self.ends[:, axis]).max() <= NEAR * np.abs(self.ends).max())
 
-    def mirrors(self, other: "SheetCord", axis: int) -> bool:
+    def mirrors(self, candidate: "SheetCord", axis: int) -> bool:
         """Return whether it is another's mirror image, along x (0) or y (1)."""
-        image = other.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
-        near = NEAR * np.abs(image).max()
-        turned = (np.abs(self.ends - ends).max() <= near for ends in (image, image[::-1]))
-        return any(turned) and has_same_force(self, other)
+        image = candidate.ends * np.where(np.arange(2) == axis, -1.0, 1.0)
+        tolerance = NEAR * np.abs(image).max()
+        is_image = (np.abs(self.ends - ends).max() <= tolerance for ends in (image, image[::-1]))
+        return any(is_image) and has_same_force(self, candidate)
 
 
 NEAR = 1e-6  # of a length
@@ -120,9 +120,9 @@ class BubbleModel:
     def __post_init__(self) -> None:
         steps = self.increments if len(self.increments) else self.pressures
         keep_levels(self, " MPa", self.unloaded, pressures=self.pressures, increments=steps)
-        wanted = np.array(self.pressures)
-        near = np.abs(np.array(self.increments)[self.reported] - wanted)
-        if (near > 1e-9 * wanted).any():
+        pressures = np.array(self.pressures)
+        distance = np.abs(np.array(self.increments)[self.reported] - pressures)
+        if (distance > 1e-9 * pressures).any():
             raise InputError(None, "increments", "must contain every reported pressure")
         if not self.thickness > 0:
             raise InputError(None, "thickness", f"expected > 0 mm, got {self.thickness}")
@@ -130,7 +130,7 @@ class BubbleModel:
             raise InputError(None, "slack", f"expected shares above -1, got {self.slack}")
         for i, cord in enumerate(self.cords):
             for axis in self.halved:
-                if not any(cord.mirrors(other, axis) for other in self.cords):
+                if not any(cord.mirrors(cord_beside, axis) for cord_beside in self.cords):
                     problem = f"a quarter needs the mirror image in {'xy'[axis]} = 0, too; "
                     raise InputError(None, f"cord[{i}].ends", problem + 'or symmetry = "full"')
 
@@ -139,17 +139,17 @@ class BubbleModel:
         """Return the axes across which planes of symmetry lie: x (0), y (1)."""
         return tuple(k for k in (0, 1) if f"symmetry_{'xy'[k]}" in self.mesh.node_sets)
 
-    def _places(self, steps: Array, wanted: Array) -> NDArray[np.intp]:
+    def _places(self, steps: Array, levels: Array) -> NDArray[np.intp]:
         """Return the step of each wanted level: the nearest, or of a history the last in turn."""
         if not self.unloaded:
-            return places_of(wanted.tolist(), steps.tolist())
-        found = list[int]()
+            return places_of(levels.tolist(), steps.tolist())
+        places = list[int]()
         end = len(steps)
-        for level in wanted[::-1]:
-            same = np.flatnonzero(np.isclose(steps[:end], level, rtol=1e-9, atol=0.0))
-            end = int(same[-1]) if len(same) else 0
-            found.append(end)
-        return np.array(found[::-1])
+        for level in levels[::-1]:
+            matches = np.flatnonzero(np.isclose(steps[:end], level, rtol=1e-9, atol=0.0))
+            end = int(matches[-1]) if len(matches) else 0
+            places.append(end)
+        return np.array(places[::-1])
 
     def until(self, frame: int) -> Self:
         """Return the model as far as a frame, by its number."""
@@ -171,17 +171,17 @@ class BubbleModel:
             points[:, 2] += values.get(name, 0.0) * mode
         strain = self.strain
         for name in self.strains.keys() & values.keys():
-            before = np.zeros_like(points) if strain is None else strain
-            strain = before + values[name] * self.strains[name]
+            previous = np.zeros_like(points) if strain is None else strain
+            strain = previous + values[name] * self.strains[name]
         offset = values.get(PRESSURE_OFFSET, 0.0)
         warp, fill = (
-            own + values.get(name, 0.0) for own, name in zip(self.slack, SLACK, strict=True)
+            slack + values.get(name, 0.0) for slack, name in zip(self.slack, SLACK, strict=True)
         )
         yarns = self.mesh.warp
         if turn := values.get(TURN, 0.0):
             x, y, z = np.eye(3)[0] if yarns is None else yarns.T
-            turned = [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
-            yarns = np.array(np.broadcast_to(np.stack(turned, axis=-1), (len(self.mesh.quads), 3)))
+            rotated = [x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z]
+            yarns = np.array(np.broadcast_to(np.stack(rotated, axis=-1), (len(self.mesh.quads), 3)))
         return replace(
             self,
             mesh=replace(self.mesh, points=points, warp=yarns),
@@ -262,7 +262,7 @@ class MeasuredShape(BubbleModel):
     fields: Array = None  # type: ignore[assignment]
 
     @classmethod
-    def of(cls, model: BubbleModel, moved: Array, fields: Array) -> Self:
+    def of(cls, model: BubbleModel, displacements: Array, fields: Array) -> Self:
         """Return the shape of a model; its pressures are the steps of the law."""
         return cls(
             model.mesh,
@@ -274,8 +274,8 @@ class MeasuredShape(BubbleModel):
             model.slack,
             model.strain,
             model.strains,
-            moved[:, model.mesh.node_sets["rim"]],
-            moved,
+            displacements[:, model.mesh.node_sets["rim"]],
+            displacements,
             fields,
             unloaded=model.unloaded,
             cords=model.cords,
@@ -284,6 +284,6 @@ class MeasuredShape(BubbleModel):
 
 def default_increments(pressures: Sequence[float]) -> tuple[float, ...]:
     """Return the pressures with small first steps, which help Newton from a flat sheet."""
-    first, *rest = pressures
-    between = [first + (p - first) * 18.0 / 37.0 for p in rest[:1] if p > 1.5 * first]
-    return (first * 6.0 / 22.0, first, *between, *rest)
+    first, *later = pressures
+    between = [first + (p - first) * 18.0 / 37.0 for p in later[:1] if p > 1.5 * first]
+    return (first * 6.0 / 22.0, first, *between, *later)

@@ -25,8 +25,8 @@ def divided_quarter_disk(n: int, m: int) -> tuple[Array, NDArray[np.intp]]:
     core_nodes = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     # The core's two far sides, from the x axis to the y axis, are the ring's first layer.
     side = np.concatenate([core_nodes[n, :], core_nodes[-2::-1, n]])
-    outside = len(core_nodes.ravel()) + np.arange(m * len(side)).reshape(m, len(side))
-    ring_nodes = np.concatenate([side[None], outside])
+    outer_nodes = len(core_nodes.ravel()) + np.arange(m * len(side)).reshape(m, len(side))
+    ring_nodes = np.concatenate([side[None], outer_nodes])
     points = np.concatenate([core.reshape(-1, 2), ring[1:].reshape(-1, 2)])
     return points, np.concatenate([grid_quads(core_nodes), grid_quads(ring_nodes)])
 
@@ -35,8 +35,8 @@ def divisions(elements: float) -> tuple[int, int]:
     """Return core divisions n and ring layers m whose n^2 + 2 n m is nearest to `elements`."""
     best = (math.inf, math.inf, 1, 1)
     for n in range(1, math.isqrt(math.ceil(elements)) + 2):
-        wanted = round((elements - n * n) / (2 * n))
-        m = min(max(wanted, math.ceil(THINNEST * n)), max(1, math.floor(THICKEST * n)))
+        ideal = round((elements - n * n) / (2 * n))
+        m = min(max(ideal, math.ceil(THINNEST * n)), max(1, math.floor(THICKEST * n)))
         best = min(best, (abs(n * n + 2 * n * m - elements), abs(m / n - 0.5), n, m))
     return best[2], best[3]
 

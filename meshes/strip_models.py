@@ -58,14 +58,14 @@ def _levels(length: float, along: int, gauge: float) -> tuple[Array, int]:
         return np.linspace(0.0, length, along + 1), 0
     if along < 3:
         raise InputError(None, "along", f"a gauge inside the strip needs 3 rows, got {along}")
-    inside = np.arange(2 - along % 2, along - 1, 2)
-    rows = int(inside[np.argmin(np.abs(inside / along - gauge / length))])
-    outside = (along - rows) // 2
+    candidates = np.arange(2 - along % 2, along - 1, 2)
+    rows = int(candidates[np.argmin(np.abs(candidates / along - gauge / length))])
+    rows_outside = (along - rows) // 2
     ends = 0.5 * (length - gauge), 0.5 * (length + gauge)
-    before = np.linspace(0.0, ends[0], outside + 1)
-    after = np.linspace(ends[1], length, outside + 1)
+    below_gauge = np.linspace(0.0, ends[0], rows_outside + 1)
+    above_gauge = np.linspace(ends[1], length, rows_outside + 1)
     between = np.linspace(*ends, rows + 1)[1:-1]
-    return np.concatenate([before, between, after]), outside
+    return np.concatenate([below_gauge, between, above_gauge]), rows_outside
 
 
 def yarn_direction(angle: float) -> Array:
@@ -200,14 +200,14 @@ class PatchModel(OfThickness):
     @cached_property
     def mesh(self) -> Mesh:
         sets = {"symmetry_x": [0, 3], "symmetry_y": [0, 1], "right": [1, 2], "top": [2, 3]}
-        return replace(SQUARE, node_sets={name: np.array(own) for name, own in sets.items()})
+        return replace(SQUARE, node_sets={name: np.array(nodes) for name, nodes in sets.items()})
 
     def displacements(self, elongation: ArrayLike) -> Array:
         """Return (n, 4, 3) mm of the corners at elongations (n, 2)."""
         e = np.asarray(elongation, dtype=float)
-        moved = np.zeros((len(e), 4, 3))
-        moved[:, :, :2] = self.mesh.points[:, :2] * e[:, None, :]
-        return moved
+        displacement = np.zeros((len(e), 4, 3))
+        displacement[:, :, :2] = self.mesh.points[:, :2] * e[:, None, :]
+        return displacement
 
 
 def elongations(displacement: ArrayLike) -> Array:

@@ -25,9 +25,9 @@ def angles(n: int, seam: float) -> Array:
     step = math.pi / (4 * n)
     angle = np.linspace(0.0, math.pi, 4 * n + 1)
     if seam:
-        inside = min(max(1, round(seam / step)), 2 * n - 1)
-        angle[: inside + 1] = np.linspace(0.0, seam, inside + 1)
-        angle[inside : 2 * n + 1] = np.linspace(seam, 0.5 * math.pi, 2 * n - inside + 1)
+        in_seam = min(max(1, round(seam / step)), 2 * n - 1)
+        angle[: in_seam + 1] = np.linspace(0.0, seam, in_seam + 1)
+        angle[in_seam : 2 * n + 1] = np.linspace(seam, 0.5 * math.pi, 2 * n - in_seam + 1)
     return angle
 
 
@@ -50,14 +50,14 @@ def with_cap(
     quarter, pattern = divided_quarter_disk(n, max(1, round(n / 2)))
     disk, pattern, _ = with_mirror_image(snapped(quarter, NEAR), pattern, 1)
     at = np.arctan2(disk[:, 0], -disk[:, 1])
-    far = np.hypot(disk[:, 0], disk[:, 1])
+    distance = np.hypot(disk[:, 0], disk[:, 1])
     even = np.linspace(0.0, math.pi, len(angle))
     # Turned with the square of the radius, so that the rim meets the tube's rows of nodes.
-    at += far**2 * (np.interp(at, even, angle) - at)
+    at += distance**2 * (np.interp(at, even, angle) - at)
     end = points[grid[-1, 0], 2]
     radius = -points[grid[0, 0], 1]
-    flat = radius * snapped(np.stack([far * np.sin(at), -far * np.cos(at)], axis=1), NEAR)
-    rim = far > 1 - NEAR
+    flat = radius * snapped(np.stack([distance * np.sin(at), -distance * np.cos(at)], axis=1), NEAR)
+    rim = distance > 1 - NEAR
     number = np.empty(len(disk), dtype=np.intp)
     number[rim] = grid[-1, np.argmin(np.abs(at[rim, None] - angle), axis=1)]
     number[~rim] = len(points) + np.arange(np.count_nonzero(~rim))
@@ -101,11 +101,11 @@ def _between(start: float, end: float, size: float, refinements: Sequence[Refine
     finest = min([size, *(r.size for r in refinements)])
     count = max(SAMPLES, math.ceil(SAMPLES * (end - start) / finest))
     z = np.linspace(start, end, count + 1)
-    wanted = np.full(len(z), float(size))
+    sizes = np.full(len(z), float(size))
     for r in refinements:
-        beyond = np.maximum(np.abs(z - r.position) - r.reach, 0.0)
-        wanted = np.minimum(wanted, r.size + GROWTH * beyond)
-    density = 1 / wanted
+        distance = np.maximum(np.abs(z - r.position) - r.reach, 0.0)
+        sizes = np.minimum(sizes, r.size + GROWTH * distance)
+    density = 1 / sizes
     total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(z))])
     parts = max(1, round(total[-1]))
     places = np.interp(np.linspace(0.0, total[-1], parts + 1)[1:], total, z)
@@ -222,7 +222,9 @@ def surface_mesh(blocks: list[np.ndarray]) -> Mesh:
     points = np.concatenate([b.reshape(-1, 3) for b in blocks])
     ends = np.cumsum([b[..., 0].size for b in blocks])[:-1]
     nodes = zip(np.split(np.arange(len(points)), ends), blocks, strict=True)
-    quads = np.concatenate([grid_quads(own.reshape(b.shape[:2])) for own, b in nodes])
+    quads = np.concatenate(
+        [grid_quads(nodes_of_block.reshape(b.shape[:2])) for nodes_of_block, b in nodes]
+    )
     rounded = np.round(points, 6)
     _, first, inverse = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     points = points[first]

@@ -47,20 +47,20 @@ class Says:
 
     @property
     def notes(self) -> list[Note]:
-        lost = [Note(LOSES, words) for words in self.loses]
-        return [*lost, *(Note(CONFIRM, words) for words in self.confirm)]
+        losses = [Note(LOSES, words) for words in self.loses]
+        return [*losses, *(Note(CONFIRM, words) for words in self.confirm)]
 
     def lines(self) -> list[str]:
-        found: list[str] = []
+        lines: list[str] = []
         for head, texts in (
             ("carries", self.carries),
             ("loses", self.loses or ("nothing",)),
             ("to confirm", self.confirm),
         ):
-            found += [f"{head}:"] if texts else []
+            lines += [f"{head}:"] if texts else []
             for text in texts:
-                found += textwrap.wrap(text, WIDTH, initial_indent="  - ", subsequent_indent="    ")
-        return found
+                lines += textwrap.wrap(text, WIDTH, initial_indent="  - ", subsequent_indent="    ")
+        return lines
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,10 @@ def check_positive(card: MaterialCard) -> None:
 
 
 def heading(
-    card: MaterialCard, what: str, says: Says, comment: str, units: str = "mm, N, MPa"
+    card: MaterialCard, description: str, says: Says, comment: str, units: str = "mm, N, MPa"
 ) -> str:
     """Return the comment that begins every file: card, format, what it carries and loses."""
-    lines = [f"{what}, written by bubblefit {__version__}."]
+    lines = [f"{description}, written by bubblefit {__version__}."]
     for label, text in (("card", card.name), ("source", card.source)):
         # One line each, whatever the card's text holds.
         words = one_line(" ".join(text.split()))
@@ -114,8 +114,8 @@ def heading(
     return "\n".join(f"{comment} {line}" for line in ascii_lines)
 
 
-def title_of(card: MaterialCard, most: int) -> str:
-    return one_line(_ascii(card.name))[:most] or "fabric"
+def title_of(card: MaterialCard, length: int) -> str:
+    return one_line(_ascii(card.name))[:length] or "fabric"
 
 
 def _ascii(text: str) -> str:
@@ -150,8 +150,8 @@ def band_table(card: MaterialCard) -> str:
     rows = [f"# {100 * LEVEL:g} % band of the moduli: {_ascii(str(sure.words))}", BAND_COLUMNS]
     for name, strain in strains_of(law).items():
         values = strain, law.modulus(name, strain), *sure.band(law, name, strain)
-        every = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
-        rows += [f"{name},{numbers}" for numbers in every]
+        lines = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
+        rows += [f"{name},{numbers}" for numbers in lines]
     return "\n".join(rows) + "\n"
 
 
@@ -217,9 +217,9 @@ class Format:
     load_ratios: bool = False
     unloads: bool = False
 
-    def export(self, card: MaterialCard, **given: Any) -> Export:
+    def export(self, card: MaterialCard, **options: Any) -> Export:
         """Return the files of a card, and of its band if any; raise InputError if unfit."""
-        self.check(given)
+        self.check(options)
         if card.law.of_load_ratio and not self.load_ratios:
             problem = (
                 f"the format {self.name} has moduli of strain, and those of a {card.law.form.name} "
@@ -233,25 +233,25 @@ class Format:
             )
             raise InputError(None, "memory", problem)
         check_positive(card)
-        export = self.write(card, self.options(**given))
+        export = self.write(card, self.options(**options))
         if card.certainty is None:
             return export
         return replace(export, files={**export.files, BAND_FILE: band_table(card)})
 
     def write_files(
-        self, card: MaterialCard, stem: Path, overwrite: bool = False, **given: Any
+        self, card: MaterialCard, stem: Path, overwrite: bool = False, **options: Any
     ) -> list[Path]:
         """Write the files of a card, the stem with a suffix each, and return them."""
-        export = self.export(card, **given)
+        export = self.export(card, **options)
         paths = [stem.with_name(f"{stem.name}{suffix}") for suffix in export.files]
         write_export(export, paths, overwrite)
         return paths
 
     def check(self, names: Iterable[str]) -> None:
         """Raise InputError for the name of an option that this format does not take."""
-        known = {entry.name for entry in fields(self.options)}
+        option_names = {entry.name for entry in fields(self.options)}
         for name in names:
-            if name not in known:
+            if name not in option_names:
                 raise InputError(
                     None, f"--{name.replace('_', '-')}", f"means nothing to the format {self.name}"
                 )
@@ -259,11 +259,11 @@ class Format:
 
 def options_of(formats: Iterable[Format]) -> Mapping[str, Option]:
     """Return every option of these formats by its name; those of one name mean the same."""
-    found: dict[str, Option] = {}
-    for each in formats:
-        for entry in fields(each.options):
-            found.setdefault(entry.name, entry.metadata["option"])
-    return found
+    options: dict[str, Option] = {}
+    for export_format in formats:
+        for entry in fields(export_format.options):
+            options.setdefault(entry.name, entry.metadata["option"])
+    return options
 
 
 #: Log strain of the one point in compression: a curve has to begin somewhere.
@@ -313,7 +313,9 @@ def fabric_curves(card: MaterialCard, options: TableOptions, measure: Measure) -
     }
     pushed = np.array([COMPRESSION])
     warp, fill = (
-        np.concatenate([curve_of(card.law, name, own, measure) for own in (pushed, strains[name])])
+        np.concatenate(
+            [curve_of(card.law, name, strain, measure) for strain in (pushed, strains[name])]
+        )
         for name in ("E1", "E2")
     )
     gamma = strains["G12"][strains["G12"] >= 0]
@@ -341,14 +343,14 @@ def unloading_curves(
     Empty where the law has no memory. The fabric was loaded to that end for the first time.
     """
     law = card.law
-    found = {}
+    curves = {}
     if law.memory is None:
         return {}
     for k, (name, modulus) in enumerate(zip(STRAIN_NAMES, COMPONENTS, strict=True)):
         end = float(modulus_table(law, modulus, 2, options.reach).strain[-1])
         path = np.linspace(end, law.memory.kept(k, end), options.points)
-        found[name] = curve_of(law, modulus, path, measure)[::-1]
-    return found
+        curves[name] = curve_of(law, modulus, path, measure)[::-1]
+    return curves
 
 
 def _softer(law: HypoelasticLaw, log_strain: float) -> tuple[float, float]:

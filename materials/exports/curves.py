@@ -59,13 +59,13 @@ class Law58Options(base.CurveOptions):
 
 def yarn_of(strain: Array, stress: Array) -> Yarn:
     """Fit by least squares; without softening where the curve stiffens: B has to be positive."""
-    both = np.column_stack([strain, -0.5 * strain**2])
-    modulus, softening = np.linalg.lstsq(both, stress, rcond=None)[0].tolist()
+    columns = np.column_stack([strain, -0.5 * strain**2])
+    modulus, softening = np.linalg.lstsq(columns, stress, rcond=None)[0].tolist()
     stiffens = not (softening > 0 and modulus > 0)
     if stiffens:
         modulus = float(strain @ stress / (strain @ strain))
         softening = 0.0
-    off = stress - both @ [modulus, softening]
+    off = stress - columns @ [modulus, softening]
     rms = float(np.sqrt(np.mean(off**2)) / np.abs(stress).max())
     return Yarn(modulus, softening, rms, stiffens)
 
@@ -95,10 +95,10 @@ def law58(card: MaterialCard, options: Law58Options) -> base.Export:
     functions = {}
     if unload:
         tension = {name: getattr(curves, name)[1:] for name in ("warp", "fill")}
-        both = [*{**tension, "shear": curves.shear}.values(), *map(from_zero, unload.values())]
+        tables = [*{**tension, "shear": curves.shear}.values(), *map(from_zero, unload.values())]
         for k in (2, 5):  # of the angle between the yarns, in degrees
-            both[k] = both[k] * [math.degrees(1.0), 1.0]
-        functions = dict(enumerate(both, start=FUNCTION))
+            tables[k] = tables[k] * [math.degrees(1.0), 1.0]
+        functions = dict(enumerate(tables, start=FUNCTION))
     straight = [name for name, yarn in (("warp", warp), ("fill", fill)) if yarn.stiffens]
     stiff = (
         f"the stiffening along {' and '.join(straight)}: B has to be positive, a mean E is written"
@@ -200,7 +200,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
     }
     if unload:
         unload["shear unloading"] = _odd(unload["shear unloading"])
-    lost = ("the stiffness of the law in compression",) if slack else ()
+    losses = ("the stiffness of the law in compression",) if slack else ()
     says = base.Says(
         carries=(
             f"curves LCA (warp), LCB (fill), LCAB (shear): {NAMES[measure]}; of strips free to "
@@ -211,7 +211,7 @@ def mat34(card: MaterialCard, options: Mat34Options) -> base.Export:
             *((f"{UNLOADS} (LCUA, LCUB, LCUAB); RL = 0",) if unload else ()),
         ),
         loses=(
-            *lost,
+            *losses,
             "nu12: FORM 14 with curves does not couple warp and fill; " + curves.uncoupled,
             f"stress along the yarns in shear alone (2nd Piola-Kirchhoff, up to "
             f"{curves.yarns:.3g} MPa in the card)",
@@ -314,9 +314,9 @@ def fabric(card: MaterialCard, options: base.CurveOptions) -> base.Export:
 
 def material_name(card: MaterialCard) -> str:
     """Return a name for Abaqus and CalculiX: letters, digits and underscores, a letter first."""
-    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.upper())
-    kept = kept.strip("_")[:32]
-    return kept if kept[:1].isalpha() else "FABRIC"
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.upper())
+    name = name.strip("_")[:32]
+    return name if name[:1].isalpha() else "FABRIC"
 
 
 FABRIC = base.Format("abaqus-fabric", fabric, base.CurveOptions, unloads=True)

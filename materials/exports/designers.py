@@ -47,16 +47,16 @@ class ConstantsOptions:
     )
 
 
-def _yarn(what: str, yarn: str, least: float | None = None) -> Any:
-    return option(None, f"{what}, {yarn} [not given].", least=least)
+def _yarn(description: str, yarn: str, lower: float | None = None) -> Any:
+    return option(None, f"{description}, {yarn} [not given].", least=lower)
 
 
 @dataclass(frozen=True)
 class SheetOptions(ConstantsOptions):
     """Numbers that a design program needs beside the stiffness; a card has neither."""
 
-    prestress_warp: float | None = _yarn("kN/m, prestress", "warp", least=0)
-    prestress_fill: float | None = _yarn("kN/m, prestress", "fill", least=0)
+    prestress_warp: float | None = _yarn("kN/m, prestress", "warp", lower=0)
+    prestress_fill: float | None = _yarn("kN/m, prestress", "fill", lower=0)
     kept_warp: float | None = _yarn("%, strain kept after load cycles", "warp")
     kept_fill: float | None = _yarn("%, strain kept after load cycles", "fill")
 
@@ -73,8 +73,8 @@ class Linear:
 
     @property
     def says(self) -> Says:
-        found = self.found
-        least, largest = found.shear
+        constants = self.found
+        smallest, largest = constants.shear
         unknown: tuple[str, ...] = ()
         if self.card.law.strain_range[2] < SHEARED:
             unknown = (
@@ -84,25 +84,29 @@ class Linear:
             f"{NAMES[name]} {low:.4g} to {high:.4g}"
             for name, (low, high) in designers.spread_of(evaluations(self)).items()
         )
-        lost = ", ".join(
-            f"{name} {rms:.3g} of {found.largest[name]:.3g} %" for name, rms in found.lost.items()
+        losses = ", ".join(
+            f"{name} {rms:.3g} of {constants.largest[name]:.3g} %"
+            for name, rms in constants.lost.items()
         )
         return Says(
             carries=(
                 f"straight lines of load over strain from {self.lowest:g} to {self.highest:.4g} "
-                f"kN/m: least squares of the {found.evaluation.options.minimise}s of "
-                f"{found.evaluation.paths} paths of ratios {', '.join(found.lost)}, reciprocal",
+                f"kN/m: least squares of the {constants.evaluation.options.minimise}s of "
+                f"{constants.evaluation.paths} paths of ratios {', '.join(constants.lost)}, "
+                "reciprocal",
                 f"G: mean tangent to a shear strain of {100 * self.shear:.3g} %",
             ),
             loses=(
                 *unknown,
-                f"what is not straight: RMS of strain, by ratio: {lost}; {found.rms:.3g} % over "
+                f"what is not straight: RMS of strain, by ratio: {losses}; "
+                f"{constants.rms:.3g} % over "
                 "all",
-                f"over {1 + len(found.others)} choices of paths, squares and reciprocity: {spread}",
+                f"over {1 + len(constants.others)} choices of paths, squares and reciprocity: "
+                f"{spread}",
                 *(
                     []
-                    if f"{least:.4g}" == f"{largest:.4g}"
-                    else [f"G from {least:.4g} to {largest:.4g} kN/m along the shear"]
+                    if f"{smallest:.4g}" == f"{largest:.4g}"
+                    else [f"G from {smallest:.4g} to {largest:.4g} kN/m along the shear"]
                 ),
             ),
         )
@@ -120,15 +124,15 @@ def linear_card(card: MaterialCard, options: ConstantsOptions) -> Linear:
         end = float(law.strain_range[2])
         shear = end if SHEARED <= end < UNLIMITED else SHEAR
     chosen = designers.Options(options.paths == "10", True, options.minimise)
-    found = designers.constants_of_law(law, thickness, options.lowest, highest, shear, chosen)
-    c = found.constants
+    constants = designers.constants_of_law(law, thickness, options.lowest, highest, shear, chosen)
+    c = constants.constants
     if not c.nu_warp * c.nu_fill < 1:
         problem = (
             f"nu_warp nu_fill is {c.nu_warp * c.nu_fill:.3g} between {options.lowest:g} and "
             f"{highest:.4g} kN/m; no program takes 1 or more: choose other loads"
         )
         raise InputError(None, "--highest", problem)
-    return Linear(card, found, options.lowest, highest, shear)
+    return Linear(card, constants, options.lowest, highest, shear)
 
 
 def evaluations(linear: Linear) -> list[designers.Evaluation]:
@@ -156,7 +160,7 @@ Row = tuple[str, Sequence[float | None], str]
 
 def _sheet(
     linear: Linear,
-    what: str,
+    description: str,
     stiffness: Sequence[tuple[str, float | None, str]],
     options: SheetOptions,
     *confirm: str,
@@ -166,10 +170,10 @@ def _sheet(
     says = linear.says
     missing = "not given"
     loads = options.prestress_warp, options.prestress_fill
-    kept = options.kept_warp, options.kept_fill
+    kept_strains = options.kept_warp, options.kept_fill
     strain: Sequence[float | None] = (None, None)
-    for words, both in (("prestress", loads), ("kept", kept)):
-        if sum(value is None for value in both) == 1:
+    for words, pressures_or_strains in (("prestress", loads), ("kept", kept_strains)):
+        if sum(value is None for value in pressures_or_strains) == 1:
             field = f"--{words}-warp, --{words}-fill"
             raise InputError(None, field, "expected both yarns, got one")
     carries = says.carries
@@ -178,19 +182,19 @@ def _sheet(
         loses += ("prestress: a card has none (--prestress-warp, --prestress-fill)",)
     else:
         path = np.linspace(0.0, 1.0, designers.STEPS + 1)[1:, None] * np.array(loads, dtype=float)
-        found = biaxial_response(card.law, path, card.thickness)
-        if found.reached < len(path):
+        response = biaxial_response(card.law, path, card.thickness)
+        if response.reached < len(path):
             problem = "the law does not carry it: choose a lower prestress"
             raise InputError(None, "--prestress-warp", problem)
-        strain = (100 * found.elongation[-1]).tolist()
+        strain = (100 * response.elongation[-1]).tolist()
         carries += ("strain at the prestress: of the law itself, from the unloaded fabric",)
-    if None in kept:
+    if None in kept_strains:
         loses += (
             "compensation: a card knows no strain kept after load cycles; `bubblefit biaxial` "
             "measures it (--kept-warp, --kept-fill)",
         )
     rows = [*stiffness]
-    compensation: Row = ("compensation (strain kept)", kept, "%")
+    compensation: Row = ("compensation (strain kept)", kept_strains, "%")
     prestress: Row = ("prestress", loads, "kN/m")
     elastic: list[Row] = [("strain at the prestress", strain, "%")] if None not in strain else []
     for words, pair, unit in (prestress, *elastic, compensation):
@@ -200,7 +204,7 @@ def _sheet(
         for name, value, unit in rows
     ]
     says = Says(carries, loses, (*says.confirm, WHICH_NU, *confirm))
-    text = "\n".join([heading(card, what, says, "#", "as beside each value"), *lines]) + "\n"
+    text = "\n".join([heading(card, description, says, "#", "as beside each value"), *lines]) + "\n"
     return Export({".txt": text}, says)
 
 
@@ -258,11 +262,11 @@ def constants(card: MaterialCard, options: ConstantsOptions) -> Export:
     """Write inverse form (E, nu) and direct form (A), G, and the same by every other choice."""
     linear = linear_card(card, options)
     rows = []
-    for number, one in enumerate(evaluations(linear)):
+    for number, evaluation in enumerate(evaluations(linear)):
         row = {
             "chosen": "yes" if number == 0 else "",
             "G_kN_per_m": linear.found.constants.shear,
-            **designers.row_of(one),
+            **designers.row_of(evaluation),
         }
         rows.append(",".join(_text(row[name]) for name in COLUMNS))
     meaning = (

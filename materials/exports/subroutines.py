@@ -139,13 +139,13 @@ def guarded(table: ModulusTable) -> list[list[float]]:
     """Return strain and modulus of a table, and one point more beyond each end."""
     rows = np.pad(np.column_stack([table.strain, table.modulus]), ((1, 1), (0, 0)), "edge")
     rows[[0, -1], 0] += [-GUARD, GUARD]
-    found: list[list[float]] = rows.tolist()
-    return found
+    numbers: list[list[float]] = rows.tolist()
+    return numbers
 
 
 def _name(card: MaterialCard) -> str:
-    kept = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
-    return kept.strip("_")[:24] or "fabric"
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in card.name.lower())
+    return name.strip("_")[:24] or "fabric"
 
 
 NLELAST = base.Format("marc", nlelast, base.TableOptions)

@@ -98,20 +98,24 @@ class Form(Protocol):
 
 def ratio_map(form: Form) -> Array:
     """Return (2, size), d (gain of E1 and E2 by their load ratio, from 0 to 1) / d beta."""
-    own = getattr(form, "by_load_ratio", None)
-    return np.zeros((2, form.size)) if own is None else np.asarray(own(), dtype=float)
+    by_load_ratio = getattr(form, "by_load_ratio", None)
+    return (
+        np.zeros((2, form.size))
+        if by_load_ratio is None
+        else np.asarray(by_load_ratio(), dtype=float)
+    )
 
 
 def crimp_map(form: Form) -> Array:
     """Return (3, size), d (T1, T2, S of crimp interchange) / d beta, or (0, size) without."""
-    own = getattr(form, "by_crimp", None)
-    return np.zeros((0, form.size)) if own is None else np.asarray(own(), dtype=float)
+    by_crimp = getattr(form, "by_crimp", None)
+    return np.zeros((0, form.size)) if by_crimp is None else np.asarray(by_crimp(), dtype=float)
 
 
 def own_bounds(form: Form) -> Mapping[str, tuple[float, float]]:
     """Return least and largest, MPa, of entries of beta that are no moduli, by `modulus_of`."""
-    found: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
-    return found
+    bounds: Mapping[str, tuple[float, float]] = getattr(form, "own_bounds", {})
+    return bounds
 
 
 def ratios_of(form: Form, name: str) -> tuple[float, ...]:
@@ -165,26 +169,30 @@ def modulus_rows(
     """Return (n, size), d modulus / d beta at strains (n,), held ones included, at a load ratio."""
     component = COMPONENTS[name]
     uppers, rows = _in_range(form, tuple(float(end) for end in strain_range))
-    held = held_strain(component, strain, uppers[component, -1])
-    place = np.searchsorted(uppers[component, :-1], held)
-    powers = np.vander(held, 4)
-    own = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
-    return own if name == SHEAR else own + (ratio - EVEN) * ratio_map(form)[component]
+    in_range = held_strain(component, strain, uppers[component, -1])
+    place = np.searchsorted(uppers[component, :-1], in_range)
+    powers = np.vander(in_range, 4)
+    at_even_loads = np.asarray(np.einsum("ni,nij->nj", powers, rows[component, place]))
+    return (
+        at_even_loads
+        if name == SHEAR
+        else at_even_loads + (ratio - EVEN) * ratio_map(form)[component]
+    )
 
 
 def moduli_on_grid(form: Form, strain_range: Sequence[float]) -> dict[str, Array]:
     """Return rows (n, size) by modulus on the form's own grids, equal loads first; then what else
     has bounds."""
-    found = {}
+    rows = {}
     for name in ORDER:
         strain = form.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
         several = ratios_of(form, name)
-        found[name] = np.vstack(
+        rows[name] = np.vstack(
             [modulus_rows(form, name, strain, strain_range, ratio) for ratio in several]
         )
     for name in own_bounds(form):
-        found[name] = np.asarray(form.own_rows(name))  # type: ignore[attr-defined]
-    return found
+        rows[name] = np.asarray(form.own_rows(name))  # type: ignore[attr-defined]
+    return rows
 
 
 GROUP: Group = "bubblefit.laws"
@@ -241,9 +249,9 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
     settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
     offer, plug_in = _offer(name)
     if offer is None:
-        known = form_names()
-        words = f"no form is called {name!r}{did_you_mean(name, known) or ';'} known: "
-        raise InputError(None, "form", words + ", ".join(known))
+        names = form_names()
+        words = f"no form is called {name!r}{did_you_mean(name, names) or ';'} known: "
+        raise InputError(None, "form", words + ", ".join(names))
     for key in settings:
         if key not in offer.settings:
             raise InputError(None, key, f"a {name} law has no {key}")
@@ -252,8 +260,8 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
     with plug_in.calling("fails when it is made"):
         form = offer.make(name, settings, strain_range)
     if not isinstance(form, Form):
-        known = [name for name in dir(Form) if not name.startswith("_")]
-        missing = ", ".join(name for name in known if not hasattr(form, name))
+        names = [name for name in dir(Form) if not name.startswith("_")]
+        missing = ", ".join(name for name in names if not hasattr(form, name))
         raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
     return form
 

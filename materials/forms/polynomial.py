@@ -41,10 +41,10 @@ class Polynomial(Form):
         return tuple(ORDER[i // 4] for i in self.free)
 
     def piece_map(self) -> Array:
-        whole = np.zeros((3, 1, 4, 12))
+        rows = np.zeros((3, 1, 4, 12))
         for block, name in enumerate(ORDER):
-            whole[COMPONENTS[name], 0, :, 4 * block : 4 * block + 4] = np.eye(4)
-        return whole
+            rows[COMPONENTS[name], 0, :, 4 * block : 4 * block + 4] = np.eye(4)
+        return rows
 
     def grid(self, component: int, end: float) -> Array:
         return np.linspace(0.0, end, GRID)
@@ -53,12 +53,12 @@ class Polynomial(Form):
         """Return the map from Chebyshev points: condition 6e3 where monomials have 1e8."""
         n = self.degree + 1
         share = 0.5 * (1.0 - np.cos((2 * np.arange(n) + 1) * np.pi / (2 * n)))
-        whole = np.zeros((3 * n, 3 * n))
+        matrix = np.zeros((3 * n, 3 * n))
         for block, name in enumerate(ORDER):
             part = slice(n * block, n * block + n)
             points = strain_range[COMPONENTS[name]] * share
-            whole[part, part] = np.linalg.inv(np.vander(points, n))
-        return whole
+            matrix[part, part] = np.linalg.inv(np.vander(points, n))
+        return matrix
 
     def describe(self) -> str:
         return (
@@ -91,27 +91,27 @@ class LoadRatio(Form):
     modulus_of = ("G12", "E2", "E2", "E1", "E1")
 
     def piece_map(self) -> Array:
-        whole = np.zeros((3, 1, 4, self.size))
+        rows = np.zeros((3, 1, 4, self.size))
         for name, place in PLACES.items():
-            whole[COMPONENTS[name], 0, 3, place] = 1.0
-        return whole
+            rows[COMPONENTS[name], 0, 3, place] = 1.0
+        return rows
 
     def by_load_ratio(self) -> Array:
-        whole = np.zeros((2, self.size))
+        rows = np.zeros((2, self.size))
         for name in ("E1", "E2"):
-            whole[COMPONENTS[name], PLACES[name] + 1] = 1.0
-        return whole
+            rows[COMPONENTS[name], PLACES[name] + 1] = 1.0
+        return rows
 
     def grid(self, component: int, end: float) -> Array:
         return np.array([0.0, end])
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from E2 and E1 where their own yarn carries nothing, and all."""
-        whole = np.eye(self.size)
+        matrix = np.eye(self.size)
         for name in ("E1", "E2"):
-            own = slice(PLACES[name], PLACES[name] + 2)
-            whole[own, own] = [[1.0 - EVEN, EVEN], [-1.0, 1.0]]
-        return whole
+            of_modulus = slice(PLACES[name], PLACES[name] + 2)
+            matrix[of_modulus, of_modulus] = [[1.0 - EVEN, EVEN], [-1.0, 1.0]]
+        return matrix
 
     def describe(self) -> str:
         return (

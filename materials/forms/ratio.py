@@ -61,19 +61,19 @@ class SplineRatio(_MoreThanSpline):
     more, of_more = ("dE2", "dE1"), ("E2", "E1")
 
     def by_load_ratio(self) -> Array:
-        whole = np.zeros((2, self.size))
-        whole[1, -2] = whole[0, -1] = 1.0
-        return whole
+        rows = np.zeros((2, self.size))
+        rows[1, -2] = rows[0, -1] = 1.0
+        return rows
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from moduli at the knots, and at rest where one yarn carries all."""
-        whole = np.eye(self.size)
+        matrix = np.eye(self.size)
         share = 1.0 / (1.0 - EVEN)
         first = self.modulus_of.index
         for place, name in ((-2, "E2"), (-1, "E1")):
-            whole[place, first(name)] = -share
-            whole[place, place] = share
-        return whole
+            matrix[place, first(name)] = -share
+            matrix[place, place] = share
+        return matrix
 
     def describe(self) -> str:
         return (
@@ -114,8 +114,8 @@ for _form in (SplineRatio, SplineCrimp):
         name: str,
         settings: Mapping[str, Any],
         strain_range: Sequence[float],
-        made: type[Spline] = _form,
+        spline_class: type[Spline] = _form,
     ) -> Spline:
-        return made.at(knots_of(settings, strain_range))
+        return spline_class.at(knots_of(settings, strain_range))
 
     register_form(Offer(_form.name, _named, ("knots",), of_load_ratio=True))

@@ -73,21 +73,21 @@ class Spline(base.Form):
 
     @cached_property
     def _map(self) -> Array:
-        most = max(len(row) for row in self.knots)
-        whole = np.zeros((3, most, 4, self.size))
+        count = max(len(row) for row in self.knots)
+        rows = np.zeros((3, count, 4, self.size))
         start = 0
         for name in ORDER:
             component = COMPONENTS[name]
-            own = self.knots[component]
-            stop = start + len(own)
-            whole[component, : len(own) - 1, :, start:stop] = _coefficients(own)
-            whole[component, len(own) - 1 :, 3, stop - 1] = 1.0
+            knots = self.knots[component]
+            stop = start + len(knots)
+            rows[component, : len(knots) - 1, :, start:stop] = _coefficients(knots)
+            rows[component, len(knots) - 1 :, 3, stop - 1] = 1.0
             start = stop
-        return whole
+        return rows
 
     def uppers(self) -> Array:
-        most = max(len(row) for row in self.knots)
-        return np.array([[*row[1:], *[UNLIMITED] * (most + 1 - len(row))] for row in self.knots])
+        count = max(len(row) for row in self.knots)
+        return np.array([[*row[1:], *[UNLIMITED] * (count + 1 - len(row))] for row in self.knots])
 
     def grid(self, component: int, end: float) -> Array:
         return _between([*(knot for knot in self.knots[component] if knot < end), end], PARTS)
@@ -112,13 +112,13 @@ def _between(ends: Sequence[float], parts: int) -> Array:
 def _coefficients(knots: Sequence[float]) -> Array:
     """Return (n - 1, 4, n): powers of strain, highest first, by the values at n knots."""
     spline = scipy.interpolate.CubicSpline(knots, np.eye(len(knots)), bc_type="not-a-knot")
-    whole = np.zeros((len(knots) - 1, 4, len(knots)))
+    coefficients = np.zeros((len(knots) - 1, 4, len(knots)))
     for k, start in enumerate(knots[:-1]):
         for power in range(4):  # c (x - start)^power
             for lower in range(power + 1):
                 share = comb(power, lower) * (-start) ** (power - lower)
-                whole[k, 3 - lower] += share * spline.c[3 - power, k]
-    return whole
+                coefficients[k, 3 - lower] += share * spline.c[3 - power, k]
+    return coefficients
 
 
 def _digits(knots: Sequence[float]) -> int:
@@ -140,44 +140,44 @@ def _increasing(row: Any) -> bool:
 
 def knots_of(settings: Mapping[str, Any], strain_range: Sequence[float]) -> list[list[float]]:
     """Return the rows of `knots`: a number, strains, or either by direction."""
-    given = settings.get("knots")
-    if given is None:
+    setting = settings.get("knots")
+    if setting is None:
         raise InputError(None, "knots", "a spline needs knots = 6, or {warp = [0, ...], ...}")
-    if not isinstance(given, Mapping):
-        return [_row(given, "knots", float(end)) for end in strain_range]
-    ends = zip(_by_direction("knots", given), strain_range, strict=True)
-    return [_row(own, f"knots.{key}", float(end)) for (key, own), end in ends]
+    if not isinstance(setting, Mapping):
+        return [_row(setting, "knots", float(end)) for end in strain_range]
+    ends = zip(_by_direction("knots", setting), strain_range, strict=True)
+    return [_row(direction, f"knots.{key}", float(end)) for (key, direction), end in ends]
 
 
-def _by_direction(name: str, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _by_direction(name: str, by_direction: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield direction and value of each strain; InputError: one is missing, or not known."""
-    for key in given:
+    for key in by_direction:
         if key not in STRAIN_NAMES:
             problem = f"unknown direction; allowed: {', '.join(STRAIN_NAMES)}"
             raise InputError(None, f"{name}.{key}", problem)
     for key in STRAIN_NAMES:
-        if key not in given:
+        if key not in by_direction:
             raise InputError(None, f"{name}.{key}", "this key is missing")
-        yield key, given[key]
+        yield key, by_direction[key]
 
 
-def _row(own: Any, field: str, end: float) -> list[float]:
-    if isinstance(own, int) and not isinstance(own, bool):
-        if not 2 <= own <= MOST_KNOTS:
-            raise InputError(None, field, f"expected 2 to {MOST_KNOTS} knots, got {own}")
+def _row(knots: Any, field: str, end: float) -> list[float]:
+    if isinstance(knots, int) and not isinstance(knots, bool):
+        if not 2 <= knots <= MOST_KNOTS:
+            raise InputError(None, field, f"expected 2 to {MOST_KNOTS} knots, got {knots}")
         if end >= UNLIMITED:
             raise InputError(
                 None, field, "a number of knots needs a strain range to space them over"
             )
         # Rounded for whoever reads the card; the last is the end itself.
-        return [*(float(f"{x:.10g}") for x in np.linspace(0.0, end, own)[:-1]), end]
-    if not _increasing(own):
-        problem = f"expected a number, or at least two strains that increase from 0, got {own}"
+        return [*(float(f"{x:.10g}") for x in np.linspace(0.0, end, knots)[:-1]), end]
+    if not _increasing(knots):
+        problem = f"expected a number, or at least two strains that increase from 0, got {knots}"
         raise InputError(None, field, problem)
-    if len(own) > MOST_KNOTS or own[-1] > end * (1 + 1e-12):
+    if len(knots) > MOST_KNOTS or knots[-1] > end * (1 + 1e-12):
         problem = f"expected at most {MOST_KNOTS} knots, the last at the end {end:g} of the range"
-        raise InputError(None, field, f"{problem} or before it, got {own}")
-    return [float(x) for x in own]
+        raise InputError(None, field, f"{problem} or before it, got {knots}")
+    return [float(x) for x in knots]
 
 
 register_form(Offer("spline", lambda _, own, ends: Spline.at(knots_of(own, ends)), ("knots",)))
@@ -220,11 +220,11 @@ class TriLinear(base.Form):
         return breaks
 
     def piece_map(self) -> Array:
-        whole = np.zeros((3, 3, 4, 12))
+        rows = np.zeros((3, 3, 4, 12))
         for block, name in enumerate(ORDER):
             for piece in range(3):
-                whole[COMPONENTS[name], piece, 3, 4 * block + 3 - piece] = 1.0
-        return whole
+                rows[COMPONENTS[name], piece, 3, 4 * block + 3 - piece] = 1.0
+        return rows
 
     def uppers(self) -> Array:
         return np.column_stack([self.breaks, np.full(3, UNLIMITED)])
@@ -296,40 +296,42 @@ class Pieces:
         return np.array(self.upper)
 
     def grid(self, component: int, end: float) -> Array:
-        ends = [0.0, *sorted({own for own in self.upper[component] if own < end}), end]
+        ends = [0.0, *sorted({upper for upper in self.upper[component] if upper < end}), end]
         return _between(ends, max(2, min(PARTS, ASKED // (len(ends) - 1))))
 
     def from_values(self, strain_range: Sequence[float]) -> Array:
         """Return the map from values where the functions differ most; InputError: they do not."""
-        whole = np.zeros((self.size, self.size))
+        matrix = np.zeros((self.size, self.size))
         for name in ORDER:
-            own = np.flatnonzero(np.array(self.modulus_of) == name)
+            of_modulus = np.flatnonzero(np.array(self.modulus_of) == name)
             strain = self.grid(COMPONENTS[name], strain_range[COMPONENTS[name]])
-            rows = modulus_rows(self, name, strain, strain_range)[:, own]
+            rows = modulus_rows(self, name, strain, strain_range)[:, of_modulus]
             scaled = rows / np.maximum(np.abs(rows).max(axis=0), 1e-300)
             _, sizes, places = scipy.linalg.qr(scaled.T, mode="economic", pivoting=True)
             if not np.abs(np.diag(sizes)).min() > DEPENDENT:
                 problem = f"the functions of {name} are not independent up to a strain of "
                 raise InputError(None, "form", f"{problem}{strain[-1]:g}; leave one out")
-            whole[np.ix_(own, own)] = np.linalg.inv(rows[np.sort(places[: len(own)])])
-        return whole
+            matrix[np.ix_(of_modulus, of_modulus)] = np.linalg.inv(
+                rows[np.sort(places[: len(of_modulus)])]
+            )
+        return matrix
 
     def to_card(self) -> dict[str, Any]:
-        said = {"labels": self.labels, "modulus_of": self.modulus_of}
+        names = {"labels": self.labels, "modulus_of": self.modulus_of}
         arrays = {"uppers": self.uppers().tolist(), "map": self.piece_map().tolist()}
-        return {"pieces": {"title": self.title, **{k: list(v) for k, v in said.items()}, **arrays}}
+        return {"pieces": {"title": self.title, **{k: list(v) for k, v in names.items()}, **arrays}}
 
     def describe(self) -> str:
-        said = ", ".join(self.labels)
-        return f"{self.title}, by the cubics of [pieces], highest power first; beta lists {said}."
+        labels = ", ".join(self.labels)
+        return f"{self.title}, by the cubics of [pieces], highest power first; beta lists {labels}."
 
 
 def pieces_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Pieces:
     """Return the form of the table `pieces` of a card."""
     try:
-        said = settings["pieces"]
-        labels, owners = (tuple(map(str, said[key])) for key in ("labels", "modulus_of"))
-        upper, cubics = (np.array(said[key], dtype=float) for key in ("uppers", "map"))
+        table = settings["pieces"]
+        labels, owners = (tuple(map(str, table[key])) for key in ("labels", "modulus_of"))
+        upper, cubics = (np.array(table[key], dtype=float) for key in ("uppers", "map"))
         good = (
             set(owners) == set(ORDER)
             and len(labels) == len(owners)
@@ -345,7 +347,7 @@ def pieces_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[
     if not good:
         problem = "expected labels and modulus_of (n), uppers (3, P), that increase, and map "
         raise InputError(None, "pieces", f"{problem}(3, P, 4, n): copy them from the card of a fit")
-    return Pieces(str(said.get("title", "")), labels, owners, _fixed(upper), _fixed(cubics))
+    return Pieces(str(table.get("title", "")), labels, owners, _fixed(upper), _fixed(cubics))
 
 
 def _fixed(values: Any) -> Any:
@@ -378,44 +380,49 @@ class Form:
         """Return the form up to these strains (eps1, eps2, gamma12); InputError: no such form."""
         labels = list[str]()
         owners = list[str]()
-        found = {}
+        pieces = {}
         for name in ORDER:
             end = float(strain_range[COMPONENTS[name]])
             close = CLOSE * np.abs(self._values(name, np.linspace(0.0, end, GRID))).max(axis=1)
             ends = [0.0, *sorted(b for b in self.breaks if 0 < b < end), end]
             parts = [p for a, b in pairwise(ends) for p in self._cubics(name, a, b, close)]
             parts.append((UNLIMITED, np.eye(4)[:, 3:] @ np.vander([end], 4) @ parts[-1][1]))
-            own = self.labels.get(name) or [f"{name} {k + 1}" for k in range(len(close))]
-            if len(own) != len(close):
-                problem = f"expected {len(close)} of {name}, one of each function, got {len(own)}"
+            own_labels = self.labels.get(name) or [f"{name} {k + 1}" for k in range(len(close))]
+            if len(own_labels) != len(close):
+                problem = (
+                    f"expected {len(close)} of {name}, one of each function, got {len(own_labels)}"
+                )
                 raise InputError(None, "form.labels", problem)
-            found[COMPONENTS[name]] = len(labels), parts
-            labels = [*labels, *own]
-            owners = [*owners, *[name] * len(own)]
-        most = max(len(parts) for _, parts in found.values())
-        upper = np.full((3, most), UNLIMITED)
-        cubics = np.zeros((3, most, 4, len(labels)))
-        for component, (start, parts) in found.items():
-            for k in range(most):
+            pieces[COMPONENTS[name]] = len(labels), parts
+            labels = [*labels, *own_labels]
+            owners = [*owners, *[name] * len(own_labels)]
+        count = max(len(parts) for _, parts in pieces.values())
+        upper = np.full((3, count), UNLIMITED)
+        cubics = np.zeros((3, count, 4, len(labels)))
+        for component, (start, parts) in pieces.items():
+            for k in range(count):
                 upper[component, k], piece = parts[min(k, len(parts) - 1)]
                 cubics[component, k, :, start : start + piece.shape[1]] = piece
         title = type(self).__name__
-        made = Pieces(title, tuple(labels), tuple(owners), _fixed(upper), _fixed(cubics))
-        made.from_values(strain_range)  # says what is wrong with them
-        return made
+        form = Pieces(title, tuple(labels), tuple(owners), _fixed(upper), _fixed(cubics))
+        form.from_values(strain_range)  # says what is wrong with them
+        return form
 
     def _values(self, name: str, strain: Array) -> Array:
         """Return (unknowns, n) values of the functions; InputError: they are none."""
-        why = ""
+        reason = ""
         try:
-            own = [np.broadcast_to(one, strain.shape) for one in self.functions(name, strain)]
-            values = np.array(own, dtype=float)
+            rows = [
+                np.broadcast_to(function_values, strain.shape)
+                for function_values in self.functions(name, strain)
+            ]
+            values = np.array(rows, dtype=float)
         except (TypeError, ValueError) as error:
             values = np.empty((0, 0))
-            why = f" ({error})"
+            reason = f" ({error})"
         if not len(values) or not np.isfinite(values).all():
             problem = f"{type(self).__name__}.functions({name!r}, strain): expected finite values, "
-            raise InputError(None, "form", f"{problem}(n,) for n strains, of each unknown{why}")
+            raise InputError(None, "form", f"{problem}(n,) for n strains, of each unknown{reason}")
         return values
 
     def _cubics(
