@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from .laws import DIRECTION
+
 WIDTH = 25.0  # mm, of a strip whose width no project gives
 
 
@@ -85,13 +87,18 @@ def strip_load(card, direction, strain, width, nu12=None):
     return width * card.thickness * np.exp(-contraction) * stress
 
 
-def integral(card, name, strain, count=2001):
-    """Return the integral of a modulus (MPa) from 0 to a strain, by Simpson's rule."""
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+def integral(card, name, strain):
+    """Return the integral of a modulus (MPa) from 0 to a strain, by Gauss' rule piece by piece."""
     end = min(card.ends[name], strain)
-    x = np.linspace(0.0, end, count)
-    weights = np.ones(count)
-    weights[1:-1:2], weights[2:-1:2] = 4, 2
-    inside = float(weights @ card.modulus(name, x)) * (x[1] - x[0]) / 3 if end > 0 else 0.0
+    pieces = card.breaks if card.form == "trilinear" else card.knots
+    inner = [] if pieces is None else [e for e in pieces[DIRECTION[name]] if 0 < e < end]
+    edges = np.array([0.0, *inner, end])
+    half = 0.5 * np.diff(edges)[:, None]
+    places = edges[:-1, None] + half * (1 + NODES)
+    inside = float(np.sum(half * WEIGHTS * card.modulus(name, places))) if end > 0 else 0.0
     return inside + (strain - end) * float(card.modulus(name, end))
 
 
