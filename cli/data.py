@@ -380,7 +380,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     """
     out, overwrite, as_json = (options.pop(name) for name in ("out", "overwrite", "as_json"))
     fitted = options.pop("fitted")
-    folder = Path("out/cycles") if out is None else out
+    folder = given.held_folder(out or Path("out/cycles"))
     check_out(folder / "cycles.csv", files, overwrite)
     with _naming_options():
         found = cycles(files, **options)

@@ -132,7 +132,7 @@ def run_fit(options: dict[str, Any], kind: str | None = None) -> None:
 
     path: Path = options["project"]
     project = settings_given(given.read_with_solver(options), options)
-    folder: Path = options["out"] or usual_folder(path)
+    folder = given.held_folder(options["out"] or usual_folder(path))
     starts = options["starts"] or project.fit.starts
     for name in options["tests"]:
         if kind is not None and name in project.tests and project.tests[name].kind != kind:

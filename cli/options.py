@@ -21,6 +21,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from ..errors import InputError, OutputError
 from ..readers.sections import LENGTH_UNITS
+from ..runs.in_use import used_alone
 from ..runs.progress import Count
 from ..solvers.registry import ANY
 from ..solvers.registry import command_line as solver_options
@@ -147,11 +148,18 @@ def data_folders(given: Sequence[str]) -> Path | dict[str, Path] | None:
 
 
 def folder_of(options: Mapping[str, Any], suffix: str) -> Path:
-    """Return the output folder of a command that does not fit: --out, or out/NAME-`suffix`."""
+    """Return and hold the output folder of a command that does not fit: --out, or
+    out/NAME-`suffix`."""
     from ..project.schema import usual_folder
 
     own = usual_folder(options["project"])
-    return options["out"] or own.with_name(f"{own.name}-{suffix}")
+    return held_folder(options["out"] or own.with_name(f"{own.name}-{suffix}"))
+
+
+def held_folder(folder: Path) -> Path:
+    """Return an output folder, which this command alone writes until it ends; OutputError."""
+    click.get_current_context().with_resource(used_alone(folder))
+    return folder
 
 
 def result_folder(options: Mapping[str, Any], suffix: str) -> Path:

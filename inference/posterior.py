@@ -44,17 +44,20 @@ def truncated_draws(
     mean : (n,), which may lie outside. allowed : (n,) a point that keeps them, up to rounding."""
     a, c = inequalities
     c = np.minimum(c, a @ allowed)
-    variance, axes = np.linalg.eigh(covariance)
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    sigma[sigma == 0.0] = 1.0
+    variance, axes = np.linalg.eigh(covariance / np.outer(sigma, sigma))
     some = variance > NONE * max(variance[-1], 0.0)
     if not some.any():
         return np.tile(allowed, (count, 1))
-    root = axes[:, some] * np.sqrt(variance[some])
+    turn = _turn_to_reference(axes[:, some])
+    root = sigma[:, None] * ((axes[:, some] * np.sqrt(variance[some])) @ turn)
     # In standard deviations z, seen from the allowed point: rows @ z >= least.
     rows, least = a @ root, c - a @ allowed
     size = np.linalg.norm(rows, axis=1)
     real = size > NONE * size.max(initial=0.0)
     rows, least = rows[real] / size[real, None], least[real] / size[real]
-    centre = (axes[:, some].T @ (mean - allowed)) / np.sqrt(variance[some])
+    centre = turn.T @ ((axes[:, some].T @ ((mean - allowed) / sigma)) / np.sqrt(variance[some]))
     rows, least, centre, back = _without_equalities(rows, least, centre)
     inside: list[Array] = []
     for _ in range(MOST_DRAWS):
@@ -68,6 +71,16 @@ def truncated_draws(
     return np.asarray(allowed + (drawn @ back.T) @ root.T)
 
 
+def _turn_to_reference(basis: Array) -> Array:
+    """Return the rotation Q (k, k) that makes an orthonormal basis (n, k) one that only its space
+    decides: eigenvectors come with any sign, those of equal eigenvalues in any direction, as the
+    processor rounds, and the same draws would be other laws. Q maximises tr(R' basis Q) with a
+    fixed R: it is the orthogonal factor of the polar decomposition of basis' R."""
+    reference = np.random.default_rng(0).standard_normal(basis.shape)
+    left, _, right = np.linalg.svd(basis.T @ reference)
+    return np.asarray(left @ right)
+
+
 def _without_equalities(
     rows: Array, least: Array, centre: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -78,6 +91,7 @@ def _without_equalities(
         return rows, least, centre, np.eye(len(centre))
     _, size, right = np.linalg.svd(rows[held])
     free = right[int((size > 1e-6).sum()) :].T
+    free = free @ _turn_to_reference(free)
     others = rows @ free
     some = np.linalg.norm(others, axis=1) > 1e-6
     return others[some], least[some], free.T @ centre, free

@@ -32,6 +32,7 @@ from ..project.project import Project
 from .best import Card, Optimum, find_optimum
 from .executor import Task, cores
 from .folder import Presented, check_asked, finished
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .setup import fingerprints
 from .simulation import StudyRecord, begin_study
@@ -211,6 +212,7 @@ class Bootstrap(Presented):
 
 
 @checked
+@alone_in_folder
 def bootstrap(
     project: Project, over: str, samples: int = COUNT, card: Card = None,
     tests: str | Sequence[str] | None = None, *, seed: int | None = None,

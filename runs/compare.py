@@ -26,6 +26,7 @@ from .best import noise_of
 from .executor import Task
 from .fit import fit_in_series
 from .folder import Presented, check_asked, finished, shown
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .result import Fit
 from .setup import FitSetup, fingerprints, law_of, make_solver, prepare_fit
@@ -290,6 +291,7 @@ class LawComparison(Presented):
 
 
 @checked
+@alone_in_folder
 def compare(
     project: Project,
     tests: str | Sequence[str] | None = None,

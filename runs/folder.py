@@ -40,6 +40,7 @@ from ..project.objects import with_kept_arrays
 from ..project.project import Project, project_text
 from ..solvers.base import History, Solver
 from ..solvers.run_cache import RunCache
+from .in_use import used_alone
 
 #: Digits of a checksum that are shown.
 DIGITS = 12
@@ -291,7 +292,8 @@ class Reported:
         """Write all files of the result into a folder; return the path of report.html."""
         module, name = PRESENTERS.get(type(self).__name__, ("study_pages", "write_study"))
         write = getattr(import_module(f"bubblefit.reports.{module}"), name)
-        page: Path = write(self, Path(folder))
+        with used_alone(folder):
+            page: Path = write(self, Path(folder))
         return page
 
 

@@ -37,6 +37,7 @@ from ..materials.forms.base import COMPONENTS, UNLIMITED
 from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .setup import FitSetup, prepare_fit
 from .simulation import FAILED, card_of, card_words
@@ -229,6 +230,7 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
 
 
 @checked
+@alone_in_folder
 def plan(
     project: Project, card: MaterialCard | Path | str | None = None,
     tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,

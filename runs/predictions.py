@@ -44,6 +44,7 @@ from .folder import (
     failure_page,
     versions,
 )
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .setup import make_solver
 from .simulation import attempt
@@ -201,6 +202,7 @@ class RunEvent:
 
 
 @checked
+@alone_in_folder
 def predict(
     project: Project, tests: str | Sequence[str] | None = None, cards: Cards = None, *,
     samples: int | None = None, jobs: int | None = None, scheduler: str | None = None,

@@ -29,6 +29,7 @@ from ..project.project import Project
 from .best import NOT_THE_CARD, Card, Optimum, find_optimum
 from .executor import Task, cores, executor_of
 from .folder import Presented, check_unused, finished
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .setup import FitSetup
 
@@ -194,6 +195,7 @@ class Profiles(Presented):
 
 
 @checked
+@alone_in_folder
 def profile(
     project: Project, moduli: Mapping[str, Sequence[float]] | None = None, card: Card = None,
     tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,

@@ -25,6 +25,7 @@ from ..files import pandas as pd
 from ..meshes.mesh import Mesh
 from ..project.project import Project
 from .folder import Presented, check_unused, finished
+from .in_use import alone_in_folder
 from .progress import Listener
 from .simulation import (
     FAILED,
@@ -312,6 +313,7 @@ def edge_length(mesh: Mesh) -> float:
 
 
 @checked
+@alone_in_folder
 def refine(
     project: Project, card: GivenCard | None = None, tests: str | Sequence[str] | None = None,
     what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None, *,
@@ -485,6 +487,7 @@ class Nu12Study(Presented):
         return [*of_parts, *self.warnings]
 
 
+@alone_in_folder
 def vary_nu12(
     project: Project, card: GivenCard | None = None, values: Sequence[float] = NU12,
     tests: str | Sequence[str] | None = None, *, out: Path | str | None = None,

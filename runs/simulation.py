@@ -32,6 +32,7 @@ from ..solvers.registry import counted, usable_solver
 from ..solvers.run_cache import once, run_cache
 from .executor import Task, executor_of
 from .folder import RESULT, RUN, KeptAnalyses, Store, draw
+from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .starts import timed
 
@@ -118,6 +119,7 @@ def simulate(test: Test, card: MaterialCard, solver: str = "membrane", **options
     })  # fmt: skip
 
 
+@alone_in_folder
 def simulate_cards(
     project: Project, tests: Sequence[Test], cards: Mapping[str, MaterialCard], folder: Path,
     within_range: bool = False, progress: Listener = None, command: str = "simulate test",

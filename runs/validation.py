@@ -41,6 +41,7 @@ from .compare import candidates, errors, fit_of, plain
 from .executor import Task
 from .fit import fit_in_series
 from .folder import Presented, check_asked, check_unused, finished, shown
+from .in_use import alone_in_folder
 from .predictions import predict
 from .progress import Listener, listener
 from .result import Fit
@@ -292,6 +293,7 @@ def errors_left_out(
 
 
 @checked
+@alone_in_folder
 def validate(
     project: Project,
     tests: str | Sequence[str] | None = None,
@@ -516,6 +518,7 @@ class WeightStudy(Presented):
 
 
 @checked
+@alone_in_folder
 def weights(
     project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
     starts: int = WEIGHT_STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),

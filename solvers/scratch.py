@@ -14,7 +14,7 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -176,7 +176,7 @@ def claim(folder: Path) -> int | None:
         number = os.open(folder / OWNER, os.O_RDWR | os.O_CREAT, 0o600)
         with suppress(OSError):  # a file system without locks: the process's number will do
             filelock.lock_descriptor(number, blocking=False)
-        os.write(number, "\n".join(_self()).encode())
+        os.write(number, "\n".join(owner_marks()).encode())
     except OSError as error:
         log.info("%s: its owner cannot be written: %s", folder, error.strerror)
     return number
@@ -238,15 +238,22 @@ def _left(folder: Path) -> bool:
         owner = os.read(number, 1000).decode(errors="replace").split("\n")
     finally:
         os.close(number)
-    if len(owner) != len(_self()):
+    if len(owner) != len(owner_marks()):
         return old  # cut off as it was written
-    (machine, boot, process, started), this_process = owner, _self()
+    return owner_is_gone(owner)
+
+
+def owner_is_gone(marks: Sequence[str]) -> bool:
+    """Return whether the process of which these are the `owner_marks` has ended."""
+    if len(marks) != len(owner_marks()):
+        return True
+    (machine, boot, process, started), this_process = marks, owner_marks()
     if boot != this_process[1]:
         return machine == this_process[0]  # before a restart; or of another machine
     return not (process.isdigit() and started == _started(int(process)))
 
 
-def _self() -> tuple[str, str, str, str]:
+def owner_marks() -> tuple[str, str, str, str]:
     """Return the machine, its boot, the process, and when that started."""
     return platform.node(), _boot(), str(os.getpid()), _started(os.getpid())
 

@@ -74,6 +74,31 @@ def best_of(drawn):
     return np.asarray(y)
 
 
+EQUAL = np.eye(4) + 0.1
+SPREAD = np.diag([1e-6, 1.0, 1e3, 1e6])
+ONE_HELD = np.diag([1.0, 4.0, 0.0, 4.0])
+
+
+@pytest.mark.parametrize("covariance", [EQUAL, SPREAD @ EQUAL @ SPREAD, ONE_HELD])
+@pytest.mark.parametrize("least", [[-9.0, -9.0], [0.5, -9.0], [2.0, -2.0], [6.0, -9.0]])
+def test_draws_are_the_same_however_the_processor_rounds(covariance, least):
+    """Signs of eigenvectors, and axes of equal eigenvalues, are decided by rounding."""
+    sigma = np.sqrt(np.diag(covariance))
+    rows = np.array([[0.0, 1.0, 0.0, 0.5], [0.0, -1.0, 0.0, -0.5]]) / np.where(sigma > 0, sigma, 1)
+    allowed = np.array([0.0, 0.7 * max(least[0], 0.0), 0.0, 0.6 * max(least[0], 0.0)]) * sigma
+    inequalities = rows, np.array(least)
+
+    def draws(scale):
+        noise = 1.0 + scale * RANDOM.standard_normal((4, 4))
+        disturbed = covariance * (noise + noise.T) / 2
+        random = np.random.default_rng(1)
+        return truncated_draws(np.zeros(4), disturbed, inequalities, allowed, 200, random)
+
+    first = draws(0.0)
+    for _ in range(5):
+        assert (np.abs(draws(1e-13) - first) <= 1e-7 * sigma + 1e-12).all()
+
+
 def test_the_covariance_is_that_of_the_fits_to_drawn_noise():
     drawn = ROWS * np.random.default_rng(3).standard_normal((800, len(ROWS)))
     found = np.array([best_of(one) for one in drawn])

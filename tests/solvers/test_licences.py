@@ -343,7 +343,7 @@ def test_what_is_kept_is_never_swept(tmp_path, monkeypatch):
 
 
 def left(place, **said):
-    own = dict(zip(("machine", "boot", "process", "started"), scratch._self(), strict=True))
+    own = dict(zip(("machine", "boot", "process", "started"), scratch.owner_marks(), strict=True))
     folder = place / f"bubblefit-t-{len(list(place.iterdir()))}"
     folder.mkdir()
     (folder / OWNER).write_text("\n".join({**own, **said}.values()))

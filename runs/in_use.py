@@ -1,0 +1,124 @@
+"""An output folder is written by one run at a time; who that is stands in a locked file there."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from datetime import datetime
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from ..errors import OutputError
+from ..files import filelock, given, output_errors
+from ..solvers.scratch import owner_is_gone, owner_marks
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: In a folder that is written: marks of the process, the time at which it began, its command.
+HOLDER = ".in-use"
+#: Letters of a command that are shown.
+MAX_LETTERS = 80
+#: Folders that the current call, or one around it, writes.
+_held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
+#: Open files, by folder; a process that is forked must not hold them where this one is killed.
+_locks: dict[Path, int] = {}
+
+
+@contextmanager
+def used_alone(folder: Path | str | None) -> Iterator[None]:
+    """Hold an output folder within the block, which is made if it is not there.
+
+    Calls within may hold it again. None stands for no folder.
+
+    Raises
+    ------
+    OutputError
+        Another process or thread holds it, or it cannot be made.
+    """
+    path = None if folder is None else Path(folder).resolve()
+    if path is None or path in _held.get():
+        yield
+        return
+    new_folders = [part for part in (path, *path.parents) if not part.exists()]
+    with output_errors(path):
+        if path.exists() and not path.is_dir():
+            raise OutputError(f"{folder}: is a file; name a folder for the results")
+        path.mkdir(parents=True, exist_ok=True)
+        lock = _lock(path, str(folder))
+    _locks[path] = lock
+    try:
+        with given(_held, _held.get() | {path}):
+            yield
+    finally:
+        with suppress(OSError):
+            (path / HOLDER).unlink(missing_ok=True)
+        if _locks.pop(path, None) is not None:
+            os.close(lock)
+        with suppress(OSError):  # something was written
+            for part in new_folders:
+                part.rmdir()
+
+
+def alone_in_folder(function: Callable[P, R]) -> Callable[P, R]:
+    """Hold the folder that a function writes, its argument `out` or `folder`, while it runs."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        arguments = signature.bind(*args, **kwargs).arguments
+        with used_alone(arguments.get("out", arguments.get("folder"))):
+            return function(*args, **kwargs)
+
+    return wrapped
+
+
+def _lock(path: Path, name: str) -> int:
+    """Lock the file of the holder, write who that is, and return the open file."""
+    while True:
+        lock = os.open(path / HOLDER, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            marks = os.read(lock, 10_000).decode(errors="replace").split("\n")
+            try:
+                is_free = filelock.lock_descriptor(lock, blocking=False)
+            except OSError:  # a file system without locks: the process's number will do
+                is_free = owner_is_gone(marks[:4])
+            if not is_free:
+                raise OutputError(f"{name}: {_holder_words(marks)}")
+            with suppress(FileNotFoundError):  # removed by its holder meanwhile
+                if os.path.samestat(os.fstat(lock), os.stat(path / HOLDER)):
+                    began = datetime.now().astimezone().isoformat(" ", "seconds")
+                    command = " ".join([Path(sys.argv[0]).name, *sys.argv[1:]])
+                    os.ftruncate(lock, 0)
+                    lines = [*owner_marks(), began, " ".join(command.split())]
+                    os.pwrite(lock, "\n".join(lines).encode(errors="replace"), 0)
+                    return lock
+        except BaseException:
+            os.close(lock)
+            raise
+        os.close(lock)
+
+
+def _holder_words(marks: list[str]) -> str:
+    """Return who uses a folder, since when, and what to do."""
+    who = "another process"
+    if len(marks) == 6:
+        machine, _, process, _, began, command = marks
+        shown = command[:MAX_LETTERS]
+        who = f"process {process} on {machine} ({shown or 'Python'}) since {began}"
+    return f"is in use by {who}; wait until that ends, or name another folder with --out"
+
+
+def _leave_locks_to_parent() -> None:
+    for lock in _locks.values():
+        os.close(lock)
+    _locks.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_leave_locks_to_parent)
