@@ -66,8 +66,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         expected = _annotations(function)
         for name, value in signature.bind(*args, **kwargs).arguments.items():
             if name in expected and not _fits(value, expected[name]):
-                words = inspect.formatannotation(expected[name])
-                words = re.sub(r"\b(\w+\.)+(?=\w)", "", words).replace(" | None", "")
+                words = _annotation_words(expected[name])
                 problem = f"expected {words}, got {repr(value)[:FEW_LETTERS]}"
                 raise InputError(None, name, problem + MADE_BY.get(words, ""))
         return function(*args, **kwargs)
@@ -83,7 +82,32 @@ MADE_BY = {
 }
 #: Letters of a value that are shown.
 FEW_LETTERS = 60
-_annotations = functools.cache(typing.get_type_hints)
+_annotations = functools.cache(functools.partial(typing.get_type_hints, include_extras=True))
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """The smallest number that an annotated argument may be."""
+
+    smallest: int
+
+
+#: Whole numbers as arguments.
+Positive = typing.Annotated[int, AtLeast(1)]
+NotNegative = typing.Annotated[int, AtLeast(0)]
+TwoOrMore = typing.Annotated[int, AtLeast(2)]
+
+
+def _annotation_words(kind: Any) -> str:
+    """Return what an annotation allows, without modules and None."""
+    origin, inside = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated and isinstance(inside[1], AtLeast):
+        return f"{_annotation_words(inside[0])} of {inside[1].smallest} or more"
+    if origin is typing.Literal:
+        return f"one of {', '.join(map(repr, inside))}"
+    if origin in (typing.Union, types.UnionType):
+        return " | ".join(_annotation_words(one) for one in inside if one is not types.NoneType)
+    return re.sub(r"\b(\w+\.)+(?=\w)", "", inspect.formatannotation(kind))
 
 
 def _fits(value: Any, kind: Any) -> bool:
@@ -91,6 +115,9 @@ def _fits(value: Any, kind: Any) -> bool:
     origin, inside = typing.get_origin(kind), typing.get_args(kind)
     if origin in (typing.Union, types.UnionType):
         return any(_fits(value, one) for one in inside)
+    if origin is typing.Annotated:
+        of_kind = _fits(value, inside[0])
+        return of_kind and not (isinstance(inside[1], AtLeast) and value < inside[1].smallest)
     if origin is typing.Literal:
         return value in inside
     if origin is Sequence:  # a text is no sequence of texts
@@ -102,7 +129,9 @@ def _fits(value: Any, kind: Any) -> bool:
     if kind is Any:
         return True
     if kind in (int, float):
-        return hasattr(value, f"__{'index' if kind is int else 'float'}__")
+        # True is an int for Python, and no number for whoever writes starts=True.
+        is_truth = type(value).__name__ in ("bool", "bool_")
+        return hasattr(value, f"__{'index' if kind is int else 'float'}__") and not is_truth
     whole = origin or kind
     if getattr(whole, "_is_protocol", False):  # a plug-in's may have some of its methods only
         methods = [name for name, one in vars(whole).items() if inspect.isfunction(one)]

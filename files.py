@@ -8,6 +8,7 @@ names its distribution. Heavy libraries are imported where they are used.
 from __future__ import annotations
 
 import csv
+import errno
 import hashlib
 import html
 import json
@@ -44,6 +45,7 @@ LARGEST, LARGEST_WRITTEN = 2**30, 2**24
 PIECE = 2**22
 #: Opening a pipe does not wait for its writer; 0 on systems without the flag.
 NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+IS_FOLDER = "is a folder; name a file in it"
 #: Parts of a dotted key.
 MOST_PARTS = 100
 #: Every file with compiled functions. An edit of one must reach the compiled code of all, while
@@ -68,6 +70,8 @@ def content_of(path: Path | str, most: int = LARGEST) -> bytes:
     """Read a whole regular file; InputError if there is none such, or too large; OSError."""
     too_large = InputError(path, "", f"has more than {most // 2**20} MiB; is it the right file?")
     check_regular(path)
+    if os.path.isdir(path):
+        raise InputError(path, "", IS_FOLDER)
     # A pipe may have taken its place by now.
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | NO_WAIT)) as file:
         if os.fstat(file.fileno()).st_size > most:
@@ -95,7 +99,7 @@ def toml_of(path: Path, field: str = "") -> dict[str, Any]:
     """Read a TOML file; InputError (about `field` where it cannot be read at all)."""
     try:
         with reading(path, field):
-            text = content_of(path, LARGEST_WRITTEN).decode("utf-8")
+            text = content_of(path, LARGEST_WRITTEN).decode("utf-8-sig")
         # A key of n parts costs tomllib n squared, in time and memory.
         plain = text.replace(" ", "").replace("\t", "")
         if any(part.count(".") > MOST_PARTS for part in re.split(r"[^\w.\"'-]", plain)):
@@ -105,12 +109,21 @@ def toml_of(path: Path, field: str = "") -> dict[str, Any]:
     except UnicodeDecodeError:
         raise InputError(path, field, "is not a text file in UTF-8") from None
     except (ValueError, RecursionError) as error:  # beside its own, tomllib lets these through
-        raise InputError(path, "TOML syntax", str(error)) from None
+        twice = re.match(r"Cannot declare \('(\w+)',", str(error))
+        advice = f"; several tables of one name are written [[{twice[1]}]]" if twice else ""
+        raise InputError(path, "TOML syntax", f"{error}{advice}") from None
 
 
 def is_file(path: Path) -> bool:
     """Return whether there is a regular file of this name, however odd or long the name is."""
     return os.path.isfile(path)  # Path.is_file raises an OSError where the name is too long
+
+
+def no_file_words(path: Path | str) -> str:
+    """Return why a name is not that of a file: nothing is there, or a folder."""
+    if os.path.isdir(path):
+        return f"{path} {IS_FOLDER}"
+    return f"there is no file {path}"
 
 
 def check_regular(path: Path | str) -> None:
@@ -203,9 +216,14 @@ def output_errors(path: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = error.strerror or str(error)
-        problem = f"cannot be written: {reason}; free space or choose another --out"
-        raise OutputError(f"{path}: {problem}") from error
+        raise OutputError(f"{path}: {unwritable_words(error)} another --out") from error
+
+
+def unwritable_words(error: OSError) -> str:
+    """Return why something cannot be written and what to do, up to what to choose instead."""
+    is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    advice = "free space or choose" if is_full else "choose"
+    return f"cannot be written: {error.strerror or error}; {advice}"
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from ..errors import InputError, SolverFailure
 from ..experiments.kinds import Fabric, Place, Scales
 from ..experiments.registry import kind_named
+from ..files import no_file_words
 from ..materials.card import MaterialCard
 from ..project.project import Project, chosen_cards, named_cards, read_project
 from ..project.schema import FitSection, LawSection, usual_folder
@@ -251,7 +252,7 @@ def simulate_bend(diameter: float, pressure: float, **options: Any) -> None:
         section["places"] = given.numbers(options["places"], "--places")
     for path in options["measured"]:
         if not path.is_file():
-            raise InputError(path, "--measured", "no such file")
+            raise InputError(None, "--measured", no_file_words(path))
     if options["measured"]:
         section["measured"] = {"files": [str(path) for path in options["measured"]]}
     named = named_cards(options["cards"], {})

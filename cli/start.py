@@ -16,7 +16,7 @@ from rich.markdown import Markdown
 
 from ..errors import InputError, OutputError, check_one_of, did_you_mean
 from ..experiments.registry import kind_named
-from ..files import ROOT, __version__, render, write_text
+from ..files import ROOT, __version__, render, unwritable_words, write_text
 from ..inference.methods import method_names
 from ..materials.forms.base import form_names
 from ..project.project import read_project
@@ -98,9 +98,7 @@ def init_command(folder: Path, example: str | None, own: bool, **given: Any) -> 
             for file in content:  # half an example would be in the way of the next attempt
                 with suppress(OSError):
                     (folder / file).unlink(missing_ok=True)
-            raise OutputError(
-                f"{folder}: cannot be written: {error.strerror}; free space or name another folder"
-            ) from None
+            raise OutputError(f"{folder}: {unwritable_words(error)} another folder") from None
         click.echo(wrapped(f"wrote {', '.join(f.name for f in files)} to {folder}"))
         click.echo(f"next: {advice.format(folder / project)}")
 

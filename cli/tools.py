@@ -175,6 +175,8 @@ def report_command(folders: tuple[Path, ...], kind: str, out: Path | None) -> No
         raise InputError(None, "FOLDER", f"give one folder or two, not {len(folders)}")
     for folder in folders:
         if not folder.is_dir():
+            if folder.exists():
+                raise InputError(folder, "", "is a file; name the output folder of a run")
             raise InputError(folder, "", "there is no such folder")
     reports = [page_of_folder(folder) for folder in folders]
     if len(folders) == 1:

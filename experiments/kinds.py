@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
 from ..errors import Against, InputError, Note, NoteKind, SolverFailure, apart, as_note
-from ..files import is_file, replacing
+from ..files import is_file, no_file_words, replacing
 from ..files import pandas as pd
 from ..materials.card import MaterialCard, State, positive, thickness_difference
 from ..meshes.beam_model import axial_table
@@ -169,7 +169,7 @@ class Place:
         """Return whether a measured file is there; raises InputError where it is needed."""
         there = is_file(file)
         if not there and self.need_data:
-            raise self.error(field, f"there is no file {file}; --data DIR names another folder")
+            raise self.error(field, f"{no_file_words(file)}; --data DIR names another folder")
         return there
 
 

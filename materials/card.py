@@ -185,9 +185,11 @@ class MaterialCard:
         law that has an energy: hypoelastic ones have it only in part."""
         return closed_path(self.law)
 
+    @checked
     def write(self, path: Path | str, unit: ModulusUnit = "GPa") -> None:
         write_card(self, Path(path), unit)
 
+    @checked
     def export(
         self, name: str, folder: Path | str = ".", *, overwrite: bool = False, **options: Any
     ) -> list[Path]:

@@ -32,7 +32,7 @@ from ..errors import InputError, did_you_mean
 from ..experiments.bubble.section import RegistrationSection, SheetSection
 from ..experiments.kinds import Output
 from ..experiments.registry import kind_named
-from ..files import is_file, output_errors, write_text
+from ..files import is_file, no_file_words, output_errors, write_text
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..readers.curves import DIRECTIONS, read_load_curves
 from ..readers.frames import QUANTITIES, frame_files
@@ -522,7 +522,7 @@ def file_names(files: Files) -> list[str]:
     found, _ = frame_files(full)
     for file in found:
         if not is_file(file):
-            raise InputError(None, "files", f"there is no file {file}")
+            raise InputError(None, "files", no_file_words(file))
     return list(map(str, found))
 
 

@@ -16,7 +16,7 @@ from ..errors import InputError, check_one_of, checked
 from ..experiments.kinds import Fabric, Place, Scales, Test
 from ..experiments.own import OwnTest
 from ..experiments.registry import kind_named, kind_names, kinds
-from ..files import content_of, is_file, write_text
+from ..files import content_of, is_file, no_file_words, write_text
 from ..inference.methods import method_named, method_names
 from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import Form, form_settings
@@ -415,6 +415,8 @@ class Project:
         fitted : only those that a fit can match, or only those that are predicted. InputError.
         """
         names = None if which is None else [which] if isinstance(which, str) else list(which)
+        if names == []:
+            raise InputError(self.path, "tests", "names no test; leave it out to take all of them")
         able = [t for t in self.tests.values() if fitted in (None, kind_named(t.kind).fitted)]
         for name in names or ():
             if name not in self.tests and name not in kind_names():
@@ -441,7 +443,7 @@ def read_project(
     """
     path, data = Path(path), Path(data) if isinstance(data, str) else data
     content = read_content(path)
-    text = content_of(path).decode("utf-8")
+    text = content_of(path).decode("utf-8-sig")
     return _project(content, path, text, data, need_data)
 
 
@@ -556,6 +558,8 @@ def chosen_cards(project: Project, cards: Cards = None) -> dict[str, MaterialCar
     sources = card_sources(project, cards) or []
     files = [Path(one) for one in sources if str(one) not in project.cards]
     for path in files:
+        if path.is_dir():
+            raise InputError(project.path, "--card", no_file_words(path))
         if not is_file(path):
             problem = f"there is no card (and no file) {str(path)!r}; the project has: "
             problem += f"{', '.join(project.cards) or 'none'}; fit first (bubblefit fit), name a "

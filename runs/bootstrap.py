@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, checked, percent, rows
+from ..errors import InputError, Note, NoteKind, NotNegative, TwoOrMore, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import by_strain
 from ..files import pandas as pd
@@ -214,8 +214,8 @@ class Bootstrap(Presented):
 @checked
 @alone_in_folder
 def bootstrap(
-    project: Project, over: str, samples: int = COUNT, card: Card = None,
-    tests: str | Sequence[str] | None = None, *, seed: int | None = None,
+    project: Project, over: str, samples: TwoOrMore = COUNT, card: Card = None,
+    tests: str | Sequence[str] | None = None, *, seed: NotNegative | None = None,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Listener = None,
 ) -> Bootstrap:  # fmt: skip
@@ -225,8 +225,6 @@ def bootstrap(
     draws, each kept in `out` as it ends. seed : of the draws, the project's unless given. The other
     arguments and the errors are those of `profile`. InputError also : fewer than two units."""
     check_asked(out, resume, overwrite)
-    if samples < 2:
-        raise InputError(None, "--samples", f"expected two or more, got {samples}")
     project = project.with_fit(seed=seed)
     found = find_optimum(project, card, tests)
     groups = groups_of(found, over)

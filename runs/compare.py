@@ -11,7 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, NoFeasibleStart, Note, NoteKind, check_one_of, checked, rows
+from ..errors import (
+    InputError,
+    NoFeasibleStart,
+    Note,
+    NoteKind,
+    Positive,
+    TwoOrMore,
+    check_one_of,
+    checked,
+    rows,
+)
 from ..errors import lines as note_lines
 from ..experiments.kinds import Masks
 from ..files import known
@@ -296,7 +306,7 @@ def compare(
     project: Project,
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
-    *, folds: int = FOLDS, starts: int = STARTS, fold_starts: int = FOLD_STARTS,
+    *, folds: TwoOrMore = FOLDS, starts: Positive = STARTS, fold_starts: Positive = FOLD_STARTS,
     trust: Sequence[str] = (), out: Path | str | None = None, resume: bool = False,
     overwrite: bool = False, progress: Listener = None,
     command_line: Sequence[str] | None = None,

@@ -24,7 +24,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import InputError, NoFeasibleStart, Note, NoteKind, OutputError, SolverFailure
+from ..errors import (
+    InputError,
+    NoFeasibleStart,
+    Note,
+    NoteKind,
+    OutputError,
+    SolverFailure,
+    checked,
+)
 from ..experiments.kinds import RunRecord, files_of
 from ..files import (
     __version__,
@@ -288,6 +296,7 @@ def check_unused(out: Path | str | None, resume: bool, overwrite: bool) -> None:
 class Reported:
     """A result whose presenter writes a page: presenters look from above, no result imports one."""
 
+    @checked
     def report(self, folder: Path | str) -> Path:
         """Write all files of the result into a folder; return the path of report.html."""
         module, name = PRESENTERS.get(type(self).__name__, ("study_pages", "write_study"))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, SolverFailure, check_one_of, checked, percent, rows
+from ..errors import InputError, Note, Positive, SolverFailure, check_one_of, checked, percent, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     BEYOND_LAW,
@@ -234,7 +234,7 @@ def present_tests(setup: FitSetup, card: MaterialCard) -> Present:
 def plan(
     project: Project, card: MaterialCard | Path | str | None = None,
     tests: str | Sequence[str] | None = None, *, strain: Sequence[float] | None = None,
-    rank: str = WORST, specimens: int | None = None, noise: Mapping[str, float] | None = None,
+    rank: str = WORST, specimens: Positive | None = None, noise: Mapping[str, float] | None = None,
     out: Path | str | None = None, overwrite: bool = False,
     progress: Listener = None,
 ) -> Plan:  # fmt: skip

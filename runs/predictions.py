@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, Note, SolverFailure, as_note, checked, marks
+from ..errors import InputError, Note, NotNegative, Positive, SolverFailure, as_note, checked, marks
 from ..errors import lines as note_lines
 from ..errors import rows as note_rows
 from ..experiments.kinds import (
@@ -205,7 +205,7 @@ class RunEvent:
 @alone_in_folder
 def predict(
     project: Project, tests: str | Sequence[str] | None = None, cards: Cards = None, *,
-    samples: int | None = None, jobs: int | None = None, scheduler: str | None = None,
+    samples: NotNegative | None = None, jobs: Positive | None = None, scheduler: str | None = None,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Listener = None, command_line: Sequence[str] | None = None,
 ) -> Predictions:  # fmt: skip

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from ..errors import InputError, Note, SolverFailure, as_note, checked, rows
+from ..errors import InputError, Note, NotNegative, SolverFailure, TwoOrMore, as_note, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import Refined, notes_of, other_thickness
 from ..files import known
@@ -316,7 +316,8 @@ def edge_length(mesh: Mesh) -> float:
 @alone_in_folder
 def refine(
     project: Project, card: GivenCard | None = None, tests: str | Sequence[str] | None = None,
-    what: Refined = "elements", levels: int = 4, factor: int = 2, coarser: int | None = None, *,
+    what: Refined = "elements", levels: TwoOrMore = 4, factor: TwoOrMore = 2,
+    coarser: NotNegative | None = None, *,
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Listener = None,
 ) -> Refinement:  # fmt: skip
@@ -487,6 +488,7 @@ class Nu12Study(Presented):
         return [*of_parts, *self.warnings]
 
 
+@checked
 @alone_in_folder
 def vary_nu12(
     project: Project, card: GivenCard | None = None, values: Sequence[float] = NU12,

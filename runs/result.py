@@ -10,7 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Against, InputError, Note, NoteKind, as_note, check_one_of, rows
+from ..errors import (
+    Against,
+    InputError,
+    Note,
+    NoteKind,
+    NotNegative,
+    as_note,
+    check_one_of,
+    checked,
+    rows,
+)
 from ..experiments.kinds import (
     BEYOND_LAW,
     WIDER,
@@ -247,7 +257,8 @@ class Fit(Reported):
         """Return the 95 % band of `moduli`: modulus, strain, lower_MPa, upper_MPa."""
         return self.moduli()[["modulus", "strain", "lower_MPa", "upper_MPa"]]
 
-    def draw_laws(self, count: int = 100, *, seed: int = 0) -> list[HypoelasticLaw]:
+    @checked
+    def draw_laws(self, count: NotNegative = 100, *, seed: NotNegative = 0) -> list[HypoelasticLaw]:
         """Return random laws that agree with the data: 95 % of them lie within the band.
 
         The same seed draws the same laws. InputError : the fit has no uncertainty to draw from.
@@ -341,6 +352,7 @@ class Fit(Reported):
         every = pd.concat(frames, ignore_index=True)
         return every[[name for name in every if name not in COMPARED] + list(COMPARED)]
 
+    @checked
     def write_table(self, path: Path | str, table: str = "residuals") -> Path:
         """Write one of `TABLES`, as `folder.write_table`; InputError : another table."""
         check_one_of(table, TABLES, "table")

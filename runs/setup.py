@@ -33,7 +33,14 @@ from ..inference.unknowns import (
     Starts,
     Unknowns,
 )
-from ..materials.forms.base import STRAIN_NAMES, Form, form_named, form_settings, of_strain
+from ..materials.forms.base import (
+    STRAIN_NAMES,
+    Form,
+    checked_offer,
+    form_named,
+    form_settings,
+    of_strain,
+)
 from ..materials.forms.spline import Form as OwnForm
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import QUANTITIES, Memory
@@ -56,6 +63,11 @@ def law_of(project: Project, reaches: Sequence[Reach]) -> HypoelasticLaw:
     """Return the law of a fit with coefficients of zero; reaches : of the data of each test.
     InputError : no such form, an unknown setting, no strain range that follows from the tests."""
     section, path = project.law, project.path
+    try:
+        if project.form is None:
+            checked_offer(section.form)
+    except InputError as error:
+        raise InputError(path, "law.form", error.problem) from None
     ends = _strain_range(project, reaches)
     try:
         own = project.form

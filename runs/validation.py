@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, Note, NoteKind, checked, rows
+from ..errors import InputError, Note, NoteKind, Positive, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     Divisible,
@@ -299,7 +299,7 @@ def validate(
     tests: str | Sequence[str] | None = None,
     forms: Sequence[str] = (),
     *, cards: Sequence[str] | Mapping[str, MaterialCard] = (), leave: str = TESTS,
-    starts: int = STARTS, trust: Sequence[str] = (), out: Path | str | None = None,
+    starts: Positive = STARTS, trust: Sequence[str] = (), out: Path | str | None = None,
     resume: bool = False, overwrite: bool = False, progress: Listener = None,
     command_line: Sequence[str] | None = None,
 ) -> Validation:  # fmt: skip
@@ -521,7 +521,7 @@ class WeightStudy(Presented):
 @alone_in_folder
 def weights(
     project: Project, counted: str, tests: str | Sequence[str] | None = None, *,
-    starts: int = WEIGHT_STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),
+    starts: Positive = WEIGHT_STARTS, counts: Sequence[float] = COUNTS, trust: Sequence[str] = (),
     out: Path | str | None = None, resume: bool = False, overwrite: bool = False,
     progress: Listener = None, command_line: Sequence[str] | None = None,
 ) -> WeightStudy:  # fmt: skip

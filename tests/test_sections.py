@@ -159,7 +159,7 @@ def test_what_may_never_end_is_not_read(tmp_path, read):
 
 def test_a_folder_is_left_to_its_reader(tmp_path):
     check_regular(tmp_path)
-    assert complaint(read_card, tmp_path) == f"{tmp_path}: cannot be read: Is a directory"
+    assert complaint(read_card, tmp_path) == f"{tmp_path}: is a folder; name a file in it"
 
 
 def test_a_message_stays_one_line_whatever_a_name_holds():

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...files import is_file
+from ...files import is_file, no_file_words
 from ...readers import pressure_log
 from ...readers.fields import QUANTITIES as FIELD
 from ...readers.frames import FrameOptions, frame_files, read_frames
@@ -104,7 +104,8 @@ def _beside(name: str, place: Place, folder: Path, field: str) -> Path:
     for home in (folder, place.path.parent):
         if is_file(home / name):
             return home / name
-    raise place.error(field, f"there is no file {folder / name}; --data DIR names another folder")
+    problem = f"{no_file_words(folder / name)}; --data DIR names another folder"
+    raise place.error(field, problem)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """A test of strips: its section, the reading of its load curves, and its models."""
 
+import glob
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, TypeAdapter
 
 from ...errors import InputError
-from ...files import is_file
+from ...files import is_file, no_file_words
 from ...materials.card import State
 from ...meshes.strip_models import (
     GRIP_DISTANCE,
@@ -261,9 +262,11 @@ def files_of(place: Place, data: CurvesSection, folder: Path) -> list[ListedFile
 
 def _matches(folder: Path, name: str) -> list[str]:
     """Return the files that a pattern such as "warp*.csv" matches; else the name itself."""
-    if not name or Path(name).is_absolute() or is_file(folder / name):
+    is_pattern = glob.has_magic(name) and not Path(name).is_absolute()
+    if not is_pattern or is_file(folder / name):
         return [name]
-    return sorted(str(path.relative_to(folder)) for path in folder.glob(name)) or [name]
+    matches = glob.glob(name, root_dir=folder, recursive=True)
+    return sorted(match for match in matches if is_file(folder / match)) or [name]
 
 
 def measured_curves(
@@ -321,7 +324,7 @@ def read_strips(place: Place, section: StripsSection, width: float) -> dict[str,
             continue
         ends = {d: (t.gauge_length, t.final_length) for d, t in tables.items()}
         if place.need_data or not ends or any(None in pair for pair in ends.values()):
-            problem = f"there is no file {path}; --data DIR names another folder"
+            problem = f"{no_file_words(path)}; --data DIR names another folder"
             raise place.error(field, problem)
         return {d: _strip(place, d, *pair) for d, pair in ends.items()}
     if data.polynomials is not None:

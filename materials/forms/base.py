@@ -247,11 +247,7 @@ def of_load_ratio(name: str) -> bool:
 def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[float]) -> Form:
     """Return the form of that name, as a project's `[law]` or a card says it.
     settings : what stands beside the name. strain_range : ends; UNLIMITED where there is none."""
-    offer, plug_in = _offer(name)
-    if offer is None:
-        names = form_names()
-        words = f"no form is called {name!r}{did_you_mean(name, names) or ';'} known: "
-        raise InputError(None, "form", words + ", ".join(names))
+    offer, plug_in = checked_offer(name)
     for key in settings:
         if key not in offer.settings:
             raise InputError(None, key, f"a {name} law has no {key}")
@@ -264,6 +260,16 @@ def form_named(name: str, settings: Mapping[str, Any], strain_range: Sequence[fl
         missing = ", ".join(name for name in names if not hasattr(form, name))
         raise plug_in.failure(f"gives no form: {type(form).__name__} has no {missing}")
     return form
+
+
+def checked_offer(name: str) -> tuple[Offer, PlugIn | None]:
+    """Return the offer of a form, and the plug-in that makes it; InputError: no such form."""
+    offer, plug_in = _offer(name)
+    if offer is None:
+        known = form_names()
+        words = f"no form is called {name!r}{did_you_mean(name, known) or ';'} known: "
+        raise InputError(None, "form", words + ", ".join(known))
+    return offer, plug_in
 
 
 def _offer(name: str) -> tuple[Offer | None, PlugIn | None]:
