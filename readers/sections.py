@@ -102,11 +102,11 @@ def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
         few = "at least" if kind == "too_short" else "at most"
         count = error["ctx"]["min_length" if kind == "too_short" else "max_length"]
         return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
-    table = ".".join(part for part in location if isinstance(part, str))
+    name = ".".join(part for part in location if isinstance(part, str))
     if kind == "list_type" and isinstance(given, Mapping):
-        return f"there can be several of these tables; write [[{table}]] for [{table}]"
+        return f"there can be several of these tables; write [[{name}]] for [{name}]"
     if kind in ("model_type", "dict_type") and isinstance(given, list):
-        return f"there is one of these tables only; write [{table}] for [[{table}]]"
+        return f"there is one of these tables only; write [{name}] for [[{name}]]"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
     got = repr(given)
     return f"expected {expected}, got {got if len(got) <= 60 else f'{got[:57]}...'}"
