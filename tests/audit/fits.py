@@ -613,7 +613,7 @@ class FitAudit:
                         rel=0.05 if sure["largest_relative_mesh"] else 1e-6)  # fmt: skip
             alike = sure["values_that_err_as_one"][name]
             count = len(self.blocks[name])
-            ledger.claim_json(("uncertainty", "values_that_err_as_one", name), "consistent")
+            self._alike_values(name, misfit, count)
             if not 1.0 - 1e-9 <= alike <= count * (1 + 1e-9):
                 ledger.find(f"result.json: values_that_err_as_one.{name}", f"is {alike} of {count}")
         for name in MODULI:
@@ -631,6 +631,25 @@ class FitAudit:
         self._second_order(sure["second_order"])
         self._discrepancies(sure)
         self._pinned(sure)
+
+    def _alike_values(self, name, misfit, count):
+        """Readings of a strip's curve that vary together; of a misfit within the noise, exactly.
+
+        Without specimens to compare there are 1.25 independent places along a curve.
+        """
+        place = ("uncertainty", "values_that_err_as_one", name)
+        test, _, part = name.partition(": ")
+        kind, section = self.kind_of(test)
+        expected = None
+        if kind == "bubble" or misfit["noise_is"] == "given":
+            expected = 1.0
+        elif kind == "strips":
+            expected = strips.alike(self, test, section, part, count)
+        within = misfit["rms"] <= misfit["noise"] * 0.999
+        if expected is not None and within and "specimens" not in section.get("data", {}):
+            self.ledger.json(place, expected, rel=1e-6)
+        else:
+            self.ledger.claim_json(place, "consistent")
 
     def _second_order(self, order):
         """The order of the uncertainty, and the sentence on what it changes."""
@@ -752,6 +771,15 @@ class FitAudit:
             for source in pinned:
                 alone = pinned[source][name]
                 ledger.claim_json(("pinned", source, name), "consistent")
+                drawn = self.pinned_charts.get((source, name))
+                if drawn is not None:
+                    ends = {
+                        "least": drawn.min(),
+                        "median": np.median(drawn),
+                        "largest": drawn.max(),
+                    }
+                    ledger.json(("pinned", source, name), {k: float(v) for k, v in ends.items()},
+                                "consistent", rel=1e-5)  # fmt: skip
                 if not 0 <= alone["least"] <= alone["median"] <= alone["largest"]:
                     ledger.find(f"result.json: pinned.{source}.{name}", f"is not sorted: {alone}")
                 if alone["largest"] > PRIOR * (1 + 1e-6):
@@ -760,6 +788,17 @@ class FitAudit:
                     ledger.find(f"result.json: pinned.{source}.{name}", "one knows more than all")
             if self.card.form == "constant":
                 self._precisions_add(name, pinned)
+
+    @property
+    def pinned_charts(self):
+        """Return what is drawn of each test's sigma, by test and modulus, as fractions."""
+        drawn = {}
+        for part in self.folder.charts("pinned"):
+            for chart in part["charts"]:
+                name = chart["title"].partition(",")[0]
+                for series in chart["series"]:
+                    drawn[series["name"], name] = np.array(series["y"], dtype=float) / 100
+        return drawn
 
     def _precisions_add(self, name, pinned):
         """Of constants that hardly correlate, the tests' precisions add, the prior counted once."""
@@ -980,6 +1019,7 @@ class FitAudit:
             # Between the fit's strains the band is interpolated: its last digit may differ.
             ledger.table(WORDS[name], ["strain", "MPa", "kN/m"], rows, "recomputed", digits=3,
                          slack=2e-3)  # fmt: skip
+            self._drawn_modulus(name)
             rest = float(card.modulus(name, 0.0)), float(card.modulus(name, end))
             ledger.text(rf"^{name}, [^:]*: from {NUM} MPa at rest to {NUM} MPa at {NUM} %",
                         [*rest, 100 * end], digits=3)  # fmt: skip
@@ -988,6 +1028,26 @@ class FitAudit:
         ledger.text(r"with their bands \((95) %, noise and mesh together\)", ["95"], needed=False)
         ledger.text(r"What each test pins down.*above (1000) %", ["1000"], needed=False)
         ledger.text(r"add strips at 45 degrees", [], needed=False)
+
+    def _drawn_modulus(self, name):
+        """The chart of a modulus: the card's curve within the band of moduli.csv."""
+        own = self.table[self.table["modulus"] == name]
+        for part in self.folder.charts("moduli"):
+            for chart in part["charts"]:
+                if not chart["title"].startswith(f"{name},"):
+                    continue
+                for series in chart["series"]:
+                    strain = np.array(series["x"], dtype=float) / 100
+                    if series["name"] == "best":
+                        right = self.card.modulus(name, strain)
+                        if not np.allclose(series["y"], right, rtol=1e-4):
+                            self.ledger.find(f"page: chart of {name}", "is not the card's curve")
+                    for end in ("lower", "upper"):
+                        told = series.get(end)
+                        if told:
+                            band = np.interp(strain, own["strain"], own[f"{end}_MPa"])
+                            if not np.allclose(np.array(told, dtype=float), band, rtol=1e-2):
+                                self.ledger.find(f"page: chart of {name}", f"has another {end}")
 
     def _trust(self):
         """Misfit beside noise, errors against a known law, where the moduli end."""

@@ -56,6 +56,12 @@ class Folder:
     def page_data(self):
         return self._json("page.json")
 
+    def charts(self, name):
+        """Return the figures of a name in page.json."""
+        sections = (self.page_data or {}).get("sections", [])
+        parts = (part for section in sections for part in section["parts"])
+        return [part for part in parts if part["part"] == "charts" and part["name"] == name]
+
     @cached_property
     def page(self):
         file = self.path / "report.html"

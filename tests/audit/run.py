@@ -4,6 +4,7 @@ import argparse
 import importlib
 import pkgutil
 import sys
+import traceback
 from pathlib import Path
 
 from .folders import Folder
@@ -43,7 +44,19 @@ def audit(path, project=None, terminal="", base=None):
     if not chosen:
         ledger.find(str(path), f"no auditor knows the command {names[0]!r}")
     for auditor in dict.fromkeys(chosen):
-        auditor(folder, ledger)
+        try:
+            auditor(folder, ledger)
+        except (
+            KeyError,
+            IndexError,
+            ValueError,
+            TypeError,
+            StopIteration,
+            ArithmeticError,
+        ) as error:
+            # A folder whose parts do not fit each other: what is missing there is the finding.
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            ledger.find(str(path), f"the auditor fails at {where.name}: {error!r}")
     for line in ledger.unclaimed():
         ledger.find(line, "nobody audits this number")
     return ledger

@@ -33,6 +33,20 @@ def _setting(audit, section, key, usual):
     return section.get(key, defaults.get(key, usual))
 
 
+#: Independent places along one curve; specimens behind a polynomial, as ISO 1421 asks for.
+PLACES, SPECIMENS = 1.25, 5
+
+
+def alike(audit, test, section, direction, count):
+    """Return how many loads of a direction vary together; None where specimens tell it."""
+    curves = measured.load_curves(audit.folder, test, section)
+    if measured.polynomials(audit.folder, test, section) is not None:
+        return max(1.0, count / (PLACES * (SPECIMENS - 1)))
+    if curves is None or len(curves.get(direction, [])) != 1:
+        return None
+    return max(1.0, count / PLACES)
+
+
 def audit(audit, test, section, numbers):
     """Audit numbers, tables and files of one test of strips."""
     prefix = f"{test}-" if audit.several else ""

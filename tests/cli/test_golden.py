@@ -1,11 +1,16 @@
 """Terminal output of the commands that no other file of this folder runs: tests/golden/."""
 
+import ast
+import random
 import re
+from pathlib import Path
 
 import pytest
 from bubblefit.cli.main import main
 
+from ..audit import audit
 from ..commands import every_command, in_process
+from ..disturbances import copied, disturbed
 from ..golden_files import FOLDER
 from ..projects import constant_strips
 
@@ -48,6 +53,23 @@ def test_a_command_prints_its_golden_file(name, folder, golden):
 
 def test_doctor_lists_the_embedded_solver(golden, tmp_path):
     golden("doctor", in_process("doctor", cwd=tmp_path).stdout.splitlines()[0], tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_fault_put_in_by_hand_is_found_by_the_auditor(seed, folder, tmp_path):
+    out = copied(folder / "out", tmp_path / "out")
+    fault = disturbed(out, random.Random(seed))
+    assert audit(out, base=folder).findings, fault
+
+
+def test_the_auditor_imports_nothing_of_bubblefit():
+    for path in (Path(__file__).parents[1] / "audit").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom):
+                assert node.level < 2, path
+                names = [node.module or ""]
+            assert not any(name.startswith("bubblefit") for name in names), path
 
 
 def test_every_command_has_a_golden_file():
