@@ -1034,7 +1034,7 @@ class FitAudit:
         own = self.table[self.table["modulus"] == name]
         for part in self.folder.charts("moduli"):
             for chart in part["charts"]:
-                if not chart["title"].startswith(f"{name},"):
+                if not chart["title"].startswith(f"{name},") or "MPa" not in chart["y_label"]:
                     continue
                 for series in chart["series"]:
                     strain = np.array(series["x"], dtype=float) / 100
