@@ -23,7 +23,8 @@ from pydantic import BaseModel, Field
 from ..errors import Against, InputError, Note, NoteKind, SolverFailure, apart, as_note
 from ..files import is_file, no_file_words, replacing
 from ..files import pandas as pd
-from ..materials.card import MaterialCard, State, positive, thickness_difference
+from ..materials.card import MaterialCard, State, thickness_difference
+from ..materials.positivity import is_positive
 from ..meshes.beam_model import axial_table
 from ..meshes.cylinder_model import ForceTable
 from ..readers.frames import FrameSource
@@ -833,7 +834,7 @@ def laws_around(
     found = []
     for along in np.eye(len(sure.directions))[:DIRECTIONS]:
         tried = ((step, sure.shifted(card.law, step * along)) for step in STEPS)
-        found.append(next((pair for pair in tried if positive(pair[1])), None))
+        found.append(next((pair for pair in tried if is_positive(pair[1])), None))
     known = [pair for pair in found if pair is not None]
     if len(known) < len(found):
         raise ValueError("a modulus is not positive next to the card's own law")

@@ -20,8 +20,8 @@ from .linear import (
     Order,
     Second,
     along,
-    moduli_of,
     posteriors_of,
+    relative_changes,
     sizes_of,
 )
 from .noise import Noise
@@ -126,17 +126,13 @@ def certainty(
     def effect(step: Array) -> float:
         """Return the largest relative change of a modulus halfway along its strains."""
         some = {name: at[len(at) // 2 : len(at) // 2 + 1] for name, at in strains.items()}
-        before, after = (
-            moduli_of(problem.unknowns, y, some) for y in (best.unknowns, best.unknowns + step)
-        )
-        return max(float(np.abs(after[name] / before[name] - 1.0).max()) for name in some)
+        changes = relative_changes(problem.unknowns, best.unknowns, step, some)
+        return max(float(np.abs(change).max()) for change in changes.values())
 
     wrong = discrepancies(problem, left, 2 * LEFT * (left - best.residual), best, effect)
     mesh = None
     if limit is not None:
-        moduli = moduli_of(problem.unknowns, best.unknowns, strains)
-        there = moduli_of(problem.unknowns, best.unknowns + limit.step, strains)
-        mesh = {name: there[name] / moduli[name] - 1.0 for name in strains}
+        mesh = relative_changes(problem.unknowns, best.unknowns, limit.step, strains)
     bands = bands_of(fine or posterior, law, strains)
     sure = Certainty(
         noise, strains, sigmas, (), mesh, posterior, fine, bands,

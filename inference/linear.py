@@ -151,6 +151,14 @@ def moduli_of(unknowns: Unknowns, y: Array, strains: Mapping[str, Array]) -> dic
     return {name: unknowns.rows(name, strain) @ coefficients for name, strain in strains.items()}
 
 
+def relative_changes(
+    unknowns: Unknowns, y: Array, step: Array, strains: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Return (n,) by modulus at strains (n,), its relative change by a step of the unknowns y."""
+    before, after = (moduli_of(unknowns, point, strains) for point in (y, y + step))
+    return {name: after[name] / before[name] - 1.0 for name in strains}
+
+
 def along(
     unknowns: Unknowns, law: HypoelasticLaw, reached: Array, covariance: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -359,8 +367,8 @@ def residual_of(
 @dataclass(frozen=True, eq=False)
 class Limit:
     """The limit of ever finer models.
-    step : (unknowns,) from the best ones. residual : (m,) left there. error : (m,) at the best
-    ones."""
+    step : (unknowns,) from the best ones, to others within the bounds. residual : (m,) left there.
+    error : (m,) at the best ones."""
 
     step: Array
     residual: Array
@@ -391,4 +399,9 @@ def limit_of(problem: FitProblem, best: Evaluation, finer: Array, factor: float)
     if without is None or there is None:
         return None
     step = there - without
+    if not own.keeps_bounds(at + step):  # the nearest that does, in the metric of the fit
+        nearest = bounded_step(own, curvature, -curvature @ step, at)
+        if nearest is None:
+            return None
+        step = nearest
     return Limit(step, best.residual + error + best.jacobian @ step, error)

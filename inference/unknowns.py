@@ -58,6 +58,7 @@ SMALLEST = 1e-3  # MPa; a bound that is zero or negative says nothing of the siz
 #: is as far as its test reached. Increments of a side.
 CORNERS, SIDE = [(i / 8, j / 8) for i in range(2, 9) for j in range(2, 9)], 16
 WITHIN = 0.04  # of that bound, by which steps keep off it: corners between these reach higher
+ROUNDING = 1e-6  # of a scaled inequality: what violates it by less keeps it
 SLOPE = 1e-5  # difference of an unknown by which that work is differentiated
 
 
@@ -234,6 +235,15 @@ class Unknowns:
         return scipy.linalg.block_diag(law, box), np.concatenate(
             [*c, low, -high, np.zeros(len(pairs))]
         )
+
+    def keeps_bounds(self, y: Array) -> bool:
+        """Return whether unknowns (count,) keep all bounds, those of the work included.
+
+        Moduli above their margin, coefficients and moduli within their bounds, and the form's own
+        inequalities: whatever moves the unknowns of a fit afterwards has to be looked at with it.
+        """
+        rows, limits = self.inequalities
+        return bool((rows @ y >= limits - ROUNDING).all()) and self.within_work(y)
 
     def work(self, y: Array) -> Array:
         """Return the work of closed paths of the law to `CORNERS`, shares of that of loading."""

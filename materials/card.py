@@ -27,6 +27,7 @@ from .closed_path import ClosedPath, closed_path
 from .forms import base
 from .law import HypoelasticLaw, ThicknessChange, moduli_html
 from .memory import FIELDS, Memory
+from .positivity import check_positive, is_positive
 
 #: Share of a normal distribution inside a band, and standard deviations to its ends.
 LEVEL, BAND = 0.95, 1.96
@@ -85,7 +86,7 @@ class CardCertainty:
             if len(laws) == count:
                 break
             law_drawn = self.shifted(law, random.standard_normal(len(self.directions)))
-            if positive(law_drawn):
+            if is_positive(law_drawn):
                 laws.append(law_drawn)
         if len(laws) < count:
             raise ValueError("hardly any law of this card's certainty has positive moduli")
@@ -133,16 +134,6 @@ def strains_of(law: HypoelasticLaw) -> dict[str, base.Array]:
     }
 
 
-def positive(law: HypoelasticLaw) -> bool:
-    """Return whether every modulus is above zero in the law's range, at every load ratio, and
-    what crimp there is."""
-    return bool((base.crimp_map(law.form) @ law.beta > 0).all()) and all(
-        (law.modulus(name, strain, ratio) > 0).all()
-        for name, strain in strains_of(law).items()
-        for ratio in base.ratios_of(law.form, name)
-    )
-
-
 def words_of(tests: Sequence[str], values: int, mesh: bool) -> str:
     named = ", ".join(tests)
     sources = "noise of the data and error of the mesh" if mesh else "noise of the data alone"
@@ -166,6 +157,7 @@ class MaterialCard:
     """A law with its thickness (mm), name, source, and its certainty or None.
 
     state : of the fabric that the law is of, "first loading" or "conditioned", "" if not known.
+    InputError : a modulus is not positive in the range for which the card is to hold.
     """
 
     law: HypoelasticLaw
@@ -178,6 +170,7 @@ class MaterialCard:
     def __post_init__(self) -> None:
         if not 0.0 < self.thickness < math.inf:
             raise InputError(None, "thickness", f"must be above zero, got {self.thickness:g} mm")
+        check_positive(self.law)
 
     @property
     def closed_path(self) -> ClosedPath:

@@ -15,6 +15,7 @@ from ..inference.comparison import Blocks
 from ..inference.descent import DescentSettings, descend
 from ..inference.linear import (
     NOT_DEFINITE,
+    POINTS,
     TOO_LITTLE,
     WORTH,
     Limit,
@@ -25,6 +26,7 @@ from ..inference.linear import (
     large,
     limit_of,
     posteriors_of,
+    relative_changes,
     residual_of,
     second_of,
 )
@@ -36,6 +38,7 @@ from ..materials.card import CardCertainty, certainty_of, words_of
 from ..materials.forms.base import COMPONENTS, Array
 from ..materials.law import HypoelasticLaw
 from ..materials.memory import NAMES
+from ..materials.positivity import is_positive
 from ..project.project import Project
 from .setup import SURROGATE, FitSetup, make_solver, prepare_fit, with_shared
 from .simulation import GivenCard, card_of, card_words
@@ -45,6 +48,15 @@ MESH = NoteKind(
     "mesh error",
     weight=16,
     against=Against("the error of the mesh is large", "fit on a finer mesh (more elements)"),
+)
+TOO_LARGE = NoteKind(
+    "mesh error too large",
+    weight=21,
+    against=Against(
+        "the error of the mesh is too large to be taken out",
+        "fit on a finer mesh (more elements)",
+        unusable=True,
+    ),
 )
 UNKNOWN = NoteKind("mesh error not known", weight=5)
 TAKEN_OUT = NoteKind("mesh error taken out")
@@ -140,6 +152,9 @@ def noise_of(problem: FitProblem) -> dict[str, float]:
 FINER = 2.0
 #: Values of `fit.mesh_error`.
 TOLD, CORRECTED = "told", "taken out"
+#: Largest relative change of a modulus by the mesh that is taken out. The step to finer meshes is
+#: linear, and what it leaves out is of the order of its square: a tenth of the modulus at 0.3.
+LARGEST_CORRECTION = 0.3
 #: Relative error of a modulus that needs no note, whatever the noise; one that is rounding.
 LEAST, NOTHING = 0.01, 1e-4
 
@@ -185,13 +200,19 @@ TAKEN_OUT_IS = (
     "finer meshes, to first order; objective, residuals and what is drawn of the tests are those "
     "of the mesh of the fit"
 )
+TOO_LARGE_IS = (
+    "the error of the mesh is not taken out of the moduli: to first order, and within the bounds, "
+    "ever finer meshes would change {} at most, and beyond {:.0f} % a linear step is not valid; "
+    "the bands reach there: more elements are needed"
+)
 NOT_TAKEN_OUT = "the error of the mesh is not known here and is not taken out of the moduli"
 
 
 def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestFit:
     """Return the best fit with its certainty, if its derivatives are known.
     Noise is the residual of finer models. With `mesh_error` taken out, and where the mesh moves
-    anything, the law is that of ever finer meshes; the analysis stays that of the fit."""
+    anything, by no more than `LARGEST_CORRECTION`, the law is that of ever finer meshes; the
+    analysis stays that of the fit."""
     slopes = best.differentiated
     if slopes is None:
         return best
@@ -207,19 +228,46 @@ def with_certainty(setup: FitSetup, problem: FitProblem, best: BestFit) -> BestF
         notes.append(Note(UNKNOWN, NOT_TAKEN_OUT))
     moves = limit is not None and np.abs(limit.step) > NOTHING * np.abs(slopes.unknowns)
     out = out and bool(np.any(moves))
+    too_large = False
     if limit is not None and out:
-        law = problem.unknowns.law(law, slopes.unknowns + limit.step)
+        too_large = not correction_is_valid(problem, slopes, best.valid, limit)
+        out = not too_large
+        law = law if too_large else problem.unknowns.law(law, slopes.unknowns + limit.step)
     sure = _certainty(problem.surrogate or problem, slopes, law, best.valid, limit, out)
     if sure.mesh is not None:
-        notes += notes_of_mesh(sure)
         most = {name: off[np.abs(off).argmax()] for name, off in sure.mesh.items()}
+        by = ", ".join(f"{name} {_signed(off)}" for name, off in most.items())
+        if too_large:
+            notes.append(Note(TOO_LARGE, TOO_LARGE_IS.format(by, 100 * LARGEST_CORRECTION)))
+        else:
+            notes += notes_of_mesh(sure)
         if out and max(map(abs, most.values())) > LEAST:
-            by = ", ".join(f"{name} {_signed(off)}" for name, off in most.items())
             notes.append(Note(TAKEN_OUT, TAKEN_OUT_IS.format(by)))
     if sure.order is not None:
         notes += sure.order.notes
     told = (*sure.undetermined, *notes)
     return replace(best, law=law, certainty=replace(sure, undetermined=told))
+
+
+def correction_is_valid(problem: FitProblem, best: Evaluation, valid: Array, limit: Limit) -> bool:
+    """Return whether the step to ever finer meshes keeps the bounds and is small enough.
+
+    Parameters
+    ----------
+    problem : FitProblem
+    best : Evaluation
+        From which the step goes.
+    valid : (3,) array
+        Ends of the strains at which the moduli are looked at.
+    limit : Limit
+    """
+    unknowns = problem.unknowns
+    y = best.unknowns + limit.step
+    if not (unknowns.keeps_bounds(y) and is_positive(unknowns.law(problem.law, y))):
+        return False
+    strains = {name: np.linspace(0.0, valid[c], POINTS) for name, c in COMPONENTS.items()}
+    changes = relative_changes(unknowns, best.unknowns, limit.step, strains)
+    return all(np.abs(change).max() <= LARGEST_CORRECTION for change in changes.values())
 
 
 def _certainty(

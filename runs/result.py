@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import (
-    Against,
     InputError,
     Note,
     NoteKind,
@@ -49,17 +48,10 @@ from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
-from .verdict import FitVerdict, verdict_of
+from .verdict import NOT_CONVERGED, FitVerdict, verdict_of
 
 STARTS = NoteKind("starts that failed", weight=2)
 ALONE = NoteKind("undetermined alone", weight=1)
-NOT_CONVERGED = NoteKind(
-    "not converged",
-    weight=20,
-    against=Against(
-        "the fit has not converged", "raise fit.max_analyses and fit again", unusable=True
-    ),
-)
 #: Number of best starts of which the laws are drawn together.
 BEST = 5
 #: Tables of `Fit.write_table`.

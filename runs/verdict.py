@@ -8,10 +8,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import Against, Note, percent
+from ..errors import Against, Note, NoteKind, percent
 from ..inference.posterior import LEVEL
 from ..materials.forms.base import COMPONENTS, SHEAR, Array
 from .best import BestFit
+
+NOT_CONVERGED = NoteKind(
+    "not converged",
+    weight=20,
+    against=Against(
+        "the fit has not converged", "raise fit.max_analyses and fit again", unusable=True
+    ),
+)
 
 State = Literal["usable", "usable within limits", "not to be used"]
 Span = tuple[float, float]
@@ -147,10 +155,14 @@ def verdict_of(
 
 
 def reasons_against(notes: Sequence[Note]) -> list[Against]:
-    """Return what notes say against the moduli, what makes a fit unusable first, each once."""
+    """Return what notes say against the moduli, what makes a fit unusable first, each once.
+
+    A fit that has not converged is that before all else: the rest may go with more analyses.
+    """
     by_weight = sorted({note.kind for note in notes}, key=lambda kind: -kind.weight)
     against = dict.fromkeys(kind.against for kind in by_weight if kind.against is not None)
-    return sorted(against, key=lambda reason: not reason.unusable)
+    unfinished = NOT_CONVERGED.against
+    return sorted(against, key=lambda reason: (not reason.unusable, reason is not unfinished))
 
 
 def _further_test(

@@ -40,15 +40,16 @@ from bubblefit.readers.frames import ORDER
 from bubblefit.reports import fit_page, study_pages, vega
 from bubblefit.reports.charts import Charts
 from bubblefit.reports.content import Exhibit
-from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, UNKNOWN
+from bubblefit.runs.best import MESH, NOT_THE_CARD, TAKEN_OUT, TOO_LARGE, UNKNOWN
 from bubblefit.runs.bootstrap import FEW_UNITS
 from bubblefit.runs.compare import FOLD
 from bubblefit.runs.estimate import GAP, NOT_ESTIMATED
 from bubblefit.runs.predictions import Predictions, predict
 from bubblefit.runs.profile import NOT_CLOSED
 from bubblefit.runs.refinement import refine, vary_nu12
-from bubblefit.runs.result import ALONE, NOT_CONVERGED, STARTS
+from bubblefit.runs.result import ALONE, STARTS
 from bubblefit.runs.simulation import FAILED, simulate_cards
+from bubblefit.runs.verdict import NOT_CONVERGED
 from bubblefit.solvers import registry
 from bubblefit.solvers.base import EARLY, SNAP
 from bubblefit.solvers.calculix.cylinder import GAS
@@ -148,6 +149,7 @@ ELSEWHERE = {
     NOT_THE_CARD,
     SECOND_ORDER,
     TAKEN_OUT,
+    TOO_LARGE,
     UNKNOWN,
 }
 

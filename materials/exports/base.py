@@ -13,7 +13,7 @@ from ...errors import InputError, Note, NoteKind, OutputError, one_line
 from ...files import __version__, write_text
 from ..card import LEVEL, MaterialCard, strains_of
 from ..deformation_curves import Measure, trellis_angle, trellis_curve, uniaxial_curve
-from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array, ratios_of
+from ..forms.base import COMPONENTS, STRAIN_NAMES, UNLIMITED, Array
 from ..law import HypoelasticLaw
 from ..modulus_tables import (
     POINTS,
@@ -29,8 +29,6 @@ CONFIRM = NoteKind("to confirm")
 
 #: t/mm3, that of water: where a program must have a density and the user gave none.
 DENSITY = 1e-9
-#: Strains a modulus at which a card is looked at.
-CHECKED = 501
 WIDTH = 70
 #: What the file of a card's band ends in, beside an export.
 BAND_FILE = ".band.csv"
@@ -78,24 +76,6 @@ def write_export(export: Export, paths: Sequence[Path], overwrite: bool) -> None
             raise OutputError(f"{path}: is already there; use --force (overwrite) or another --out")
     for path, text in zip(paths, export.files.values(), strict=True):
         write_text(path, text)
-
-
-def check_positive(card: MaterialCard) -> None:
-    """Raise InputError where a modulus, or 1 - nu12 nu21 at zero strain, is not positive."""
-    law = card.law
-    for name, component in COMPONENTS.items():
-        end = law.strain_range[component]
-        strain = np.linspace(0.0, end if end < UNLIMITED else 0.0, CHECKED)
-        for ratio in ratios_of(law.form, name):
-            values = law.modulus(name, strain, ratio)
-            if not (values > 0).all():
-                worst = int(np.argmin(values))
-                problem = f"{name} is {values[worst]:.4g} MPa at {100 * strain[worst]:.4g} % of"
-                words = f"{problem} log strain, where the card is to hold; expected > 0"
-                raise InputError(None, "beta", words)
-    if not law.nu12**2 * float(law.E2(0.0) / law.E1(0.0)) < 1:
-        problem = f"nu12 nu21 is not below 1 at zero strain, for nu12 = {law.nu12:g}"
-        raise InputError(None, "nu12", f"{problem} and E2/E1 of the card")
 
 
 def heading(
@@ -232,7 +212,6 @@ class Format:
                 "radioss-law58 or abaqus-fabric, or the card without [memory]"
             )
             raise InputError(None, "memory", problem)
-        check_positive(card)
         export = self.write(card, self.options(**options))
         if card.certainty is None:
             return export

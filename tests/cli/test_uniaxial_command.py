@@ -22,7 +22,8 @@ from bubblefit.materials.designers import DesignersConstants
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.meshes.strip_models import bias_strip, straight_strip
 from bubblefit.runs.best import MESH, UNKNOWN
-from bubblefit.runs.result import ALONE, NOT_CONVERGED, STARTS, answers
+from bubblefit.runs.result import ALONE, STARTS, answers
+from bubblefit.runs.verdict import NOT_CONVERGED
 from bubblefit.solvers.membrane.solver import MembraneSolver
 
 from ..biaxial_files import FIVE, biaxial_project, cycle, write_rows

@@ -9,18 +9,28 @@ import bubblefit as bf
 import numpy as np
 import pandas as pd
 import pytest
-from bubblefit.errors import InputError, SolverFailure
+from bubblefit.errors import InputError, SolverFailure, gravest
 from bubblefit.experiments.kinds import Weighting
 from bubblefit.inference.assessment import Certainty
 from bubblefit.inference.linear import limit_of, residual_of
+from bubblefit.inference.problem import ANALYSES_USED_UP
 from bubblefit.materials.card import read_card
 from bubblefit.materials.exports.base import band_table
 from bubblefit.materials.forms.base import COMPONENTS
+from bubblefit.materials.positivity import is_positive
 from bubblefit.project.schema import FitSection
 from bubblefit.runs import best as mesh_error
 from bubblefit.runs import multistart
 from bubblefit.runs import starts as room
-from bubblefit.runs.best import MESH, TAKEN_OUT, UNKNOWN, notes_of_mesh, with_certainty
+from bubblefit.runs.best import (
+    LARGEST_CORRECTION,
+    MESH,
+    TAKEN_OUT,
+    TOO_LARGE,
+    UNKNOWN,
+    notes_of_mesh,
+    with_certainty,
+)
 from bubblefit.runs.multistart import (
     MultiStart,
     continuation_task,
@@ -430,6 +440,75 @@ def corrected(fitted):
     )
     plain = replace(fitted.best, certainty=None)
     return replace(fitted, setup=setup, best=with_certainty(setup, fitted.problem, plain))
+
+
+def with_mesh_error(fitted, monkeypatch, error):
+    """Return the fit, corrected by default, as if a finer mesh gave another residual."""
+    monkeypatch.setattr(mesh_error, "residual_of", lambda _p, _f, best, _l: best.residual + error)
+    return corrected(fitted)
+
+
+def assert_possible(fitted, folder):
+    """Every modulus, sigma and band of a fit, of its card and of its draws is possible."""
+    table = fitted.moduli()
+    least = table["modulus"].map(fitted.problem.unknowns.bounds.least)
+    assert (table["MPa"] >= least - 1e-6 * table["MPa"].abs()).all()
+    assert (table["lower_MPa"] >= 0.0).all() and (table["upper_MPa"] >= table["MPa"]).all()
+    assert (table[["sigma_relative", "noise_relative"]] >= 0.0).all(axis=None)
+    assert (table["mesh_relative"] > -1.0).all()
+    assert all(answer.sigma >= 0.0 < answer.value for answer in answers(fitted.best, 1.0))
+    fitted.card.write(folder / "card.toml")
+    card = read_card(folder / "card.toml")
+    for law in [*fitted.laws, *fitted.draw_laws(20), *card.certainty.laws(card.law, 5, ROUND)]:
+        assert is_positive(replace(law, strain_range=fitted.best.valid))
+
+
+ROUND = np.random.default_rng(0)
+
+
+def test_a_correction_beyond_the_linear_step_is_not_taken(off, monkeypatch, tmp_path):
+    plain = off.best.differentiated.residual
+    (test,) = off.setup.tests
+    finer = test.finer(off.setup.make_solver, Weighting(), 2.0)
+    error = mesh_error.residual_of(off.problem, finer, off.best.differentiated, off.law) - plain
+    fitted = with_mesh_error(off, monkeypatch, 30.0 * error)
+    sure = fitted.best.certainty
+    # The law is that of the mesh, and its band reaches to that of finer meshes, within the bounds.
+    assert fitted.law is off.law and not sure.taken_out and sure.fine is not None
+    assert off.problem.unknowns.keeps_bounds(sure.fine.best)
+    assert max(np.abs(change).max() for change in sure.mesh.values()) > LARGEST_CORRECTION
+    for name, strain in sure.strain.items():
+        limit = fitted.law.modulus(name, strain) * (1.0 + sure.mesh[name])
+        lower, upper = sure.band[name]
+        assert (lower <= fitted.law.modulus(name, strain)).all()
+        assert ((lower <= 1.05 * limit) & (0.95 * limit <= upper)).all()
+    assert_possible(fitted, tmp_path)
+
+    first = gravest(fitted.notes)[0]
+    assert first.kind is TOO_LARGE and "a linear step is not valid" in first
+    assert not [note for note in fitted.notes if note.kind in (MESH, TAKEN_OUT)]
+    verdict = fitted.verdict
+    assert verdict.state == "not to be used"
+    assert verdict.reasons[0] == "the error of the mesh is too large to be taken out"
+    assert verdict.next_step == "fit on a finer mesh (more elements)"
+    unfinished = replace(
+        fitted.best,
+        ranked=[replace(record, status=ANALYSES_USED_UP) for record in fitted.best.ranked],
+    )
+    verdict = replace(fitted, best=unfinished).verdict
+    assert verdict.reasons[:2] == (
+        "the fit has not converged", "the error of the mesh is too large to be taken out"
+    )  # fmt: skip
+    assert verdict.next_step.startswith("raise fit.max_analyses")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_error_of_a_mesh_makes_a_modulus_impossible(off, monkeypatch, tmp_path, seed):
+    random = np.random.default_rng(seed)
+    plain = off.best.differentiated.residual
+    size = 10.0 ** random.uniform(-2.0, 3.0) * np.abs(plain).mean()
+    error = size * random.standard_normal(len(plain))
+    assert_possible(with_mesh_error(off, monkeypatch, error), tmp_path)
 
 
 def test_the_default_is_nearer_to_the_truth_than_its_mesh(off):

@@ -14,8 +14,7 @@ from bubblefit.inference.noise import ABOVE_NOISE
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.best import MESH
-from bubblefit.runs.result import NOT_CONVERGED
-from bubblefit.runs.verdict import usable_ranges, verdict_of
+from bubblefit.runs.verdict import NOT_CONVERGED, usable_ranges, verdict_of
 
 ALL = frozenset(COMPONENTS)
 GOOD = dict.fromkeys(COMPONENTS, 0.1)

@@ -6,10 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bubblefit.materials.biaxial_patch import biaxial_response
-from bubblefit.materials.card import MaterialCard, certainty_of, positive, read_card
+from bubblefit.materials.card import MaterialCard, certainty_of, read_card
 from bubblefit.materials.closed_path import closed_path
 from bubblefit.materials.deformation_curves import bar
-from bubblefit.materials.exports.base import check_positive
 from bubblefit.materials.forms.base import EVEN, form_named
 from bubblefit.materials.forms.polynomial import LoadRatio
 from bubblefit.materials.forms.ratio import SplineCrimp
@@ -18,6 +17,7 @@ from bubblefit.materials.law import HypoelasticLaw, definite_rows
 from bubblefit.materials.memory import Memory
 from bubblefit.materials.modulus_tables import piece_constants
 from bubblefit.materials.point_law import RIGHT, load_angle
+from bubblefit.materials.positivity import is_positive
 from bubblefit.solvers.base import check_carries
 from bubblefit.solvers.exports import FORMATS
 from bubblefit.solvers.registry import solver_named
@@ -141,9 +141,9 @@ def test_it_is_refused_where_a_modulus_is_not_positive_at_some_ratio():
     falling = law_of((30.0, 800.0, 0.0, 1000.0, 1500.0))  # E1 < 0 where the warp carries little
     assert falling.modulus("E1", 0.0) == 1000.0
     assert falling.modulus("E1", 0.0, 0.0) == pytest.approx(1000.0 - 1500.0 * EVEN)
-    assert positive(law_of()) and not positive(falling)
-    check_positive(MaterialCard(law_of(), 0.8))
-    assert "E1 is -60.66 MPa" in complaint(check_positive, MaterialCard(falling, 0.8))
+    assert is_positive(law_of()) and not is_positive(falling)
+    MaterialCard(law_of(), 0.8)
+    assert "E1 is -60.66 MPa" in complaint(MaterialCard, falling, 0.8)
     along_fill = np.array([[0.0, 10.0]])
     assert biaxial_response(falling, along_fill, 0.8).reached == 0
     assert biaxial_response(falling, along_fill[:, ::-1], 0.8).reached == 1
@@ -246,8 +246,8 @@ def test_the_crimp_of_a_closed_path_of_stress_returns():
 def test_cards_bounds_and_what_has_no_crimp(tmp_path):
     MaterialCard(crimped(), 0.8, "crimp").write(tmp_path / "card.toml", "MPa")
     back = read_card(tmp_path / "card.toml").law
-    assert back.form == FORM and positive(back) and back.of_load_ratio
-    assert not positive(crimped([*CRIMP[:-3], -1.5, 2.5, 12.0]))
+    assert back.form == FORM and is_positive(back) and back.of_load_ratio
+    assert not is_positive(crimped([*CRIMP[:-3], -1.5, 2.5, 12.0]))
     drawn = CRIMP + np.random.default_rng(1).normal(0.0, 0.1, (50, 12)) * (np.arange(12) > 8)
     sure = certainty_of(crimped(), drawn)
     assert np.sqrt(np.diag(sure.covariance)[9:]) == pytest.approx(0.1, rel=0.3)
