@@ -379,6 +379,6 @@ def _of_table(place: Place, at: str, section: CardSection) -> MaterialCard:
             NU12 if section.nu12 is None else section.nu12, np.array(ends),
             section.thickness_change or place.fabric.thickness_change, form,
         )  # fmt: skip
+        return MaterialCard(law, thickness, section.name)
     except InputError as error:
         raise InputError(place.path, f"{at}.{error.field}", error.problem) from None
-    return MaterialCard(law, thickness, section.name)

@@ -20,6 +20,7 @@ from bubblefit.solvers import registry
 
 from ..commands import in_process, one_line, result_in
 from ..cylinder_cases import FAILS, STOPS, Formula, write_project, write_readings
+from ..places import KNOWN
 
 #: Warp modulus (MPa) of the card with which `Falling` has a knee and a limit point.
 FALLS = 500.0
@@ -277,3 +278,42 @@ def test_simulate_bend_on_the_membrane(tmp_path, card, golden):
     assert run["inflation_strain"]["body"]["fill"] == pytest.approx(0.042, abs=0.003)
     assert run["error"]["compared"] == 3
     assert (out / "figures" / "150-mm-140-kPa-beam.png").exists()
+
+
+#: A card as a fit of another version wrote it: G12 falls below zero from 3 % of strain on.
+IMPOSSIBLE = """
+format = 2
+law = "hypoelastic orthotropic"
+form = "cubic"
+unit = "MPa"
+beta = [0.0, 0.0, -100.0, 3.0, 0.0, 0.0, 0.0, 120.0, 0.0, 0.0, 0.0, 600.0]
+nu12 = 0.24
+thickness_mm = 0.8
+valid_strain = { warp = [0.0, 0.1], fill = [0.0, 0.1], shear = [0.0, 0.08] }
+"""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "bend", "--diameter", 150, "--pressure", 140, "--card", "card.toml"),
+        ("simulate", "bubble", KNOWN, "--card", "card.toml"),
+        ("export", "card.toml", "--format", "abaqus-umat"),
+        ("bend", "project.toml", "--card", "card.toml"),
+    ],
+)
+def test_a_card_with_a_negative_modulus_is_refused_in_one_line(tmp_path, command):
+    (tmp_path / "card.toml").write_text(IMPOSSIBLE)
+    write_project(tmp_path)
+    done = in_process(*command, cwd=tmp_path, code=2)
+    one_line(done, "card.toml: beta: G12 is -5 MPa at 8 % of log strain")
+
+
+def test_a_card_in_a_project_with_a_negative_modulus_is_named(tmp_path):
+    text = write_project(tmp_path).read_text()
+    (tmp_path / "project.toml").write_text(
+        f"{text}\n[[card]]\nname = 'impossible'\nstrain_range = [0.1, 0.1, 0.1]\n"
+        "beta = [0.0, 0.0, -0.3, 0.01, 0.0, 0.0, 0.0, 0.12, 0.0, 0.0, 0.0, 0.6]\n"
+    )
+    done = in_process("bend", "project.toml", cwd=tmp_path, code=2)
+    one_line(done, "project.toml: card", "G12 is -0.02 MPa at 10 % of log strain")

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from bubblefit.cli.main import main
 from bubblefit.errors import InputError
+from bubblefit.materials import card as card_module
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.materials.deformation_curves import trellis_angle, trellis_curve, uniaxial_curve
 from bubblefit.materials.exports.base import NoOptions
@@ -335,14 +336,16 @@ def test_nothing_is_written_over_without_force(folder):
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_card_without_stiffness_is_bad_input(folder, name):
+def test_a_card_without_stiffness_is_bad_input(folder, name, monkeypatch):
     for law, words in (
         (dataclasses.replace(GONE, strain_range=[0.1, 0.1, 0.1]),
          "beta: E1 is -500 MPa at 10 % of log strain"),
         (HypoelasticLaw(np.zeros(12)), "beta: E1 is 0 MPa at 0 % of log strain,"),
         (HypoelasticLaw.linear(1.0, 1000.0, 20.0), "nu12: nu12 nu21 is not below 1"),
     ):  # fmt: skip
-        write_card(MaterialCard(law, 0.8), folder / "material.toml")
+        with monkeypatch.context() as patch:
+            patch.setattr(card_module, "check_positive", lambda law: None)
+            write_card(MaterialCard(law, 0.8), folder / "material.toml")
         text = run("material.toml", "--format", name, code=2)
         assert text.startswith(f"bubblefit: material.toml: {words}") and text.count("\n") == 1
     assert [path.name for path in folder.iterdir()] == ["material.toml"]

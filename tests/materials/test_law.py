@@ -7,6 +7,7 @@ import pytest
 from bubblefit.materials.forms.base import COMPONENTS, GRID
 from bubblefit.materials.forms.polynomial import CUBIC
 from bubblefit.materials.law import HypoelasticLaw
+from bubblefit.materials.positivity import check_positive, is_positive, smallest_modulus
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -262,3 +263,24 @@ def test_a_coefficient_that_the_law_does_not_have_is_named(place):
     beta = LAW.beta + (np.arange(12) == place)
     assert f"beta_{place}" in complaint(LAW.with_beta, beta)
     assert "E2" in complaint(HypoelasticLaw.trilinear, MODULI[0], (1.0, 2.0), MODULI[2], BREAKS)
+
+
+def test_the_smallest_modulus_is_exact_between_any_strains_of_a_grid():
+    # A dip below zero that is 2e-4 of strain wide, and lies at no strain of a grid.
+    dip = 0.0437
+    beta = np.zeros(12)
+    beta[4:8] = 0.0, 1e6, -2e6 * dip, 1e6 * dip**2 - 0.01
+    beta[[3, 11]] = 10.0, 500.0
+    law = HypoelasticLaw(beta, 0.2, [0.1, 0.1, 0.1])
+    smallest, strain = smallest_modulus(law, "E2")
+    assert (smallest, strain) == (pytest.approx(-0.01, abs=1e-9), pytest.approx(dip))
+    assert not is_positive(law) and "E2 is -0.01 MPa at 4.37 %" in complaint(check_positive, law)
+    above = replace(law, beta=beta + 0.02 * (np.arange(12) == 7))
+    assert is_positive(above)
+    # Before the dip the card holds.
+    assert is_positive(replace(law, strain_range=[0.1, 0.04, 0.1]))
+    regions = HypoelasticLaw.trilinear(
+        (500, 400, 300), (90, -1, 80), (9, 8, 7), [[0.01, 0.03]] * 3, strain_range=[0.1] * 3
+    )
+    assert smallest_modulus(regions, "E2")[0] == -1.0
+    assert smallest_modulus(regions, "E1")[0] == 300.0
