@@ -28,6 +28,7 @@ UNUSABLE = {
     "sheet taken for flat": "the sheet of a real bubble is taken for flat, so that its moduli are "
     "not to be believed",
     "not converged": "the fit has not converged",
+    "mesh error too large": "the error of the mesh is too large to be taken out",
 }
 AGAINST = {
     "on its margin": "bounds are reached",
