@@ -21,8 +21,17 @@ from ..strips.prepared import LoadObjective
 
 #: Frames of a bending, unless the section says otherwise.
 FRAMES = 12
-#: Noise of one load: of the largest, unless given; values that are taken to be independent.
-NOISE, INDEPENDENT = 0.02, 5.0
+
+
+@dataclass(frozen=True)
+class AssumedNoise:
+    """Noise of loads whose noise is not given."""
+
+    share: float = 0.02  # of the largest load
+    independent_values: float = 5.0  # of all loads
+
+
+NOISE = AssumedNoise()
 
 
 class BendingSection(BentSection):
@@ -34,24 +43,33 @@ class BendingSection(BentSection):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BendingTest(CylinderTest):
-    """A cylinder with measured loads; noise : of one load, N."""
+    """A cylinder with measured loads that a fit matches; `noise` is of one load, N."""
 
     kind: str = "bending"
 
     @property
     def points(self) -> tuple[Array, Array]:
         """Return deflection (n,) mm and load (n,) N of all repetitions, up to the last frame."""
-        every = [(c.deflection, c.load) for c in self.measured] or [(np.empty(0), np.empty(0))]
-        way, load = (np.concatenate(own) for own in zip(*every, strict=True))
-        inside = (way > 0) & (way <= self.deflections[-1] * (1 + 1e-9))
-        return way[inside], load[inside]
+        if not self.measured:
+            return np.empty(0), np.empty(0)
+        deflection = np.concatenate([curve.deflection for curve in self.measured])
+        load = np.concatenate([curve.load for curve in self.measured])
+        is_matched = (deflection > 0) & (deflection <= self.deflections[-1] * (1 + 1e-9))
+        return deflection[is_matched], load[is_matched]
 
     def settings(self) -> Mapping[str, object]:
+        """Return everything but names and measurements."""
         return {**super().settings(), "weight": self.weight, "noise": self.noise}
 
 
 def read(section: BendingSection, place: Place, name: str) -> BendingTest:
-    """Read the section of a test, and its loads; refuse one without any."""
+    """Read the section of a test, and its loads.
+
+    Raises
+    ------
+    InputError
+        If there are no measured loads, or fewer than two up to the last deflection.
+    """
     if not section.measured.files:
         problem = (
             "this key is missing; without measured loads a cylinder is predicted: [[cylinder]]"
@@ -62,8 +80,8 @@ def read(section: BendingSection, place: Place, name: str) -> BendingTest:
     if section.deflection is None and section.deflections is None and ends:
         end, frames = max(ends), section.frames or FRAMES
         cylinder = replace(cylinder, deflections=tuple(np.linspace(0.0, end, frames + 1)[1:]))
-    own = {"kind": "bending", "weight": section.weight, "noise": section.noise}
-    test = BendingTest(**vars(cylinder) | own)
+    fitted = {"kind": "bending", "weight": section.weight, "noise": section.noise}
+    test = BendingTest(**vars(cylinder) | fitted)
     largest = float(np.abs(test.points[1]).max(initial=0.0))
     if cylinder.measured and not (len(test.points[0]) > 1 and largest > 0):
         end = test.deflections[-1] / place.scales.length
@@ -73,21 +91,38 @@ def read(section: BendingSection, place: Place, name: str) -> BendingTest:
 
 
 class BendingObjective(LoadObjective):
-    """Residuals of the collar's loads; frame 0 is the inflated cylinder."""
+    """Residuals of the collar's loads; frame 0 is the inflated cylinder.
+
+    Parameters
+    ----------
+    test : BendingTest
+        With measured loads.
+    weighting : Weighting
+        Of the test in the objective.
+    """
 
     def __init__(self, test: BendingTest, weighting: Weighting) -> None:
-        way, load = test.points
+        deflection, load = test.points
         largest = float(np.abs(load).max(initial=0.0))
-        noise, noise_is, alike = test.noise, cast(NoiseIs, "given"), 1.0
+        noise, noise_is = test.noise, cast(NoiseIs, "given")
+        correlated_count = 1.0
         if noise is None:
-            noise, noise_is, alike = NOISE * largest, "assumed", len(load) / INDEPENDENT
-        scale = largest if weighting.relative else 1.0
+            noise, noise_is = NOISE.share * largest, "assumed"
+            correlated_count = len(load) / NOISE.independent_values
         super().__init__(
-            test.deflections, way, load, scale, weighting.weight, noise, noise_is, alike
+            test.deflections,
+            deflection,
+            load,
+            largest if weighting.relative else 1.0,
+            weighting.weight,
+            noise,
+            noise_is,
+            correlated_count,
         )
         self.sample = np.insert(self.sample, 0, 0.0, axis=1)
 
     def modelled(self, history: History) -> Array:
+        """Return the model's loads (n,) N; SolverFailure where it ended early."""
         if len(history.load) < self.sample.shape[1]:
             raise SolverFailure(history.early or "the bending ended early", "membrane")
         return super().modelled(history)
@@ -101,17 +136,22 @@ class PreparedBending(PreparedWhole):
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
-        model, objective = self.test.models()[PART], BendingObjective(self.test, weighting)
+        """Return the one comparison."""
+        model = self.test.models()[PART]
+        objective = BendingObjective(self.test, weighting)
         # Wrinkles come and go, and tubes snap: an unstable frame is no reason to refuse a law.
         return (Comparison(self.test.name, model, make_solver(), objective, must_be_stable=False),)
 
     def finer(
         self, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
-        (own,) = self.comparisons(make_solver, weighting)
-        return (replace(own, model=self.test.models(what="elements", factor=factor)[PART]),)
+        """Return the comparison on a mesh whose edges are divided by a factor."""
+        (comparison,) = self.comparisons(make_solver, weighting)
+        model = self.test.models(what="elements", factor=factor)[PART]
+        return (replace(comparison, model=model),)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
+        """Return the measured files."""
         return self.test.data_files()
 
 

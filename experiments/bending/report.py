@@ -17,9 +17,10 @@ FIGURE, CAPTION = "bending.png", "Load of the collar over its deflection, measur
 
 def residuals(prepared: PreparedBending, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N."""
-    own = BendingObjective(prepared.test, Weighting())
-    loads, where = own.modelled(fitted.histories[0]), {"deflection_mm": own.elongation}
-    return compared("load", own.measured, loads, "N", part=PART, **where)
+    objective = BendingObjective(prepared.test, Weighting())
+    loads = objective.modelled(fitted.histories[0])
+    labels = {"part": PART, "deflection_mm": objective.elongation}
+    return compared("load", objective.measured, loads, "N", **labels)
 
 
 def findings(prepared: PreparedBending, fitted: FittedTest) -> Findings:
@@ -33,16 +34,18 @@ def simulate(
     test: BendingTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
     """Draw the loads with every card; return the RMS errors."""
-    numbers, lines, good = errors_of_cards(
+    numbers, lines, histories = errors_of_cards(
         runs, lambda history: _errors(test, history) if test.measured else {}, _words
     )
-    figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
+    figures = []
+    if histories:
+        figures.append(saved(out, FIGURE, _load_charts(test, histories), CAPTION))
     return Simulation({"cards": numbers}, lines, figures)
 
 
 def _errors(test: BendingTest, history: History) -> dict[str, float]:
-    own = BendingObjective(test, Weighting())
-    return {"rms_N": own.rms(history), "largest_N": float(abs(own.measured).max())}
+    objective = BendingObjective(test, Weighting())
+    return {"rms_N": objective.rms(history), "largest_N": float(abs(objective.measured).max())}
 
 
 def _words(numbers: Mapping[str, float]) -> str:
@@ -50,11 +53,11 @@ def _words(numbers: Mapping[str, float]) -> str:
     return f"RMS error of the load {numbers['rms_N']:.3g} N ({share:.2g} % of the largest)"
 
 
-def _drawn(test: BendingTest, curves: Mapping[str, History]) -> Charts:
+def _load_charts(test: BendingTest, curves: Mapping[str, History]) -> Charts:
     """Return measured and modelled loads in one chart."""
     series = [dots(c.repetition, c.deflection, c.load, colour=7) for c in test.measured]
     for rank, (name, history) in enumerate(curves.items()):
-        way = [0.0, *test.deflections][: len(history.load)]
-        series.append(line(name, way, history.load, colour=1 + rank))
+        deflection = [0.0, *test.deflections][: len(history.load)]
+        series.append(line(name, deflection, history.load, colour=1 + rank))
     chart = Chart(test.name, "deflection of the collar, mm", "load, N", series, CAPTION)
     return Charts(f"{test.name} bending", [chart], CAPTION, columns=1)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,134 +23,174 @@ from ...reports.content import Exhibit, Part, Table, Words
 from ...reports.maps import write_vtu
 from ...reports.vega import save
 from ..kinds import Array, Cards, Output, PredictedRun, Runs, Shown, Simulation, record_of
-from .curve import CRITERIA, CURVE_PROPERTIES
+from .curve import CRITERIA, CURVE_PROPERTIES, CurvePoint
+from .measures import BendingMeasures
 from .predicted import CylinderOutcome, CylinderPredicted, measured_table, place_names
-from .run import BendingRun
+from .run import BendingRun, Model
 from .terminal import describe_load
 from .test import PART, CylinderTest
 
 #: Node sets that the picture draws as lines.
-LINES = ("mid_span", "top_line", "bottom_line")
+DRAWN_LINES = ("mid_span", "top_line", "bottom_line")
+#: Folders of the output.
+FIGURES, BEAMS = "figures", "beams"
+#: Files of the output.
+CURVES_FILE, MEASURED_FILE = "load_deflection.csv", "measured.csv"
+#: Predictions that the page sums up in its first sentence.
+SUMMED_UP = 4
+#: Letters of a cell that is not broken.
+UNBROKEN_LETTERS = 30
 
 
-#: The whole cylinder: mesh (mm, with warp), displacements (nodes, 3) when inflated and at the end.
-Beam = tuple[Mesh, Array, Array]
+class WholeBeam(NamedTuple):
+    """The whole cylinder: mesh (mm, with warp), displacements (nodes, 3) mm."""
+
+    mesh: Mesh
+    inflated: Array
+    bent: Array
 
 
-def whole_beam(model: CylinderModel | BeamModel, run: BendingRun) -> Beam:
+def whole_beam(model: Model, run: BendingRun) -> WholeBeam:
     """Return the meshed part and its mirror images."""
     mesh = model.mesh
     assert mesh.warp is not None
     points, quads, warp = mesh.points, mesh.quads, mesh.warp
-    moves = [run.inflated, run.bent]
+    displacements = [run.inflated, run.bent]
     number = np.arange(len(points))
-    lines = {name: np.isin(number, mesh.node_sets[name]) for name in LINES}
+    is_on_line = {name: np.isin(number, mesh.node_sets[name]) for name in DRAWN_LINES}
     for axis, name in ((0, "symmetry_x"), (2, "symmetry_z")):
         if name not in mesh.node_sets:
             continue
-        turned = np.where(np.arange(3) == axis, -1.0, 1.0)
+        mirror = np.where(np.arange(3) == axis, -1.0, 1.0)
         count = len(points)
         points, quads, source = with_mirror_image(points, quads, axis)
-        sign = np.where((np.arange(len(points)) < count)[:, None], 1.0, turned)
-        moves = [u[source] * sign for u in moves]
-        warp = np.concatenate([warp, warp * turned])
-        lines = {name: line[source] for name, line in lines.items()}
-    sets = {name: np.flatnonzero(line) for name, line in lines.items()}
-    return Mesh(points, quads, sets, {}, warp), moves[0], moves[1]
+        sign = np.where((np.arange(len(points)) < count)[:, None], 1.0, mirror)
+        displacements = [u[source] * sign for u in displacements]
+        warp = np.concatenate([warp, warp * mirror])
+        is_on_line = {name: mask[source] for name, mask in is_on_line.items()}
+    sets = {name: np.flatnonzero(mask) for name, mask in is_on_line.items()}
+    return WholeBeam(Mesh(points, quads, sets, {}, warp), *displacements)
 
 
-def bodies_of(model: CylinderModel | BeamModel, beam: Beam, deflection: float) -> BeamBodies:
+def bodies_of(model: Model, beam: WholeBeam, deflection: float) -> BeamBodies:
     """Return supports and collar, placed to touch the inflated beam; straps hang on its axis."""
-    mesh, inflated, bent = beam
     if isinstance(model, BeamModel):
-        z, size = model.supports.span, model.supports.diameter
-        rows, row = np.unique(np.round(mesh.points[:, 2], 3), return_inverse=True)
-        axis = np.bincount(row, (mesh.points + bent)[:, 1]) / np.bincount(row)
-        strap = np.interp(0.5 * model.load_spacing, rows, axis)
-        spots = sorted({-0.5 * model.load_spacing, 0.5 * model.load_spacing})
-        low = -max(model.roller_below, model.section.radius + 0.5 * size)
-        return BeamBodies(
-            ((-0.5 * z, low), (0.5 * z, low)), 0.5 * size, float(strap), model.section.radius,
-            model.collar.length, tuple(spots),
-        )  # fmt: skip
-    at = mesh.points + inflated
-    radius, half = 0.5 * model.supports.width, 0.5 * model.supports.span
-    beside = np.abs(np.abs(at[:, 2]) - half)
-    near = beside < radius
-    height = float((at[near, 1] - np.sqrt(radius**2 - beside[near] ** 2)).min())
-    inner, middle = 0.5 * model.collar.inner_diameter, 0.5 * model.collar.spacing
-    along = np.abs(np.abs(at[:, 2]) - middle) <= 0.5 * model.collar.length
-    inside = along & (np.abs(at[:, 0]) < inner)
-    top = float((at[inside, 1] - np.sqrt(inner**2 - at[inside, 0] ** 2)).max())
+        return _rollers_and_straps(model, beam)
+    return _supports_and_collars(model, beam, deflection)
+
+
+def _rollers_and_straps(model: BeamModel, beam: WholeBeam) -> BeamBodies:
+    radius, half_spacing = model.section.radius, 0.5 * model.load_spacing
+    half_span, roller_radius = 0.5 * model.supports.span, 0.5 * model.supports.diameter
+    rows, row = np.unique(np.round(beam.mesh.points[:, 2], 3), return_inverse=True)
+    axis = np.bincount(row, (beam.mesh.points + beam.bent)[:, 1]) / np.bincount(row)
+    strap_height = np.interp(half_spacing, rows, axis)
+    roller_height = -max(model.roller_below, radius + roller_radius)
     return BeamBodies(
-        ((-half, height), (half, height)), radius, top - deflection, inner, model.collar.length,
-        tuple(sorted({-middle, middle})),
-    )  # fmt: skip
+        supports=((-half_span, roller_height), (half_span, roller_height)),
+        support_radius=roller_radius,
+        collar_height=float(strap_height),
+        collar_radius=radius,
+        collar_length=model.collar.length,
+        collars=tuple(sorted({-half_spacing, half_spacing})),
+    )
 
 
-def draw_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path, title: str) -> None:
+def _supports_and_collars(model: CylinderModel, beam: WholeBeam, deflection: float) -> BeamBodies:
+    position = beam.mesh.points + beam.inflated
+    support_radius, half_span = 0.5 * model.supports.width, 0.5 * model.supports.span
+    distance = np.abs(np.abs(position[:, 2]) - half_span)
+    is_over = distance < support_radius
+    rise = np.sqrt(support_radius**2 - distance[is_over] ** 2)
+    support_height = float((position[is_over, 1] - rise).min())
+    inner, middle = 0.5 * model.collar.inner_diameter, 0.5 * model.collar.spacing
+    is_along = np.abs(np.abs(position[:, 2]) - middle) <= 0.5 * model.collar.length
+    is_inside = is_along & (np.abs(position[:, 0]) < inner)
+    rise = np.sqrt(inner**2 - position[is_inside, 0] ** 2)
+    collar_height = float((position[is_inside, 1] - rise).max())
+    return BeamBodies(
+        supports=((-half_span, support_height), (half_span, support_height)),
+        support_radius=support_radius,
+        collar_height=collar_height - deflection,
+        collar_radius=inner,
+        collar_length=model.collar.length,
+        collars=tuple(sorted({-middle, middle})),
+    )
+
+
+def draw_beam(model: Model, run: BendingRun, path: Path, title: str) -> None:
     """Draw the last frame."""
-    mesh, *moves = beam = whole_beam(model, run)
-    rest, sets = mesh.points, mesh.node_sets
-    nodes, top, bottom = (sets[name] for name in LINES)
-    around = np.argsort(np.arctan2(rest[nodes, 0], rest[nodes, 1]))
-    ring = np.append(nodes[around], nodes[around[0]])
-    top, bottom = (line[np.argsort(rest[line, 2])] for line in (top, bottom))
+    beam = whole_beam(model, run)
+    points, sets = beam.mesh.points, beam.mesh.node_sets
+    ring, top, bottom = (sets[name] for name in DRAWN_LINES)
+    ring = ring[np.argsort(np.arctan2(points[ring, 0], points[ring, 1]))]
+    ring = np.append(ring, ring[0])
+    top, bottom = (nodes[np.argsort(points[nodes, 2])] for nodes in (top, bottom))
     outline = np.concatenate([top, bottom[::-1], top[:1]])
-    inflated, bent = (rest + moved for moved in moves)
-    strain = surface_strain(mesh, moves[1])[:, 0]
-    lines = inflated[outline][:, [2, 1]], (inflated[ring, :2], bent[ring, :2])
-    bodies = bodies_of(model, beam, float(run.deflection[-1]))
-    save(path, beam_charts(bent, mesh.quads, strain, *lines, bodies, title))
+    inflated, bent = points + beam.inflated, points + beam.bent
+    charts = beam_charts(
+        bent,
+        beam.mesh.quads,
+        surface_strain(beam.mesh, beam.bent)[:, 0],
+        inflated[outline][:, [2, 1]],
+        (inflated[ring, :2], bent[ring, :2]),
+        bodies_of(model, beam, float(run.deflection[-1])),
+        title,
+    )
+    save(path, charts)
 
 
-def write_beam(model: CylinderModel | BeamModel, run: BendingRun, path: Path) -> None:
+def write_beam(model: Model, run: BendingRun, path: Path) -> None:
     """Write the last frame for ParaView, with the inflated one as a further displacement."""
-    mesh, inflated, bent = whole_beam(model, run)
+    beam = whole_beam(model, run)
     strains = {
-        "log_strain_1_2_12": surface_strain(mesh, bent),
-        "inflated_log_strain_1_2_12": surface_strain(mesh, inflated),
+        "log_strain_1_2_12": surface_strain(beam.mesh, beam.bent),
+        "inflated_log_strain_1_2_12": surface_strain(beam.mesh, beam.inflated),
     }
-    write_vtu(mesh, bent, path, {"inflated_displacement": inflated}, strains)
-
-
-FIGURES, BEAMS = "figures", "beams"
+    write_vtu(beam.mesh, beam.bent, path, {"inflated_displacement": beam.inflated}, strains)
 
 
 def draw_figures(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     """Draw loads, gas and beam of every test, and all loads; return those of the page."""
     tests = tests_of(outcome)
     names = file_names([test.name for test in tests])
-    panels, figures = {test.name: _panel(test, outcome) for test in tests}, []
+    panels = {test.name: _panel(test, outcome) for test in tests}
+    figures = []
     for test in tests:
-        if not (ended := _ended(test, outcome)):
+        numbers = _predicted_runs(test, outcome)
+        if not numbers:
             continue
         stem, panel = f"{FIGURES}/{names[test.name]}", panels[test.name]
         save(out.path(f"{stem}-load.png"), bending_charts([panel], misses=True, columns=1))
         save(out.path(f"{stem}-gas.png"), gas_charts(panel))
-        first, run = outcome.runs[ended[0]], outcome.bent[ended[0]]
-        drawn = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
-        draw_beam(first.model, run, out.path(f"{stem}-beam.png"), drawn)
+        first, run = outcome.runs[numbers[0]], outcome.bent[numbers[0]]
+        title = f"{test.name}, {first.card}, {run.deflection[-1]:g} mm"
+        draw_beam(first.model, run, out.path(f"{stem}-beam.png"), title)
         figures += [
             (out.name(f"{stem}-beam.png"), f"{test.name}: the bent beam, card {first.card}"),
             (out.name(f"{stem}-gas.png"), f"{test.name}: the gas while bending"),
         ]
     if sum(bool(panel.lines) for panel in panels.values()) > 1:
-        # A row a diameter, where several diameters have several pressures.
-        sizes: dict[float, list[CylinderTest]] = {}
-        for test in tests:
-            sizes.setdefault(round(test.diameter, 6), []).append(test)
-        rows = list(sizes.values())
-        if len(rows) == 1 or max(map(len, rows)) == 1:
-            rows = [tests[i : i + 3] for i in range(0, len(tests), 3)]
+        rows = _rows_of_panels(tests)
         columns = max(map(len, rows))
-        laid = [
+        grid = [
             panels[row[k].name] if k < len(row) else BendPanel("")
             for row in rows
             for k in range(columns)
         ]
-        save(out.path(f"{FIGURES}/all-loads.png"), bending_charts(laid, columns=columns))
+        save(out.path(f"{FIGURES}/all-loads.png"), bending_charts(grid, columns=columns))
     return figures
+
+
+def _rows_of_panels(tests: Sequence[CylinderTest]) -> list[Sequence[CylinderTest]]:
+    """Return a row a diameter where several diameters have several pressures, else of three."""
+    by_diameter: dict[float, list[CylinderTest]] = {}
+    for test in tests:
+        by_diameter.setdefault(round(test.diameter, 6), []).append(test)
+    rows = list(by_diameter.values())
+    if len(rows) == 1 or max(map(len, rows)) == 1:
+        return [tests[i : i + 3] for i in range(0, len(tests), 3)]
+    return list(rows)
 
 
 def load_charts(outcome: CylinderOutcome) -> list[Charts]:
@@ -160,8 +200,8 @@ def load_charts(outcome: CylinderOutcome) -> list[Charts]:
         return []
     caption = "Load over deflection"
     if len(outcome.band) > 1:
-        predicted, *others = (end.name for end in outcome.band)
-        caption += f"; line: {predicted}, dashed: {', '.join(others)}"
+        predicted, *ends = (end.name for end in outcome.band)
+        caption += f"; line: {predicted}, dashed: {', '.join(ends)}"
     if outcome.spreads:
         caption += f". Shaded: {panels[0].spread}"
     return [bending_charts(panels, caption)]
@@ -174,11 +214,14 @@ def write_beams(outcome: CylinderOutcome, out: Output) -> list[Shown]:
     files = []
     for i, bent in outcome.bent.items():
         run = outcome.runs[i]
-        wall = "" if run.predicted else f"-{file_names([run.wall])[run.wall]}"
+        description = f"the beam at {bent.deflection[-1]:g} mm, for ParaView"
+        wall = ""
+        if not run.predicted:
+            wall = f"-{file_names([run.wall])[run.wall]}"
+            description += f" ({run.wall})"
         name = f"{BEAMS}/{tests[run.test.name]}-{cards[run.card]}{wall}.vtu"
         write_beam(run.model, bent, out.path(name))
-        what = f"the beam at {bent.deflection[-1]:g} mm, for ParaView"
-        files.append((out.name(name), what if run.predicted else f"{what} ({run.wall})"))
+        files.append((out.name(name), description))
     return files
 
 
@@ -192,46 +235,69 @@ def file_names(names: Sequence[str]) -> dict[str, str]:
     files: dict[str, str] = {}
     for number, name in enumerate(names, start=1):
         plain = re.sub(r"[^A-Za-z0-9.]+", "-", name).strip("-.") or str(number)
-        taken = plain.casefold() in (other.casefold() for other in files.values())
-        files[name] = f"{plain}-{number}" if taken else plain
+        is_used = plain.casefold() in (file.casefold() for file in files.values())
+        files[name] = f"{plain}-{number}" if is_used else plain
     return files
 
 
-def _ended(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
+def _predicted_runs(test: CylinderTest, outcome: CylinderOutcome) -> list[int]:
     """Return the runs of a test that did not fail, of what the solver predicts."""
     runs = outcome.runs
     return [i for i in outcome.bent if runs[i].test is test and runs[i].predicted]
 
 
 def _panel(test: CylinderTest, outcome: CylinderOutcome) -> BendPanel:
-    cards, lines = list(dict.fromkeys(run.card for run in outcome.runs)), []
-    for i in _ended(test, outcome):
+    """Return the curves of a test, of all cards, with what was measured."""
+    cards = list(dict.fromkeys(run.card for run in outcome.runs))
+    lines = []
+    for i in _predicted_runs(test, outcome):
         run, m, card = outcome.bent[i], outcome.measures[i], outcome.runs[i].card
-        rms = None if m.error is None else m.error.rms
-        curves = run.deflection, run.load, run.pressure, run.volume
-        other = outcome.other_end(i)
-        band = None if other is None else (outcome.bent[other].deflection, outcome.bent[other].load)
-        sure = outcome.spreads.get(i)
-        off = None if sure is None or np.isnan(sure).all() else BAND * sure
-        lines.append(BendLine(card, cards.index(card), *curves, m.knee, m.limit, rms, band, off))
+        other_number = outcome.other_end(i)
+        other_end = None if other_number is None else outcome.bent[other_number]
+        sigma = outcome.spreads.get(i)
+        bend_line = BendLine(
+            name=card,
+            rank=cards.index(card),
+            deflection=run.deflection,
+            load=run.load,
+            pressure=run.pressure,
+            volume=run.volume,
+            knee=m.knee,
+            limit=m.limit,
+            rms=None if m.error is None else m.error.rms,
+            other=None if other_end is None else (other_end.deflection, other_end.load),
+            off=None if sigma is None or np.isnan(sigma).all() else BAND * sigma,
+        )
+        lines.append(bend_line)
     measured = None
     if test.measured:
-        s = scatter(test.measured)
+        spread = scatter(test.measured)
         # Where a repetition has ended the mean of the others jumps.
-        whole = s.count == len(test.measured)
-        mean, deviation = (np.where(whole, own, np.nan) for own in (s.mean, s.deviation))
-        measured = replace(s, mean=mean, deviation=deviation)
-    beam = any(isinstance(run.model, BeamModel) for run in outcome.runs if run.test is test)
-    along = "deflection of mid-span, mm" if beam else ALONG
-    spread = f"{100 * LEVEL:g} % by the card"
-    return BendPanel(test.name, lines, test.measured, measured, spread, along)
+        is_complete = spread.count == len(test.measured)
+        measured = replace(
+            spread,
+            mean=np.where(is_complete, spread.mean, np.nan),
+            deviation=np.where(is_complete, spread.deviation, np.nan),
+        )
+    is_beam = any(isinstance(run.model, BeamModel) for run in outcome.runs if run.test is test)
+    return BendPanel(
+        title=test.name,
+        lines=lines,
+        readings=test.measured,
+        measured=measured,
+        spread=f"{100 * LEVEL:g} % by the card",
+        along="deflection of mid-span, mm" if is_beam else COLLAR_DEFLECTION,
+    )
 
 
 def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[str]:
     """Return notes on the uncertainty of the loads and on assumptions."""
     lines = []
-    shares = [float(np.nanmax(s)) / float(np.max(outcome.bent[i].load))
-              for i, s in outcome.spreads.items() if not np.isnan(s).all()]  # fmt: skip
+    shares = [
+        float(np.nanmax(sigma)) / float(np.max(outcome.bent[i].load))
+        for i, sigma in outcome.spreads.items()
+        if not np.isnan(sigma).all()
+    ]
     if shares:
         lines.append(
             f"By what the cards leave open of their laws, loads are off by up to "
@@ -241,19 +307,12 @@ def how_sure(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> list[st
     if len(outcome.band) > 1:
         ends = "; ".join(f"{end.name}: {end.meaning}" for end in outcome.band)
         lines.append(f"The solver's answer lies between walls ({ends}).")
-    for words in dict.fromkeys(words for test in tests for words in test.assumed):
-        own = [test for test in tests if words in test.assumed]
-        of = "" if len(own) == len(tests) else f" for {', '.join(t.name for t in own)}"
-        lines.append(f"Assumed{of}, as the project does not say: the usual {words}.")
+    assumptions = dict.fromkeys(words for test in tests for words in test.assumed)
+    for words in assumptions:
+        names = [test.name for test in tests if words in test.assumed]
+        of_tests = "" if len(names) == len(tests) else f" for {', '.join(names)}"
+        lines.append(f"Assumed{of_tests}, as the project does not say: the usual {words}.")
     return lines
-
-
-#: Predictions that the page sums up in its first sentence.
-SENTENCES = 4
-#: Letters of a cell that is not broken.
-SHORT = 30
-CURVES = "load_deflection.csv"
-MEASURED = "measured.csv"
 
 
 def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
@@ -264,31 +323,31 @@ def show_outcome(outcome: CylinderOutcome, out: Output) -> Exhibit:
     tables = [_runs(outcome, tests), *_errors(outcome)]
     first = openings(outcome)
     parts: list[Part] = [first, *load_charts(outcome), Words(how_sure(outcome, tests))]
+    lengths: dict[str, set[float]] = {
+        "length, mm": {t.length for t in tests},
+        "span, mm": {t.supports.span for t in tests},
+        "element size, mm": {t.size for t in tests},
+        "seam width, mm": {t.seam_width for t in tests},
+    }
+    facts = [(label, float(v.pop())) for label, v in lengths.items() if len(v) == 1]
     sentences = [_sentence(row) for row in first.rows if row[2]]
-    lines = sentences if len(first.rows) <= SENTENCES else []
-    shared = (
-        ("length, mm", {t.length for t in tests}),
-        ("span, mm", {t.supports.span for t in tests}),
-        ("element size, mm", {t.size for t in tests}),
-        ("seam width, mm", {t.seam_width for t in tests}),
-    )
-    facts = [(label, float(values.pop())) for label, values in shared if len(values) == 1]
-    summary = f"{'; '.join(lines)}." if lines else ""
+    has_summary = sentences and len(first.rows) <= SUMMED_UP
+    summary = f"{'; '.join(sentences)}." if has_summary else ""
     return Exhibit(facts, figures, tables, files, parts, summary=summary)
 
 
-def _in(band: object) -> str:
-    return f" ({band})" if band else ""
+def _in_brackets(text: object) -> str:
+    return f" ({text})" if text else ""
 
 
 def _sentence(row: Sequence[object]) -> str:
     """Return a row of the opening table in words."""
-    test, card, stiffness, band, *points = row
-    words = [f"{test}, {card}: stiffness {stiffness}{_in(band)} N/mm"]
+    test, card, stiffness, stiffness_band, *points = row
+    words = [f"{test}, {card}: stiffness {stiffness}{_in_brackets(stiffness_band)} N/mm"]
     for name, cells in (("knee", points[:3]), ("limit point", points[3:])):
-        load, band, deflection = cells
+        load, load_band, deflection = cells
         if deflection:
-            words.append(f"{name} at {load}{_in(band)} N and {deflection} mm")
+            words.append(f"{name} at {load}{_in_brackets(load_band)} N and {deflection} mm")
         else:
             words.append(f"{name} {load}")
     return ", ".join(words)
@@ -301,16 +360,19 @@ def openings(outcome: CylinderOutcome) -> Table:
         if not run.predicted:
             continue
         stiffness = outcome.with_band(i, "stiffness")
-        cells = [f"{stiffness[0]:.3g}" if stiffness else None, _to(stiffness, ".3g")]
-        points: tuple[Literal["knee", "limit"], ...] = ("knee", "limit")
-        for name in points:
-            cells += _point_cells(outcome, i, name)
+        cells = [
+            f"{stiffness[0]:.3g}" if stiffness else None,
+            _range_text(stiffness, ".3g"),
+            *_point_cells(outcome, i, "knee"),
+            *_point_cells(outcome, i, "limit"),
+        ]
         rows.append(_unbroken([run.test.name, run.card, *cells]))
     header = ["test", "card", "stiffness, N/mm", "its band"]
     for name in ("knee", "limit point"):
         header += [f"load at the {name}, N", "its band", "deflection there, mm"]
     sides = [f"{100 * LEVEL:g} % by what the card leaves open"] if outcome.spreads else []
-    sides += [f"from {' to '.join(end.name for end in outcome.band)}"] if outcome.band else []
+    if outcome.band:
+        sides.append(f"from {' to '.join(end.name for end in outcome.band)}")
     note = f"Bands: {', '.join(sides) or 'not known'}; none where it is narrower than the digits. "
     note += "The knee is where the slope has fallen to half, the limit point the largest load, "
     note += "where the load falls afterwards."
@@ -327,63 +389,75 @@ def _point_cells(
     if load is None:
         return [measures.describe(None), None, None]
     deflection, _ = getattr(measures, name)
-    return [f"{load[0]:.0f}", _to(load, ".0f"), f"{deflection:.0f}"]
+    return [f"{load[0]:.0f}", _range_text(load, ".0f"), f"{deflection:.0f}"]
 
 
-def _to(found: tuple[float, float, float] | None, form: str) -> str | None:
+def _range_text(banded: tuple[float, float, float] | None, digits: str) -> str | None:
     """Return the ends of a band, where it has a width."""
-    low, high = ("", "") if found is None else (f"{end:{form}}" for end in found[1:])
+    if banded is None:
+        return None
+    low, high = (f"{end:{digits}}" for end in banded[1:])
     return None if low == high else f"{low} to {high}"
 
 
 def _write_tables(
     outcome: CylinderOutcome, tests: Sequence[CylinderTest], out: Output
 ) -> list[Shown]:
-    curves = [
-        pd.DataFrame({"test": r.test.name, "card": r.card, "wall": r.wall, **outcome.curve(i)})
-        for i, r in enumerate(outcome.runs)
-    ]
-    what = "every curve: deflection, load, pressure, volume, wrinkled share"
-    files = [out.write(CURVES, pd.concat(curves), what, None)]
+    """Write the curves, and what was measured."""
+    curves = []
+    for i, run in enumerate(outcome.runs):
+        names = {"test": run.test.name, "card": run.card, "wall": run.wall}
+        curves.append(pd.DataFrame({**names, **outcome.curve(i)}))
+    description = "every curve: deflection, load, pressure, volume, wrinkled share"
+    files = [out.write(CURVES_FILE, pd.concat(curves), description, None)]
     if any(test.measured for test in tests):
-        what = "mean and scatter of the repetitions on a grid"
-        files.append(out.write(MEASURED, measured_table(tests), what, None))
+        description = "mean and scatter of the repetitions on a grid"
+        files.append(out.write(MEASURED_FILE, measured_table(tests), description, None))
     return files
 
 
 def _slopes(tests: Sequence[CylinderTest]) -> str:
-    over = sorted({round(t.reading.slope_over, 6) for t in tests})
-    if len(over) == 1:
-        return f"{over[0]:g} mm"
+    """Return over which deflection slopes are taken."""
+    lengths = sorted({round(t.reading.slope_over, 6) for t in tests})
+    if len(lengths) == 1:
+        return f"{lengths[0]:g} mm"
     shares = {round(t.reading.slope_over / t.diameter, 9) for t in tests}
-    ends = f"{over[0]:g} to {over[-1]:g} mm"
+    ends = f"{lengths[0]:g} to {lengths[-1]:g} mm"
     return f"{shares.pop():g} diameters ({ends})" if len(shares) == 1 else ends
 
 
+def _name_cells(outcome: CylinderOutcome, run: PredictedRun) -> list[object]:
+    """Return test and card of a run, and its wall where the solver has a band."""
+    return [run.test.name, run.card, *([run.wall] if outcome.band else [])]
+
+
+def _name_header(outcome: CylinderOutcome) -> list[str]:
+    return ["test", "card", *(["wall"] if outcome.band else [])]
+
+
 def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
-    places, rows = place_names(tests), []
-    walls = ["wall"] if outcome.band else []
+    """Return the table of all runs."""
+    places = place_names(tests)
+    rows = []
     for i, run in enumerate(outcome.runs):
         m = outcome.measures.get(i)
-        head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
-        tail: list[object] = [outcome.ended(i), ", ".join(marks(run.notes)) or None]
-        tail += [len(run.notes), round(run.record.seconds, 1)]
-        if m is None:
-            rows.append([*head, *[None] * (6 + len(places)), *tail])
-            continue
-        points = m.describe(m.knee), m.describe(m.limit)
-        wrinkles = f"{m.wrinkles[0]:.0f} mm" if m.wrinkles else None
-        strain, rise = f"{100 * max(m.body_strain):.2g}", f"{m.pressure_rise:+.2f}"
-        stiffness = None if m.stiffness is None else f"{m.stiffness:.2f}"
-        spread = outcome.sigma(i)
-        loads = [(m.loads.get(place), spread.get(place)) for place in places]
-        listed = [None if one[0] is None else describe_load(*one) for one in loads]
-        rows.append([*head, stiffness, *points, wrinkles, *listed, strain, rise, *tail])
+        cells: Sequence[object] = [None] * (6 + len(places))
+        if m is not None:
+            cells = _measure_cells(m, outcome.sigma(i), places)
+        tail = [
+            outcome.ended(i),
+            ", ".join(marks(run.notes)) or None,
+            len(run.notes),
+            round(run.record.seconds, 1),
+        ]
+        rows.append(_unbroken([*_name_cells(outcome, run), *cells, *tail]))
+    names = _name_header(outcome)
     header = [
-        "test", "card", *walls, "stiffness, N/mm", "knee", "limit point", "wrinkles from",
+        *names,
+        *("stiffness, N/mm", "knee", "limit point", "wrinkles from"),
         *(f"load at {place}, N" for place in places),
-        "inflation strain, %", "pressure, kPa", "ended", "marked", "notes", "s",
-    ]  # fmt: skip
+        *("inflation strain, %", "pressure, kPa", "ended", "marked", "notes", "s"),
+    ]
     slopes = _slopes(tests)
     note = (
         f"Stiffness: to {slopes} of deflection. Knee: where the slope over {slopes} has fallen to "
@@ -393,53 +467,97 @@ def _runs(outcome: CylinderOutcome, tests: Sequence[CylinderTest]) -> Table:
         " Marked: the kinds of notes that speak against a run's numbers; the notes stand below."
     )
     if outcome.spreads:
-        how = sorted({run.around.words for run in outcome.runs if run.around is not None})
+        laws = sorted({run.around.words for run in outcome.runs if run.around is not None})
         note += (
             " ±: one standard deviation of the load by what the card leaves open of its law "
-            f"({'; '.join(how)} around it), which is no part of the band of the walls."
+            f"({'; '.join(laws)} around it), which is no part of the band of the walls."
         )
-    named = range(1, header.index("stiffness, N/mm"))
-    text = (*named, header.index("ended"), header.index("marked"))
-    return Table("Runs", header, [_unbroken(row) for row in rows], note, text=text)
+    text_columns = (*range(1, len(names)), header.index("ended"), header.index("marked"))
+    return Table("Runs", header, rows, note, text=text_columns)
+
+
+def _measure_cells(
+    m: BendingMeasures, sigmas: Mapping[str, float | None], places: Sequence[str]
+) -> list[object]:
+    """Return the cells of a run that ended, from stiffness to rise of pressure."""
+    loads: list[str | None] = []
+    for place in places:
+        load = m.loads.get(place)
+        loads.append(None if load is None else describe_load(load, sigmas.get(place)))
+    return [
+        None if m.stiffness is None else f"{m.stiffness:.2f}",
+        m.describe(m.knee),
+        m.describe(m.limit),
+        f"{m.wrinkles.deflection:.0f} mm" if m.wrinkles else None,
+        *loads,
+        f"{100 * max(m.body_strain):.2g}",
+        f"{m.pressure_rise:+.2f}",
+    ]
 
 
 def _errors(outcome: CylinderOutcome) -> list[Table]:
     """Return the tables of what is measured too: quantities, and loads reading by reading."""
-    walls = ["wall"] if outcome.band else []
-    places = place_names(run.test for run in outcome.runs)
-    compared = [*CURVE_PROPERTIES, *(f"load at {place}" for place in places)]
-    rows, beside = list[list[object]](), list[list[object]]()
+    rows = []
     for i, m in outcome.measures.items():
-        run = outcome.runs[i]
-        head: list[object] = [run.test.name, run.card, *(walls and [run.wall])]
-        if (error := m.error) is not None:
-            numbers = [error.rms, percent(error.relative), f"{error.mean:+.1f}"]
-            rows.append(_unbroken([*head, *numbers, error.compared, error.beyond]))
-        if m.against is not None:
-            for pair in map(m.against.pairs.get, compared):
-                of = None if pair is None else f"{pair[0] / pair[1]:.3f}"
-                head += [None if pair is None else f"{pair[1]:.4g}", of]
-            beside.append(_unbroken(head))
+        if m.error is not None:
+            cells = [
+                m.error.rms,
+                percent(m.error.relative),
+                f"{m.error.mean:+.1f}",
+                m.error.compared,
+                m.error.beyond,
+            ]
+            rows.append(_unbroken([*_name_cells(outcome, outcome.runs[i]), *cells]))
     if not rows:
         return []
-    named = ["test", "card", *walls]
-    header = [*named, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
+    names = _name_header(outcome)
+    header = [*names, "RMS, N", "of the largest load", "mean, N", "readings", "beyond"]
     note = "Model less reading at every reading that the model reaches; beyond: those it does not."
-    text = tuple(range(1, len(named)))
-    over = (f"{name}, {'N/mm' if name.endswith('stiffness') else 'N'}" for name in compared)
-    columns = [*named, *(words for name in over for words in (name, "of it"))]
+    text_columns = tuple(range(1, len(names)))
+    errors = Table("Against measured loads", header, rows, note, text=text_columns)
+    return [*_measured_quantities(outcome), errors]
+
+
+def _measured_quantities(outcome: CylinderOutcome) -> list[Table]:
+    """Return the table of stiffness, knee, limit point and loads beside measured ones, if any."""
+    places = place_names(run.test for run in outcome.runs)
+    quantities = [*CURVE_PROPERTIES, *(f"load at {place}" for place in places)]
+    rows = []
+    for i, m in outcome.measures.items():
+        if m.against is None:
+            continue
+        cells = _name_cells(outcome, outcome.runs[i])
+        for quantity in quantities:
+            pair = m.against.pairs.get(quantity)
+            cells += [None, None] if pair is None else _pair_cells(*pair)
+        rows.append(_unbroken(cells))
+    if not rows:
+        return []
+    names = _name_header(outcome)
+    header = list(names)
+    for quantity in quantities:
+        unit = "N/mm" if quantity.endswith("stiffness") else "N"
+        header += [f"{quantity}, {unit}", "of it"]
     low, high = (f"{100 * share:g}" for share in (CRITERIA.secant_from, CRITERIA.secant_to))
-    how = "Measured (mean of the repetitions), and predicted over measured. Secant stiffness: "
-    how += f"between {low} and {high} % of each curve's load at the last place that all reach; "
-    how += "secant knee: where the slope is half of that. Measured curves begin with friction: "
-    how += "neither is the stiffness or the knee of the tables above, which begin at zero load."
-    quantities = [Table("Measured quantities", columns, beside, how, text=text)] if beside else []
-    return [*quantities, Table("Against measured loads", header, rows, note, text=text)]
+    note = "Measured (mean of the repetitions), and predicted over measured. Secant stiffness: "
+    note += f"between {low} and {high} % of each curve's load at the last place that all reach; "
+    note += "secant knee: where the slope is half of that. Measured curves begin with friction: "
+    note += "neither is the stiffness or the knee of the tables above, which begin at zero load."
+    return [Table("Measured quantities", header, rows, note, text=tuple(range(1, len(names))))]
+
+
+def _pair_cells(predicted: float, measured: float) -> list[str]:
+    return [f"{measured:.4g}", f"{predicted / measured:.3f}"]
 
 
 def _unbroken(row: Sequence[object]) -> list[object]:
     """Return the row with names and numbers that stay on one line."""
-    return [c.replace(" ", "\u00a0") if isinstance(c, str) and len(c) < SHORT else c for c in row]
+    return [
+        cell.replace(" ", "\u00a0")
+        if isinstance(cell, str) and len(cell) < UNBROKEN_LETTERS
+        else cell
+        for cell in row
+    ]
 
 
 def simulate(
@@ -463,24 +581,37 @@ def simulate(
 
 # Charts: load over deflection, the gas, and the bent beam
 
-Point = tuple[float, float]
-
 MM3_PER_LITRE = 1e6
-ALONG = "deflection of the collar, mm"
+COLLAR_DEFLECTION = "deflection of the collar, mm"
+#: Colour of what was measured.
+MEASURED_COLOUR = 7
 #: mm of the collar's wall, which the model does not have: only for the eye.
-WALL = 12.0
+COLLAR_WALL = 12.0
 #: Beside the collar, in its lengths: how far the close view goes.
-CLOSE = 2.2
+CLOSE_VIEW = 2.2
 
 
 @dataclass(frozen=True, eq=False)
 class BendLine:
     """The curve of one card.
-    name : of the card. rank : of its colour, the same in every figure. deflection, load, pressure,
-    volume : (frames,) mm, N, MPa, mm^3. knee, limit : where they are, mm and N. rms : N, against
-    what was measured. other : deflection (mm) and load (N) of the other end of a band that begins
-    at the curve. off : (frames,) N, how far the load may be off to either side by what the card
-    leaves open."""
+
+    Parameters
+    ----------
+    name : str
+        Of the card.
+    rank : int
+        Of its colour, the same in every figure.
+    deflection, load, pressure, volume : (frames,) arrays
+        mm, N, MPa, mm^3.
+    knee, limit : CurvePoint, optional
+        Where they are.
+    rms : float, optional
+        Against what was measured, N.
+    other : (deflection, load), optional
+        The other end of a band that begins at the curve, mm and N.
+    off : (frames,) array, optional
+        How far the load may be off to either side by what the card leaves open, N.
+    """
 
     name: str
     rank: int
@@ -488,30 +619,61 @@ class BendLine:
     load: Array
     pressure: Array | None = None
     volume: Array | None = None
-    knee: Point | None = None
-    limit: Point | None = None
+    knee: CurvePoint | None = None
+    limit: CurvePoint | None = None
     rms: float | None = None
     other: tuple[ArrayLike, ArrayLike] | None = None
     off: Array | None = None
 
+    @property
+    def colour(self) -> int:
+        """Return the number of its colour."""
+        return 1 + self.rank % 6
+
 
 @dataclass(frozen=True, eq=False)
 class BendPanel:
-    """One case: a curve a card, repetitions with their scatter, what curves may be off by.
-    along : the name of the deflection."""
+    """One case: a curve a card, and repetitions with their scatter.
+
+    Parameters
+    ----------
+    title : str
+        Of the chart.
+    lines : sequence of BendLine
+        A curve a card.
+    readings : sequence of BendingCurve
+        What was measured.
+    measured : BendingScatter, optional
+        Its mean and scatter.
+    spread : str
+        What curves may be off by, in words.
+    along : str
+        Label of the deflection.
+    """
 
     title: str
     lines: Sequence[BendLine] = ()
     readings: Sequence[BendingCurve] = ()
     measured: BendingScatter | None = None
     spread: str = ""
-    along: str = ALONG
+    along: str = COLLAR_DEFLECTION
 
 
 @dataclass(frozen=True)
 class BeamBodies:
-    """Rigid bodies when bent, mm; supports : (z, y) of the axes; collar_height : y of its axis.
-    collars : z of each collar, or strap."""
+    """Rigid bodies when bent.
+
+    Parameters
+    ----------
+    supports : tuple of (z, y)
+        Axes of the supports, mm.
+    support_radius, collar_radius, collar_length : float
+        mm.
+    collar_height : float
+        y of the collar's axis, mm.
+    collars : tuple of float
+        z of each collar, or strap, mm.
+    """
 
     supports: tuple[tuple[float, float], ...]
     support_radius: float
@@ -529,68 +691,108 @@ class BeamBodies:
 def bending_charts(
     panels: Sequence[BendPanel], caption: str = "", columns: int = 0, misses: bool = False
 ) -> Charts:
-    """Return load over deflection, a chart a case; in columns, a row has the same loads."""
-    drawn = [panel for panel in panels if panel.lines or columns > 1]
-    charts = [_loads(panel) for panel in drawn]
+    """Return load over deflection, a chart a case.
+
+    Parameters
+    ----------
+    panels : sequence of BendPanel
+        The cases.
+    caption : str
+        Of the charts.
+    columns : int
+        How many charts a row has, which then have the same loads; 0: as they fit.
+    misses : bool
+        Whether charts of model less measurement follow.
+    """
+    drawn_panels = [panel for panel in panels if panel.lines or columns > 1]
+    charts = [_load_chart(panel) for panel in drawn_panels]
     if columns > 1:
+        rows = [charts[k : k + columns] for k in range(0, len(charts), columns)]
+        x_range = _common_range(charts, "x")
         charts = [
-            replace(chart, x_range=_range(charts, "x"), y_range=_range(row, "y"))
-            for row in (charts[k : k + columns] for k in range(0, len(charts), columns))
+            replace(chart, x_range=x_range, y_range=_common_range(row, "y"))
+            for row in rows
             for chart in row
         ]
-    charts += [_misses(panel) for panel in drawn if misses and panel.measured is not None]
+    if misses:
+        charts += [_miss_chart(panel) for panel in drawn_panels if panel.measured is not None]
     return Charts("loads", charts, caption, columns)
 
 
-def _range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
+def _common_range(charts: Sequence[Chart], axis: str) -> tuple[float, float]:
     """Return the range of an axis that holds all that several charts draw."""
     fields = ("x",) if axis == "x" else ("y", "upper")
-    every = [v for c in charts for s in c.series for f in fields for v in getattr(s, f)]
-    return 0.0, 1.06 * max([v for v in every if v is not None], default=0.0) or 1.0
+    values = [
+        value
+        for chart in charts
+        for series in chart.series
+        for field in fields
+        for value in getattr(series, field)
+        if value is not None
+    ]
+    return 0.0, 1.06 * max(values, default=0.0) or 1.0
 
 
-def _loads(panel: BendPanel) -> Chart:
-    series: list[Series] = []
-    if panel.measured is not None:
-        seen = panel.measured
-        ends = seen.mean - seen.deviation, seen.mean + seen.deviation
-        series.append(band("scatter of repetitions (±)", seen.deflection, *ends, colour=7))
-        series.append(line("mean", seen.deflection, seen.mean, colour=7, wide=True))
-        series += [dots("measured", c.deflection, c.load, colour=7) for c in panel.readings]
-    known = [(own.name, own.rms) for own in panel.lines if own.rms is not None]
-    for own in panel.lines:
-        look = 1 + own.rank % 6
-        sure = None if own.off is None else (own.load - own.off, own.load + own.off)
-        series.append(line(own.name, own.deflection, own.load, sure, colour=look))
-        if own.other is not None:
-            series.append(line(f"{own.name}, other end", *own.other, colour=look, dashes=1))
-        for words, point, shape in (
-            ("knee", own.knee, "diamond"), ("limit point", own.limit, "triangle-up")
-        ):  # fmt: skip
-            if point is not None:
-                at = [point[0]], [point[1]]
-                series.append(dots(words, *at, colour=look, shape=shape, hollow=True))
-    sides = [panel.spread] if any(own.off is not None for own in panel.lines) else []
-    series += [band(name, (), (), (), colour=1 + panel.lines[0].rank % 6) for name in sides if name]
-    highest = max((float(own.load.max()) for own in panel.lines), default=0.0)
+def _load_chart(panel: BendPanel) -> Chart:
+    """Return load over deflection of one case."""
+    series = _measured_series(panel)
+    for curve in panel.lines:
+        series += _line_series(curve)
+    if panel.spread and any(curve.off is not None for curve in panel.lines):
+        series.append(band(panel.spread, (), (), (), colour=panel.lines[0].colour))
+    errors = [(curve.name, curve.rms) for curve in panel.lines if curve.rms is not None]
+    highest = max((float(curve.load.max()) for curve in panel.lines), default=0.0)
     alt = f"{panel.title}: load over deflection, up to {highest:.4g} N"
-    alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in known)
+    alt += "".join(f"; {name}: RMS error {rms:.3g} N" for name, rms in errors)
     title = panel.title
-    if len(known) == 1:
-        title += f": RMS error {known[0][1]:.3g} N"
+    if len(errors) == 1:
+        title += f": RMS error {errors[0][1]:.3g} N"
     return Chart(title, panel.along, "load, N", series, alt, from_zero=True)
 
 
-def _misses(panel: BendPanel) -> Chart:
-    seen = panel.measured
-    assert seen is not None
-    grid, spread = seen.deflection, seen.deviation
-    series = [band("scatter of repetitions (±)", grid, -spread, spread, colour=7)]
-    for own in panel.lines:
-        off = np.interp(grid, own.deflection, own.load, left=np.nan, right=np.nan) - seen.mean
-        series.append(line(own.name, grid, off, colour=1 + own.rank % 6))
-    known = [f"{own.name} {own.rms:.3g} N" for own in panel.lines if own.rms is not None]
-    title = f"RMS error: {', '.join(known)}" if known else ""
+def _measured_series(panel: BendPanel) -> list[Series]:
+    """Return scatter, mean and readings of what was measured, if anything was."""
+    measured = panel.measured
+    if measured is None:
+        return []
+    low, high = measured.mean - measured.deviation, measured.mean + measured.deviation
+    deflection, colour = measured.deflection, MEASURED_COLOUR
+    return [
+        band("scatter of repetitions (±)", deflection, low, high, colour=colour),
+        line("mean", deflection, measured.mean, colour=colour, wide=True),
+        *(dots("measured", c.deflection, c.load, colour=colour) for c in panel.readings),
+    ]
+
+
+def _line_series(curve: BendLine) -> list[Series]:
+    """Return a curve with its band, the other end, knee and limit point."""
+    colour = curve.colour
+    off = curve.off
+    limits = None if off is None else (curve.load - off, curve.load + off)
+    series = [line(curve.name, curve.deflection, curve.load, limits, colour=colour)]
+    if curve.other is not None:
+        series.append(line(f"{curve.name}, other end", *curve.other, colour=colour, dashes=1))
+    marks_drawn = (("knee", curve.knee, "diamond"), ("limit point", curve.limit, "triangle-up"))
+    for name, point, shape in marks_drawn:
+        if point is not None:
+            x, y = [point[0]], [point[1]]
+            series.append(dots(name, x, y, colour=colour, shape=shape, hollow=True))
+    return series
+
+
+def _miss_chart(panel: BendPanel) -> Chart:
+    """Return model less mean of the readings over deflection, of one case."""
+    measured = panel.measured
+    assert measured is not None
+    deflection, spread = measured.deflection, measured.deviation
+    series = [
+        band("scatter of repetitions (±)", deflection, -spread, spread, colour=MEASURED_COLOUR)
+    ]
+    for curve in panel.lines:
+        load = np.interp(deflection, curve.deflection, curve.load, left=np.nan, right=np.nan)
+        series.append(line(curve.name, deflection, load - measured.mean, colour=curve.colour))
+    errors = [f"{curve.name} {curve.rms:.3g} N" for curve in panel.lines if curve.rms is not None]
+    title = f"RMS error: {', '.join(errors)}" if errors else ""
     alt = f"{panel.title}: model less mean of the readings"
     return Chart(title, panel.along, "model − mean, N", series, alt, level=0.0)
 
@@ -598,76 +800,125 @@ def _misses(panel: BendPanel) -> Chart:
 def gas_charts(panel: BendPanel) -> Charts:
     """Return gauge pressure against change of volume and against deflection."""
     by_volume: list[Series] = []
-    by_way: list[Series] = []
-    for own in panel.lines:
-        assert own.pressure is not None and own.volume is not None
-        pressure, volume = 1e3 * own.pressure, own.volume / MM3_PER_LITRE
-        name, look = f"{own.name}, from {volume[0]:.4g} litres", 1 + own.rank % 6
-        by_volume.append(line(name, volume - volume[0], pressure, colour=look))
-        by_way.append(line(name, own.deflection, pressure, colour=look))
-    across, up = "volume less that when inflated, litres", "gauge pressure, kPa"
+    by_deflection: list[Series] = []
+    for curve in panel.lines:
+        assert curve.pressure is not None and curve.volume is not None
+        pressure, volume = 1e3 * curve.pressure, curve.volume / MM3_PER_LITRE
+        name = f"{curve.name}, from {volume[0]:.4g} litres"
+        by_volume.append(line(name, volume - volume[0], pressure, colour=curve.colour))
+        by_deflection.append(line(name, curve.deflection, pressure, colour=curve.colour))
+    x_label, y_label = "volume less that when inflated, litres", "gauge pressure, kPa"
+    over_volume, over_deflection = (
+        f"{panel.title}: pressure over {name}" for name in ("volume", "deflection")
+    )
     charts = [
-        Chart(panel.title, across, up, by_volume, f"{panel.title}: pressure over volume"),
-        Chart("", panel.along, up, by_way, f"{panel.title}: pressure over deflection"),
+        Chart(panel.title, x_label, y_label, by_volume, over_volume),
+        Chart("", panel.along, y_label, by_deflection, over_deflection),
     ]
     return Charts("gas", charts, "")
 
 
 def beam_charts(
-    now: Array, cells: NDArray[np.intp], strain: Array, before: Array,
-    section: tuple[Array, Array], bodies: BeamBodies, title: str = "",
-) -> Charts:  # fmt: skip
+    positions: Array,
+    cells: NDArray[np.intp],
+    strain: Array,
+    outline: Array,
+    section: tuple[Array, Array],
+    bodies: BeamBodies,
+    title: str = "",
+) -> Charts:
     """Return a whole beam true to scale, coloured by its strain along the axis.
-    now : (n, 3) mm, positions; z along the axis, y up. cells : (m, 4). strain : (m,) log strain
-    along the axis when bent. before : (k, 2) mm, the inflated beam from the side as a closed line
-    (z, y). section : (k, 2) mm, the mid-span ring as a closed line (x, y), inflated and bent.
-    bodies : supports and collar when bent."""
+
+    Parameters
+    ----------
+    positions : (n, 3) array
+        Of the nodes of the bent beam, mm; z along the axis, y up.
+    cells : (m, 4) array of int
+        Nodes of the quads.
+    strain : (m,) array
+        Log strain along the axis when bent.
+    outline : (k, 2) array
+        The inflated beam from the side as a closed line (z, y), mm.
+    section : two (k, 2) arrays
+        The mid-span ring as a closed line (x, y), inflated and bent, mm.
+    bodies : BeamBodies
+        Supports and collar when bent.
+    title : str
+        Of the first chart.
+    """
     # Wrinkles take up many times the strain that the fabric carries: all of them one colour.
-    most = max(float(strain.max()), 1e-6)
-    values = np.clip(strain, -most, most)
+    largest = max(float(strain.max()), 1e-6)
+    values = np.clip(strain, -largest, largest)
     # Of the two halves the eye sees one; what is nearer hides what is behind.
-    seen = np.flatnonzero(now[cells, 0].mean(axis=1) >= 0)
-    seen = seen[np.argsort(now[cells[seen], 0].mean(axis=1))]
-    body = faces("", now[cells[seen]][:, :, [2, 1]], values[seen])
+    visible = np.flatnonzero(positions[cells, 0].mean(axis=1) >= 0)
+    visible = visible[np.argsort(positions[cells[visible], 0].mean(axis=1))]
+    side = [
+        faces("", positions[cells[visible]][:, :, [2, 1]], values[visible]),
+        line("inflated", *outline.T, colour=7, dashes=1),
+        *_body_lines(bodies),
+    ]
+    ring, middle = bodies.collar_radius + COLLAR_WALL, bodies.collar_height
+    feet = [y - bodies.support_radius for _, y in bodies.supports]
+    low = min(float(positions[:, 1].min()), middle - ring, *feet)
+    high = max(float(positions[:, 1].max()), float(outline[:, 1].max()), middle + ring)
+    end = float(np.abs(positions[:, 2]).max())
+    scale: dict[str, Any] = {
+        "equal": True,
+        "scale": "log strain along the axis",
+        "shades": shades_of(values),
+    }
+    whole = Chart(
+        title,
+        "z, mm",
+        "y, mm",
+        side,
+        f"{title}: the bent beam from the side",
+        x_range=(-1.03 * end, 1.03 * end),
+        y_range=(low - 20, high + 20),
+        **scale,
+    )
+    position, reach = bodies.collars[-1], CLOSE_VIEW * bodies.collar_length
+    half_height = bodies.collar_radius + 4 * COLLAR_WALL
+    close = Chart(
+        f"at the {bodies.name}",
+        "z, mm",
+        "y, mm",
+        side,
+        f"the bent beam at the {bodies.name}",
+        x_range=(position - reach, position + reach),
+        y_range=(middle - half_height, middle + half_height),
+        **scale,
+    )
+    return Charts("beam", [whole, close, _cut_chart(section, bodies)], "", columns=2)
+
+
+def _body_lines(bodies: BeamBodies) -> list[Series]:
+    """Return supports and collars from the side."""
     series = [
         line("support", *_circle(z, y, bodies.support_radius), colour=3) for z, y in bodies.supports
     ]
-    half, r = 0.5 * bodies.collar_length, bodies.collar_radius
+    half, radius = 0.5 * bodies.collar_length, bodies.collar_radius
     for z in bodies.collars:
-        for y in (bodies.collar_height - r - WALL, bodies.collar_height + r):
+        for y in (bodies.collar_height - radius - COLLAR_WALL, bodies.collar_height + radius):
             x = [z - half, z + half, z + half, z - half, z - half]
-            series.append(line(bodies.name, x, [y, y, y + WALL, y + WALL, y], colour=0))
-    side = [body, line("inflated", *before.T, colour=7, dashes=1), *series]
-    ring, middle = bodies.collar_radius + WALL, bodies.collar_height
-    feet = [y - bodies.support_radius for _, y in bodies.supports]
-    low = min(float(now[:, 1].min()), middle - ring, *feet)
-    high = max(float(now[:, 1].max()), float(before[:, 1].max()), middle + ring)
-    ends, reach = float(np.abs(now[:, 2]).max()), CLOSE * bodies.collar_length
-    at = bodies.collars[-1]
-    tall, axes = bodies.collar_radius + 4 * WALL, ("z, mm", "y, mm")
-    shades = shades_of(values)
-    scale: dict[str, Any] = {"equal": True, "scale": "log strain along the axis", "shades": shades}
-    whole = Chart(title, *axes, side, f"{title}: the bent beam from the side",
-                  x_range=(-1.03 * ends, 1.03 * ends), y_range=(low - 20, high + 20),
-                  **scale)  # fmt: skip
-    close = Chart(f"at the {bodies.name}", *axes, side, f"the bent beam at the {bodies.name}",
-                  x_range=(at - reach, at + reach), y_range=(middle - tall, middle + tall),
-                  **scale)  # fmt: skip
-    return Charts("beam", [whole, close, _cut(section, bodies)], "", columns=2)
+            top = y + COLLAR_WALL
+            series.append(line(bodies.name, x, [y, y, top, top, y], colour=0))
+    return series
 
 
 def _circle(x: float, y: float, radius: float) -> tuple[Array, Array]:
-    turn = np.linspace(0.0, 2.0 * np.pi, 73)
-    return x + radius * np.cos(turn), y + radius * np.sin(turn)
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    return x + radius * np.cos(angle), y + radius * np.sin(angle)
 
 
-def _cut(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
-    before, now = section
-    circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * WALL)
-    series = [
-        *([line("collar", *circle)] if 0.0 in bodies.collars else []),
-        line("inflated", *before.T, colour=7, dashes=1),
-        line("bent", *now.T, colour=3),
+def _cut_chart(section: tuple[Array, Array], bodies: BeamBodies) -> Chart:
+    """Return the section at mid-span with the collar."""
+    inflated, bent = section
+    circle = _circle(0.0, bodies.collar_height, bodies.collar_radius + 0.5 * COLLAR_WALL)
+    series = [line("collar", *circle)] if 0.0 in bodies.collars else []
+    series += [
+        line("inflated", *inflated.T, colour=7, dashes=1),
+        line("bent", *bent.T, colour=3),
     ]
     alt = "the beam cut at mid-span, inflated and bent"
     return Chart("cut at mid-span", "x, mm", "y, mm", series, alt, equal=True)

@@ -30,9 +30,19 @@ from ..measured import PERCENT, USUAL_NOISE, MeasuredKind, PreparedWhole, Strain
 LOADS = {"pressure_kPa": 1e-3, "force_N": 1.0, "torque_Nm": 1e3}
 STRAINS = {"axial_percent": 0.01, "hoop_percent": 0.01, "twist_deg_per_m": np.pi / 180e3}
 PART = "tube"
-#: Of a candidate: radius in mm, hoop strain over the law's range, loads, and values of a strain
-#: that are taken to be independent.
-RADIUS, INFLATED, STEPS, INDEPENDENT = 100.0, 0.3, 15, 5
+
+
+@dataclass(frozen=True)
+class CandidateTube:
+    """A tube that a plan proposes."""
+
+    radius: float = 100.0  # mm, without a tube in the project
+    hoop_share: float = 0.3  # hoop strain of the inflated tube over the law's range
+    steps: int = 15  # of torsion
+    independent_values: int = 5  # values of a strain that are taken to be independent
+
+
+CANDIDATE = CandidateTube()
 
 
 class TubeSection(Section):
@@ -48,9 +58,18 @@ class TubeSection(Section):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TubeTest(SectionTest):
-    """Loads (n, 3) as of `TubeModel`, and strains (n, 3) along, around, radius times twist.
+    """An inflated tube that is pulled and twisted.
 
-    Strains from any zero; NaN in columns that are not measured.
+    Parameters
+    ----------
+    radius : float
+        mm.
+    loads : (n, 3) array
+        As of `TubeModel`.
+    strain : (n, 3) array
+        Along, around, radius times twist, from any zero; NaN in columns that are not measured.
+    path : Path, optional
+        File of loads and strains.
     """
 
     radius: float
@@ -74,56 +93,86 @@ class TubeTest(SectionTest):
         return {PART: TubeModel(self.loads, self.radius, self.thick(thickness))}
 
     def settings(self) -> Mapping[str, object]:
+        """Return everything but names and measurements."""
         return {"weight": self.weight, "noise": self.noise, "radius": self.radius}
 
 
 def read(section: TubeSection, place: Place, name: str) -> TubeTest:
-    """Read the section of a test, and its file."""
+    """Read the section of a test, and its file.
+
+    Raises
+    ------
+    InputError
+        If the file lacks columns, or has unknown ones or other than finite numbers.
+    """
     radius = 0.5 * section.diameter * place.scales.length
     path = place.folder(section.folder) / section.file
     noise = None if section.noise is None else section.noise / PERCENT
     loads, strain = np.empty((0, 3)), np.empty((0, 3))
     if place.has(path, "file"):
-        loads, strain = _columns(path, radius)
+        loads, strain = _read_loads_and_strains(path, radius)
     return TubeTest(
-        name=name, place=place, weight=section.weight, radius=radius, loads=loads, strain=strain,
-        noise=noise, path=path,
-    )  # fmt: skip
+        name=name,
+        place=place,
+        weight=section.weight,
+        radius=radius,
+        loads=loads,
+        strain=strain,
+        noise=noise,
+        path=path,
+    )
 
 
-def _columns(path: Path, radius: float) -> tuple[Array, Array]:
+def _read_loads_and_strains(path: Path, radius: float) -> tuple[Array, Array]:
+    """Return loads (n, 3) and strains (n, 3) of a file."""
+    table = _read_table(path)
+    unmeasured = np.full(len(table), np.nan)
+    loads = [scale * table[name].to_numpy(float) for name, scale in LOADS.items()]
+    strain = [
+        scale * table[name].to_numpy(float) if name in table else unmeasured
+        for name, scale in STRAINS.items()
+    ]
+    strain[2] = radius * strain[2]
+    return np.stack(loads, axis=1), np.stack(strain, axis=1)
+
+
+def _read_table(path: Path) -> pd.DataFrame:
+    """Return the table of a file; InputError for missing or unknown columns, and no numbers."""
     try:
         table = pd.read_csv(path, comment="#", skipinitialspace=True)
     except (OSError, ValueError) as error:
         raise InputError(path, "", f"is not a CSV table: {str(error).splitlines()[0]}") from None
-    known = {*LOADS, *STRAINS}
-    if lacking := [name for name in LOADS if name not in table]:
-        raise InputError(path, lacking[0], f"is missing; columns are: {', '.join(LOADS)}")
+    names = {*LOADS, *STRAINS}
+    if missing := [name for name in LOADS if name not in table]:
+        raise InputError(path, missing[0], f"is missing; columns are: {', '.join(LOADS)}")
     if not set(STRAINS) & set(table.columns):
         raise InputError(path, "columns", f"expected one at least of {', '.join(STRAINS)}")
-    if strange := [str(name) for name in table if name not in known]:
-        raise InputError(path, strange[0], f"is no column here; known: {', '.join(sorted(known))}")
+    if unknown := [str(name) for name in table if name not in names]:
+        raise InputError(path, unknown[0], f"is no column here; known: {', '.join(sorted(names))}")
     for name in table:
         numbers = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
         if len(numbers) < 2 or not np.isfinite(numbers).all():
             raise InputError(path, str(name), "expected two or more rows of finite numbers")
-    none = np.full(len(table), np.nan)
-    loads = [scale * table[name].to_numpy(float) for name, scale in LOADS.items()]
-    strain = [s * table[n].to_numpy(float) if n in table else none for n, s in STRAINS.items()]
-    strain[2] = radius * strain[2]
-    return np.stack(loads, axis=1), np.stack(strain, axis=1)
+    return table
 
 
 class TubeObjective(StrainObjective):
     """Residuals of each measured strain over its largest.
 
     The zero of a strain is not known: strains are compared about their means.
+
+    Parameters
+    ----------
+    test : TubeTest
+        With at least one measured strain.
+    weight : float
+        Of the test in the objective.
     """
 
     def __init__(self, test: TubeTest, weight: float) -> None:
         self.model = next(iter(test.models().values()))
-        self.read = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
-        super().__init__(self.model.loads, test.strain[:, self.read], None, weight, test.noise)
+        self.columns = np.flatnonzero(~np.isnan(test.strain).any(axis=0))
+        super().__init__(self.model.loads, test.strain[:, self.columns], None, weight, test.noise)
 
     @property
     def places(self) -> tuple[Array, ...]:
@@ -137,14 +186,16 @@ class TubeObjective(StrainObjective):
 
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, blocks) about their means."""
-        return _centred(self.model.strains(history.displacement)[:, self.read])
+        return _centred(self.model.strains(history.displacement)[:, self.columns])
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        own = self.model.strain_slopes(history.displacement, slope)[:, self.read]
-        return self.in_blocks(_centred(own))
+        """Return the derivatives of the residuals by the parameters."""
+        slopes = self.model.strain_slopes(history.displacement, slope)[:, self.columns]
+        return self.in_blocks(_centred(slopes))
 
 
 def _centred(values: Array) -> Array:
+    """Return values (n, ...) about their means."""
     return np.asarray(values - values.mean(axis=0))
 
 
@@ -156,6 +207,7 @@ class PreparedTube(PreparedWhole):
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | float | None = None
     ) -> tuple[Comparison, ...]:
+        """Return the one comparison, each measured strain of equal weight."""
         test = self.test
         count = int((~np.isnan(test.strain).any(axis=0)).sum())
         weight = weighting.weight / count if weighting.relative else 1.0
@@ -165,33 +217,44 @@ class PreparedTube(PreparedWhole):
     finer = comparisons  # there is no mesh
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        own = self.test.path
-        count = len(self.test.loads)
-        return [] if own is None else [kinds.DataFile(own, FrameSource("csv"), count, {})]
+        """Return the file of loads and strains."""
+        path = self.test.path
+        if path is None:
+            return []
+        return [kinds.DataFile(path, FrameSource("csv"), len(self.test.loads), {})]
 
 
 def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     """Return torsion of an inflated tube, up to the shear that the law is known for."""
-    own = [test for test in planning.present if isinstance(test, PreparedTube)]
+    tubes = [test for test in planning.present if isinstance(test, PreparedTube)]
     noise_is = "assumed" if planning.noise is None else "given"
-    return [kinds.Candidate("torsion of a tube", partial(_twisted, own, planning), noise_is)]
+    return [kinds.Candidate("torsion of a tube", partial(_twisted, tubes, planning), noise_is)]
 
 
-def _twisted(own: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
+def _twisted(tubes: Sequence[PreparedTube], planning: Planning) -> PreparedTube:
     """Return a tube that is inflated, then twisted, with the strains that the law gives."""
-    radius = own[0].test.radius if own else RADIUS
-    law, thick, ends = planning.law, planning.place.fabric.thickness, planning.ends
-    pressure = _integral(law, "E2", INFLATED * ends[1]) * thick / radius
-    torque = 2 * np.pi * radius**2 * thick * _integral(law, "G12", ends[2])
-    turns = np.linspace(0.0, torque, STEPS)
-    loads = np.column_stack([np.full(STEPS, pressure), np.zeros(STEPS), turns])
-    model = TubeModel(loads, radius, thick)
+    radius = tubes[0].test.radius if tubes else CANDIDATE.radius
+    law, thickness, ends = planning.law, planning.place.fabric.thickness, planning.ends
+    pressure = _integral(law, "E2", CANDIDATE.hoop_share * ends[1]) * thickness / radius
+    largest_torque = 2 * np.pi * radius**2 * thickness * _integral(law, "G12", ends[2])
+    steps = CANDIDATE.steps
+    torque = np.linspace(0.0, largest_torque, steps)
+    loads = np.column_stack([np.full(steps, pressure), np.zeros(steps), torque])
+    model = TubeModel(loads, radius, thickness)
     strain = model.strains(planning.make_solver("membrane").run(model, law).displacement)
-    noise = planning.noise or kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(STEPS)
+    noise = planning.noise
+    if not noise:
+        usual = kinds.Precision(PERCENT * USUAL_NOISE, 1.0, CANDIDATE.independent_values)
+        noise = usual.at(steps)
     test = TubeTest(
-        name="torsion of a tube", place=planning.place, weight=1.0, radius=radius, loads=loads,
-        strain=strain, noise=noise / PERCENT,
-    )  # fmt: skip
+        name="torsion of a tube",
+        place=planning.place,
+        weight=1.0,
+        radius=radius,
+        loads=loads,
+        strain=strain,
+        noise=noise / PERCENT,
+    )
     return PreparedTube(test)
 
 

@@ -19,13 +19,15 @@ FIGURE, CAPTION = "strains.png", "Strains about their means"
 
 def residuals(prepared: PreparedTube, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched strain in %."""
-    own = TubeObjective(prepared.test, 1.0)
-    measured, modelled = PERCENT * own.measured, PERCENT * own.modelled(fitted.histories[0])
-    where = {"part": PART, "row": np.arange(1, 1 + len(measured))}
-    return pd.concat([
-        compared(NAMES[column], measured[:, k], modelled[:, k], "%", **where)
-        for k, column in enumerate(own.read)
-    ], ignore_index=True)  # fmt: skip
+    objective = TubeObjective(prepared.test, 1.0)
+    measured = PERCENT * objective.measured
+    modelled = PERCENT * objective.modelled(fitted.histories[0])
+    labels = {"part": PART, "row": np.arange(1, 1 + len(measured))}
+    tables = [
+        compared(NAMES[column], measured[:, k], modelled[:, k], "%", **labels)
+        for k, column in enumerate(objective.columns)
+    ]
+    return pd.concat(tables, ignore_index=True)
 
 
 def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
@@ -37,11 +39,11 @@ def findings(prepared: PreparedTube, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedTube, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write strains.csv and the figure."""
-    charts = _drawn(prepared.test, {"model": fitted.histories[0]})
+    charts = _strain_charts(prepared.test, {"model": fitted.histories[0]})
     rows: list[list[object]] = [[*row] for row in found.numbers["rms_percent"].items()]
     strains = residuals(prepared, fitted)
-    table = out.write("strains.csv", strains, "strains, measured and modelled")
-    files = [table, saved(out, FIGURE, charts, CAPTION)]
+    strains_file = out.write("strains.csv", strains, "strains, measured and modelled")
+    files = [strains_file, saved(out, FIGURE, charts, CAPTION)]
     tables = [Table("Misfit of the tube", ["strain", "RMS error, %"], rows)]
     return Exhibit(tables=tables, files=files, parts=[charts])
 
@@ -50,30 +52,39 @@ def simulate(
     test: TubeTest, cards: Cards, runs: Runs, out: Output, within_range: bool = False
 ) -> Simulation:
     """Draw the strains with every card; return the RMS errors."""
-    numbers, lines, good = errors_of_cards(
-        runs, lambda history: {"rms_percent": _errors(test, history)},
-        lambda found: f"RMS of strain in %: {_words(found['rms_percent'])}",
-    )  # fmt: skip
-    figures = [saved(out, FIGURE, _drawn(test, good), CAPTION)] if good else []
+    numbers, lines, histories = errors_of_cards(
+        runs,
+        lambda history: {"rms_percent": _errors(test, history)},
+        lambda errors: f"RMS of strain in %: {_words(errors['rms_percent'])}",
+    )
+    figures = []
+    if histories:
+        figures.append(saved(out, FIGURE, _strain_charts(test, histories), CAPTION))
     return Simulation({"cards": numbers}, lines, figures)
 
 
 def _errors(test: TubeTest, history: History) -> dict[str, float]:
-    own = TubeObjective(test, 1.0)
-    return dict(zip([NAMES[k] for k in own.read], own.rms(history).tolist(), strict=True))
+    """Return the RMS error of each measured strain, %."""
+    objective = TubeObjective(test, 1.0)
+    names = [NAMES[k] for k in objective.columns]
+    return dict(zip(names, objective.rms(history).tolist(), strict=True))
 
 
 def _words(errors: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {error:.3g}" for name, error in errors.items())
 
 
-def _drawn(test: TubeTest, curves: Mapping[str, History]) -> Charts:
+def _strain_charts(test: TubeTest, curves: Mapping[str, History]) -> Charts:
     """Return measured and modelled strains row by row, a chart a strain."""
-    charts, rows, own = [], np.arange(1, 1 + len(test.loads)), TubeObjective(test, 1.0)
-    for k, column in enumerate(own.read):
-        series = [dots("measured", rows, PERCENT * own.measured[:, k], colour=7)]
+    charts = []
+    rows = np.arange(1, 1 + len(test.loads))
+    objective = TubeObjective(test, 1.0)
+    for k, column in enumerate(objective.columns):
+        series = [dots("measured", rows, PERCENT * objective.measured[:, k], colour=7)]
         for rank, (name, history) in enumerate(curves.items()):
-            series.append(line(name, rows, PERCENT * own.modelled(history)[:, k], colour=1 + rank))
-        what = f"strain {NAMES[column]}, %"
-        charts.append(Chart(NAMES[column], "row of the file", what, series, f"{test.name}: {what}"))
+            strain = PERCENT * objective.modelled(history)[:, k]
+            series.append(line(name, rows, strain, colour=1 + rank))
+        label = f"strain {NAMES[column]}, %"
+        alt = f"{test.name}: {label}"
+        charts.append(Chart(NAMES[column], "row of the file", label, series, alt))
     return Charts(f"{test.name} strains", charts, CAPTION, columns=1)
