@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bubblefit.cli.terminal import TABLE, WIDTH, wrapped
 
-from .audit import audit, is_known
+from .audit import audit, audit_printed, is_known
 from .places import ROOT
 
 FOLDER = Path(__file__).parent / "golden"
@@ -135,6 +135,8 @@ class Golden:
             about = dict(json.loads(page.read_text())["about"])
             assert re.fullmatch(r"\d{4}-\d\d-\d\d", about["date"]) and about["fabric"], page
         self.audit(folder, printed or text)
+        ledger = audit_printed(name, printed or text, folder)
+        assert ledger is None or not ledger.findings, "\n".join(map(str, ledger.findings))
 
     def audit(self, folder, text=""):
         """Assert that a second implementation agrees with the pages below a folder."""

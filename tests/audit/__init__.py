@@ -11,6 +11,8 @@ Parts
 `ledger.py`   `Ledger`: every number that is reported; auditors claim them, with how each was
               checked. What nobody claims is an error.
 `laws.py`     `Law`: moduli of a material card.
+`tools.py`    tables and terminals of commands that leave no folder: `audit_table`,
+              `audit_printed`.
 Other modules hold auditors. A module that defines `COMMANDS`, a mapping of the `command` of
 result.json (or of the name of a CSV where there is no result.json) to a function
 `auditor(folder, ledger)`, is found by itself (`run.py`).
@@ -38,6 +40,6 @@ is itself audited), or "echoed" (of the project, the card or the command). Toler
 for numbers at full length; printed numbers must be rounded to their digits, and right.
 """
 
-from .run import audit, is_known
+from .run import audit, audit_printed, audit_table, is_known
 
-__all__ = ["audit", "is_known"]
+__all__ = ["audit", "audit_printed", "audit_table", "is_known"]

@@ -20,6 +20,7 @@ class Folder:
     project : path of the project file; None: as provenance.json says, or the parent's project.toml.
     terminal : what the command printed.
     base : folder in which the command was typed, to which relative paths refer.
+    files : names of the tables to read, None for all.
 
     Attributes
     ----------
@@ -27,15 +28,14 @@ class Folder:
     tables : every CSV as text, by its name below the folder.
     """
 
-    def __init__(self, path, project=None, terminal="", base=None):
+    def __init__(self, path, project=None, terminal="", base=None, files=None):
         self.path = Path(path)
         self.terminal = terminal
         self.base = Path(base) if base is not None else self.path.parent
+        names = sorted(self.path.glob("*.csv")) if files is None else [path / f for f in files]
         self.tables = {
-            file.relative_to(self.path).as_posix(): pd.read_csv(
-                file, dtype=str, keep_default_na=False
-            )
-            for file in sorted(self.path.glob("*.csv"))
+            file.name: pd.read_csv(file, dtype=str, keep_default_na=False, comment="#")
+            for file in names
             if file.stat().st_size > 1
         }
         self._project = project
@@ -47,6 +47,15 @@ class Folder:
     @cached_property
     def result(self):
         return self._json("result.json")
+
+    @cached_property
+    def check(self):
+        """What `check` writes in place of result.json."""
+        return self._json("check.json")
+
+    @cached_property
+    def command(self):
+        return (self.result or self.check or {}).get("command")
 
     @cached_property
     def provenance(self):
@@ -97,7 +106,8 @@ class Folder:
         named = (self.result or {}).get("project")
         if isinstance(named, str) and (self.base / named).exists():
             return self.base / named
-        near = (self.base / "project.toml", self.path.parent / "project.toml")
+        above = (self.base, *list(self.path.resolve().parents)[:3])
+        near = (place / "project.toml" for place in above)
         return next((path for path in near if path.exists()), None)
 
     @cached_property

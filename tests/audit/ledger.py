@@ -23,6 +23,7 @@ WIDTH = 80
 EXEMPT = (
     ("result.json", r"versions\..*|(.*\.)?wall_s|(.*\.)?seconds|(.*\.)?seed(\.\d+)?|.*\.date"),
     ("starts.jsonl", r"(.*\.)?(wall_s|seconds|seed(\.\d+)?)"),
+    ("check.json", r"(.*\.)?(version|cpu_s)"),
     ("history.csv", r"status .*"),
     ("page", r".*The record.*|.*How to cite.*|.*Files of the folder.*"),
     ("page", r".* fact (date|fabric|laboratory|wall time, s)"),
@@ -119,6 +120,8 @@ class Ledger:
         folder = self.folder
         if folder.result is not None:
             self._add_json("result.json", folder.result, ())
+        if folder.check is not None:
+            self._add_json("check.json", folder.check, ())
         for k, start in enumerate(folder.starts):
             self._add_json("starts.jsonl", start, (k,))
         if folder.card_text is not None:

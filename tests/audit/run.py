@@ -7,6 +7,7 @@ import sys
 import traceback
 from pathlib import Path
 
+from . import tools
 from .folders import Folder
 from .ledger import Ledger
 
@@ -28,7 +29,7 @@ def auditors():
 def is_known(path):
     """Return whether an auditor knows what wrote a folder."""
     folder = Folder(path)
-    return bool({(folder.result or {}).get("command"), *folder.tables} & set(auditors()))
+    return bool({folder.command, *folder.tables} & set(auditors()))
 
 
 def audit(path, project=None, terminal="", base=None):
@@ -38,7 +39,7 @@ def audit(path, project=None, terminal="", base=None):
     """
     folder = Folder(path, project, terminal, base)
     ledger = Ledger(folder)
-    names = [(folder.result or {}).get("command"), *folder.tables]
+    names = [folder.command, *folder.tables]
     known = auditors()
     chosen = [known[name] for name in names if name in known]
     if not chosen:
@@ -57,6 +58,30 @@ def audit(path, project=None, terminal="", base=None):
             # A folder whose parts do not fit each other: what is missing there is the finding.
             where = traceback.extract_tb(error.__traceback__)[-1]
             ledger.find(str(path), f"the auditor fails at {where.name}: {error!r}")
+    for line in ledger.unclaimed():
+        ledger.find(line, "nobody audits this number")
+    return ledger
+
+
+def audit_table(tool, path, terminal="", base=None):
+    """Return the ledger of the table that a tool (gauge, sphere) wrote, and of what it printed."""
+    path = Path(path)
+    folder = Folder(path.parent, terminal=terminal, base=base, files=[path.name])
+    return _closed(folder, tools.TABLES[tool])
+
+
+def audit_printed(command, terminal, base):
+    """Return the ledger of what a command printed that writes nothing; None of other commands."""
+    if command not in tools.PRINTED:
+        return None
+    return _closed(Folder(base, terminal=terminal, base=base, files=[]), tools.PRINTED[command])
+
+
+def _closed(folder, auditor):
+    folder.result = folder.check = folder.page = folder.card_text = None
+    folder.starts = []
+    ledger = Ledger(folder)
+    auditor(folder, ledger)
     for line in ledger.unclaimed():
         ledger.find(line, "nobody audits this number")
     return ledger

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from bubblefit.project.project import read_project
 
+from ..audit import audit_table
 from ..commands import in_process, one_line
 from ..readers.test_surfaces import cap
 
@@ -91,6 +92,8 @@ def test_from_pictures_to_a_project(tmp_path, golden):
     command = ("gauge", "frames/f*.csv", *GAUGE, *pairing, "--specimen", "W 1", "--out", "w1.csv")
     done = in_process(*command, cwd=tmp_path)
     golden("gauge", done.stdout + done.stderr, tmp_path)
+    found = audit_table("gauge", tmp_path / "w1.csv", done.stdout + done.stderr, tmp_path).findings
+    assert not found, "\n".join(map(str, found))
     left_out = "1 of 12 frames have a length and no load; they are left out: f11.csv"
     assert f"# note: {left_out}\n" in (tmp_path / "w1.csv").read_text()
     # All defaults but the gauge length: header, units, specimen and direction are found.
@@ -213,6 +216,9 @@ def test_errors_of_the_radius_are_those_of_the_thesis(folder):
     table = pd.read_csv(out)
     assert table["radius_mm"].tolist() == [row["radius_mm"] for row in said["frames"]]
     assert out.with_suffix(".png").stat().st_size > 20_000
+    printed = in_process(*run, cwd=folder).stdout
+    found = audit_table("sphere", out, printed, folder).findings
+    assert not found, "\n".join(map(str, found))
     # Nothing is written over.
     one_line(in_process(*run, "--out", out, cwd=folder, code=2), str(out), "--overwrite")
 

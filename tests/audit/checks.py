@@ -1,0 +1,305 @@
+"""Auditor of `bubblefit check`: data as read, equilibrium of the apex, the estimate."""
+
+import re
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from . import measured
+from .bubbles import PRESSURE
+from .ledger import NUM
+
+FRAMES_HEADER = ["pressure, kPa", "file", "points", "dropped", "rise about the centre, mm"]
+
+
+def audit_check(folder, ledger):
+    """Audit check.json and the page of a check."""
+    check = folder.check
+    for test, doubts in check["tests"].items():
+        for k, _ in enumerate(doubts):
+            ledger.claim_json(("tests", test, k), "consistent", file="check.json")
+    ledger.claim_json("choices", "consistent", file="check.json")
+    ledger.claim_json("joined", "consistent", file="check.json")
+    _doubts(ledger, check)
+    if check.get("estimate"):
+        _estimate(folder, ledger, check["estimate"])
+    sections = {
+        kind: own for kind in ("bubble", "strips") for own in folder.project.get(kind, [])[:1]
+    }
+    if "bubble" in sections and len(folder.project["bubble"]) == 1:
+        Bubble(folder, ledger, sections["bubble"]).audit()
+    _strips(folder, ledger)
+
+
+def _doubts(ledger, check):
+    """Every doubt stands on the page, with its name and its test."""
+    page = ledger.folder.page
+    rows = [row for table in page.tables if table.title == "Doubts" for row in table.rows]
+    words = " ".join(" ".join(row) for row in rows)
+    for doubts in check["tests"].values():
+        for doubt in doubts:
+            text = doubt.get("text", doubt.get("note", "")) if isinstance(doubt, dict) else doubt
+            if text and " ".join(text.split()) not in words:
+                ledger.find("page: Doubts", f"is without {text[:60]!r}")
+    # What was seen stands alike in check.json, on the page and on the terminal.
+    for row in rows:
+        for text in ledger.texts:
+            at = text.text.find(row[-1])
+            if len(row[-1]) > 10 and at >= 0:
+                text.claim((at, at + len(row[-1])), "consistent")
+    bad = [d for own in check["tests"].values() for d in own if _is_error(d)]
+    if check["sound"] != (not bad):
+        ledger.find("check.json: sound", f"is {check['sound']} with {len(bad)} errors")
+
+
+def _is_error(doubt):
+    return doubt["severity"] == "error" and not doubt["trusted"]
+
+
+def _estimate(folder, ledger, estimate):
+    """Moduli of the estimate: within their bands, and alike on the page."""
+    rows = []
+    for name, own in estimate["moduli"].items():
+        strains = [row["strain"] for row in own]
+        if strains != sorted(strains):
+            ledger.find(f"check.json: estimate.{name}", "strains do not rise")
+        for row in own:
+            low, high = row["band"]
+            place = f"check.json: estimate.{name} at {row['strain']:.3g}"
+            if not low <= row["MPa"] <= high:
+                ledger.find(place, f"{row['MPa']:.4g} lies outside {low:.4g} to {high:.4g}")
+            # Of a narrow band both sides are two standard deviations.
+            half, sigma = (high - low) / 2 / row["MPa"], row.get("sigma")
+            if sigma is not None and half < 0.05 and not 0.6 < half / (1.96 * sigma) < 1.6:
+                ledger.find(place, f"sigma {sigma:.3g} beside a half band of {half:.3g}")
+            rows.append([name, 100 * row["strain"], row["MPa"], low, high])
+    ledger.claim_json(("estimate", "moduli"), "consistent", file="check.json")
+    header = ["modulus", "strain, %", "MPa", "95 % from", "to"]
+    ledger.table("Estimated moduli", header, rows)
+    rows = []
+    for test, chi in estimate["chi"].items():
+        ledger.json(("estimate", "chi", test), chi, "consistent", file="check.json")
+
+        def beside(match, chi=chi):
+            return [match[1], f"{chi:.3g}"]
+
+        ledger.text(rf"off equilibrium, chi {NUM}", [f"{chi:.3g}"], needed=False)
+        ledger.text(rf"up to {NUM} mm off equilibrium", lambda m: [m[1]], needed=False)
+        rows.append([test, chi, None])
+        del beside
+    ledger.table("Distance from equilibrium", ["test", "chi", ""], rows)
+
+
+class Bubble:
+    """The tables of one bubble, from its files."""
+
+    def __init__(self, folder, ledger, section):
+        self.folder, self.ledger, self.section = folder, ledger, section
+        scale = {"mm": 1.0, "m": 1000.0}[folder.project.get("units", {}).get("length", "mm")]
+        self.radius = scale * section["radius"]
+        self.frames = self._frames()
+
+    def _frames(self):
+        """Return name, kPa, places, displacements, heights of each file; None if not plain."""
+        points = self.section.get("data", {}).get("points", {})
+        files, columns = points.get("files"), points.get("columns", {})
+        if not files or points.get("length_unit", "mm") != "mm" or "registration" in points:
+            return None
+        unit = self.folder.project.get("units", {}).get("pressure", "kPa")
+        frames = []
+        for name, pressure in zip(files, self.section["pressures"], strict=False):
+            table = measured.table_of(self.folder.project_path.parent / name)
+            names = [columns.get(key, key) for key in ("x", "y", "dx", "dy", "dz")]
+            if table is None or not set(names) <= set(table.columns):
+                return None
+            values = table[names].to_numpy(float)
+            z = columns.get("z", "z")
+            heights = table[z].to_numpy(float) if z in table else np.zeros(len(table))
+            frames.append((name, pressure * PRESSURE[unit], values[:, :2], values[:, 2:], heights))
+        return frames
+
+    def audit(self):
+        if self.frames is None:
+            self._as_printed()
+            return
+        rows = []
+        for name, pressure, places, moved, _ in self.frames:
+            near = np.hypot(*places.T) < 0.25 * self.radius
+            rise = float(np.median(moved[near if near.any() else slice(None), 2]))
+            rows.append([pressure, name, len(places), "none", rise])
+        self.ledger.table("Frames", FRAMES_HEADER, rows, "recomputed", slack=1e-6)
+        self._apexes()
+        self._centre()
+
+    def _as_printed(self):
+        """Of other files: rows by rising pressure, and what a row says of itself."""
+        ledger = self.ledger
+        for table in ledger.folder.page.tables:
+            if table.title == "Frames":
+                rises = [float(value) for value in table.column("rise about the centre, mm")]
+                if rises != sorted(rises):
+                    ledger.find("page: Frames", "the rise does not grow with the pressure")
+                ledger.table("Frames", FRAMES_HEADER, table.rows)
+            elif table.title.startswith(("Registration", "Equilibrium", "Frames taken")):
+                ledger.table(table.title, None, table.rows)
+        for label in ("the sheet rises about, mm", "axes of symmetry, degrees from x and y"):
+            if any(own == label for *_, own, _ in ledger.folder.page.facts):
+                ledger.fact(label, ledger.folder.page.fact(label))
+
+    def _apexes(self):
+        """Force, curvature and strain at the apex, from a polynomial about the centre."""
+        title = "Equilibrium of the apex, without a model"
+        header = ["pressure, kPa", "apex, mm", "k1 + k2, 1/m", "force, kN/m", "+-", "stress, MPa",
+                  "strain along warp, %", "along fill, %"]  # fmt: skip
+        tables = [t for t in self.folder.page.tables if t.title == title]
+        if not tables:
+            return
+        thickness = self.folder.project["fabric"]["thickness"]
+        rows = []
+        for row, (_, pressure, places, moved, heights) in zip(
+            tables[0].rows, self.frames, strict=True
+        ):
+            told = [float(cell) for cell in row]
+            height, curvature, strain = _apex(places, moved, heights, self.radius)
+            force = pressure / 1000 / told[2] * 1000  # N/mm, of kPa and 1/m
+            for name, own, right, limit in (
+                ("apex", told[1], height, 0.01), ("k1 + k2", told[2], 1000 * curvature, 0.05),
+                ("strain along warp", told[6], 100 * strain[0], 0.06),
+                ("along fill", told[7], 100 * strain[1], 0.06),
+            ):  # fmt: skip
+                if abs(own - right) > limit * abs(right) + 0.02:
+                    self.ledger.find(
+                        f"page: {title}, {row[0]} kPa", f"{name} is {own}; {right:.4g}"
+                    )
+            if not 0 <= told[4] < told[3]:
+                self.ledger.find(f"page: {title}, {row[0]} kPa", f"+- {told[4]}")
+            rows.append([pressure, row[1], row[2], force, row[4], told[3] / thickness, *row[6:]])
+        self.ledger.table(title, header, rows, "recomputed", slack=1e-3)
+
+    def _centre(self):
+        """The centre about which the sheet rises, with its standard error, and its axes."""
+        label = "the sheet rises about, mm"
+        text = self.folder.page.fact(label)
+        match = re.fullmatch(rf"{NUM}, {NUM} \(\+- {NUM}\)", text)
+        if match:
+            centre, error = _centre_of(self.frames, self.radius)
+            told = [float(own) for own in match.groups()]
+            off = np.hypot(told[0] - centre[0], told[1] - centre[1])
+            if off > 3 * max(error, told[2]) + 0.02 or not 0.3 < (told[2] + 1e-9) / error < 3.0:
+                self.ledger.find(f"page: {label}", f"is {text}; {centre} +- {error:.2g}")
+        if text:
+            self.ledger.fact(label, text, "recomputed")
+        label = "axes of symmetry, degrees from x and y"
+        text = self.folder.page.fact(label)
+        if text:
+            match = re.match(rf"{NUM} \(\+- {NUM}, (\d+)\s?% clear\)", text)
+            angle = _axes_of(self.frames[-1])
+            if match and int(match[3]) > 50:
+                off = (float(match[1]) - angle + 45) % 90 - 45
+                if abs(off) > 3 * float(match[2]) + 3:
+                    self.ledger.find(f"page: {label}", f"is {text}; {angle:.1f}")
+            self.ledger.fact(label, text)
+
+
+def _powers(u, v, degree, parity=None):
+    return np.stack([
+        u**i * v**j for i in range(degree + 1) for j in range(degree + 1 - i)
+        if parity is None or (i + j) % 2 == parity
+    ], axis=1)  # fmt: skip
+
+
+def _apex(places, moved, heights, radius):
+    """Return rise (mm), k1 + k2 (1/mm) and logarithmic strains along x and y at the centre."""
+    near = np.hypot(*places.T) < 0.5 * radius
+    u = places[near] / radius
+    terms = _powers(*u.T, 4)
+    index = {(i, j): k for k, (i, j) in enumerate(
+        (i, j) for i in range(5) for j in range(5 - i))}  # fmt: skip
+    after = np.column_stack([places + moved[:, :2], heights + moved[:, 2]])[near]
+    before = np.column_stack([places, heights])[near]
+    a, b = (np.linalg.lstsq(terms, own, rcond=None)[0] for own in (after, before))
+    ax, ay = a[index[1, 0]] / radius, a[index[0, 1]] / radius
+    bx, by = b[index[1, 0]] / radius, b[index[0, 1]] / radius
+    normal = np.cross(ax, ay)
+    normal /= np.linalg.norm(normal)
+    xx, xy, yy = (f * a[index[k]] @ normal / radius**2 for f, k in (
+        (2, (2, 0)), (1, (1, 1)), (2, (0, 2))))  # fmt: skip
+    metric = np.array([[ax @ ax, ax @ ay], [ax @ ay, ay @ ay]])
+    curvature = -float(np.trace(np.linalg.solve(metric, np.array([[xx, xy], [xy, yy]]))))
+    strain = [float(np.log(np.linalg.norm(p) / np.linalg.norm(q))) for p, q in ((ax, bx), (ay, by))]
+    return float(a[index[0, 0]][2] - b[index[0, 0]][2]), curvature, strain
+
+
+def _centre_of(frames, radius):
+    """Return the centre of the rim of known radius through which the sheet does not rise.
+
+    The rise is a polynomial times what vanishes on the rim, and a shift; the standard error is that
+    of both coordinates together.
+    """
+    rises = [np.median(moved[:, 2]) for _, _, _, moved, _ in frames]
+    high = [f for f, r in zip(frames, rises, strict=True) if r > 0.5 * max(rises)][-4:]
+
+    def left(centre):
+        parts = []
+        for _, _, places, moved, _ in high:
+            inside = np.hypot(*places.T) < 1.02 * radius
+            u, v = ((places[inside] - centre) / radius).T
+            rim = (1 - u**2 - v**2)[:, None]
+            terms = rim * np.hstack([_powers(u, v, 4, 0), _powers(u, v, 3, 1)])
+            terms = np.hstack([terms, np.ones((len(u), 1))])
+            orthogonal = np.linalg.qr(terms)[0]
+            rise = moved[inside, 2]
+            parts.append(rise - orthogonal @ (orthogonal.T @ rise))
+        return np.concatenate(parts)
+
+    best = least_squares(left, np.zeros(2), x_scale=radius)
+    variance = 2 * best.cost / max(len(best.fun) - 2, 1)
+    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
+    return best.x, float(np.sqrt(np.trace(covariance)))
+
+
+def _axes_of(frame):
+    """Return the angle of the rise's axes, by its part of two periods around the centre."""
+    _, _, places, moved, _ = frame
+    angle, r = np.arctan2(places[:, 1], places[:, 0]), np.hypot(*places.T)
+    ring = (r > 0.3 * r.max()) & (r < 0.9 * r.max())
+    terms = np.stack([np.cos(2 * angle), np.sin(2 * angle), np.ones_like(r), r**2, r**4], axis=1)
+    a, b = np.linalg.lstsq(terms[ring], moved[ring, 2], rcond=None)[0][:2]
+    return float(np.degrees(0.5 * np.arctan2(b, a)))
+
+
+def _strips(folder, ledger):
+    """Load curves as read, and the table after EN ISO 1421."""
+    sections = folder.project.get("strips", [])
+    if len(sections) != 1 or folder.page is None:
+        return
+    titles = [table.title for table in folder.page.tables]
+    section = sections[0]
+    if "Load curves as read" not in titles:
+        return
+    data = section.get("data", {})
+    files = data.get("files", [])
+    files = [f for own in files.values() for f in own] if isinstance(files, dict) else files
+    where = folder.project_path.parent
+    record = {"data": [{"test": "strips", "name": f, "file": str(where / f)} for f in files]}
+    folder.provenance = folder.provenance or record
+    curves = measured.load_curves(folder, "strips", section)
+    rows, gauges = [], {}
+    table = folder.page.table("Load curves as read")
+    if curves is None:
+        ledger.table("Load curves as read", None, table.rows)
+        return
+    for direction, own in curves.items():
+        gauge = section.get(direction, {}).get("gauge_length")
+        for name, along, load in own:
+            end = 100 * float(np.log1p(along[-1] / gauge)) if gauge else None
+            rows.append([direction, str(name if name is not None else direction), len(load),
+                         float(along[0]), float(along[-1]), end, float(load[0]),
+                         float(load.max())])  # fmt: skip
+        gauges[direction] = gauge
+    header = ["direction", "specimen", "points", "first elongation, mm", "last, mm",
+              "last log strain, %", "first load, N", "largest load, N"]  # fmt: skip
+    ledger.table("Load curves as read", header, rows, "recomputed")
+
+
+COMMANDS = {"check": audit_check}
