@@ -11,23 +11,35 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from .frames import Array, FrameSource
 from .machine_tables import AS_FOUND, Channel, TableOptions, read_machine_table
-from .tables import LENGTH_UNITS, LOAD_UNITS
+from .units import LENGTH_UNITS, LOAD_UNITS
 
+#: Which deflection counts as zero: as read, the first reading, or the origin of the straight line
+#: through the first readings.
 Zero = Literal["none", "first", "line"]
-#: N per kg of the weights on the strap, and N in one of each unit of load.
+#: N per kg of the weights on the strap.
 GRAVITY = 9.80665
+#: N in one of each unit of load.
 FORCE_UNITS: Mapping[str, float] = {**LOAD_UNITS, "kg": GRAVITY}
 NEEDED = ("deflection", "load")
-#: Readings that the straight line of zero = "line" goes through, and the share of the largest load
-#: among them that it must rise by, to be more than rounding.
-FIRST_READINGS, RISES = 4, 1e-6
 #: Why readings are left out.
 UNLOADING = "after the largest deflection"
 
 
 @dataclass(frozen=True, eq=False)
 class BendingCurve:
-    """One repetition as far as it was loaded: (n,) mm and N, by rising deflection."""
+    """One repetition as far as it was loaded.
+
+    Attributes
+    ----------
+    repetition : str
+    deflection : (n,) array, mm
+        Rising.
+    load : (n,) array, N
+    path : Path or None
+    dropped : mapping
+        Number of readings that are left out, by reason.
+    source : FrameSource or None
+    """
 
     repetition: str
     deflection: Array
@@ -51,57 +63,104 @@ def read_bending_curves(
 ) -> tuple[BendingCurve, ...]:
     """Read the repetitions in one file, each up to its largest deflection.
 
-    repetition : name of the column that tells them apart. preload : N beside the readings. zero :
-    of the deflection: "none", as read; "first", the first reading is zero; "line", the straight
-    line through the first four readings goes through the origin.
+    Parameters
+    ----------
+    path : path
+    deflection, load : Channel
+        Columns, units and scales.
+    repetition : str, optional
+        Column that tells repetitions apart.
+    preload : float, N
+        Load beside the readings.
+    zero : {"none", "first", "line"}
+        Deflection that counts as zero: as read, the first reading, or where the straight line
+        through the first four readings has no load.
+    comment, decimal, format
+        As in `TableOptions` and `read_machine_table`.
+
+    Raises
+    ------
+    InputError
+        The table has no such columns or no unit, or a repetition has one reading.
     """
     path = Path(path)
-    named = {k: c.column for k, c in (("deflection", deflection), ("load", load)) if c.column}
+    channels = {"deflection": deflection, "load": load}
+    named = {quantity: c.column for quantity, c in channels.items() if c.column}
     if repetition is not None:
         named["repetition"] = repetition
-    found = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
-    columns = {name: found.column(name) for name in (*NEEDED, "repetition")}
-    way = found.values(columns["deflection"], LENGTH_UNITS, deflection)
-    force = found.values(columns["load"], FORCE_UNITS, load) + preload
-    which = columns["repetition"]
-    asked = {"deflection": deflection.unit, "load": load.unit}
-    source = found.source(columns, asked)
-    names = [path.stem] * len(way) if not which else found.table.text(which).tolist()
+    table = read_machine_table(path, TableOptions(named, NEEDED, comment, decimal), format)
+    columns = {name: table.column(name) for name in (*NEEDED, "repetition")}
+    deflections = table.values(columns["deflection"], LENGTH_UNITS, deflection)
+    loads = table.values(columns["load"], FORCE_UNITS, load) + preload
+    source = table.source(columns, {quantity: c.unit for quantity, c in channels.items()})
+    labels = [path.stem] * len(loads)
+    if columns["repetition"]:
+        labels = table.table.text(columns["repetition"]).tolist()
     curves = []
-    for name in dict.fromkeys(names):
-        rows = [row for row, own in enumerate(names) if own == name]
-        at = f"line {found.table.lines[rows[0]]}"
+    for label in dict.fromkeys(labels):
+        rows = [row for row, label_of_row in enumerate(labels) if label_of_row == label]
+        line = f"line {table.table.lines[rows[0]]}"
         if len(rows) < 2:
-            raise InputError(path, at, f"repetition {name!r} has one reading; expected two or more")
-        full = f"{path.stem} {name}" if which else name
-        moved = way[rows] - _start(way[rows], force[rows], zero, path, at, full)
+            problem = f"repetition {label!r} has one reading; expected two or more"
+            raise InputError(path, line, problem)
+        name = f"{path.stem} {label}" if columns["repetition"] else label
+        u = deflections[rows]
+        f = loads[rows]
+        try:
+            u = u - _zero_deflection(u, f, zero)
+        except ValueError:
+            problem = f"the first readings of {name!r} do not rise: no zero to be found"
+            raise InputError(path, line, problem) from None
         # Sorted up to the largest deflection: noise is no unloading.
-        order = np.argsort(moved[: int(np.argmax(moved)) + 1], kind="stable")
-        after = len(rows) - len(order)
-        dropped = {UNLOADING: after} if after else {}
-        curves.append(BendingCurve(full, moved[order], force[rows][order], path, dropped, source))
+        order = np.argsort(u[: int(np.argmax(u)) + 1], kind="stable")
+        unloading = len(rows) - len(order)
+        dropped = {UNLOADING: unloading} if unloading else {}
+        curves.append(BendingCurve(name, u[order], f[order], path, dropped, source))
     return tuple(curves)
 
 
-def _start(way: Array, force: Array, zero: Zero, path: Path, at: str, name: str) -> float:
-    """Return the deflection that counts as zero, mm."""
+def _zero_deflection(
+    deflection: Array, load: Array, zero: Zero, readings: int = 4, min_rise: float = 1e-6
+) -> float:
+    """Return the deflection that counts as zero.
+
+    Parameters
+    ----------
+    deflection : (n,) array, mm
+    load : (n,) array, N
+    zero : {"none", "first", "line"}
+    readings : int
+        Readings that the straight line goes through.
+    min_rise : float
+        Share of the largest of these loads that the line must rise by, to be more than rounding.
+
+    Raises
+    ------
+    ValueError
+        The line does not rise.
+    """
     if zero != "line":
-        return float(way[0]) if zero == "first" else 0.0
-    x = way[:FIRST_READINGS]
-    y = force[:FIRST_READINGS]
+        return float(deflection[0]) if zero == "first" else 0.0
+    x = deflection[:readings]
+    y = load[:readings]
     slope, intercept = np.polyfit(x, y, 1) if np.ptp(x) > 0 else np.zeros(2)
-    if not slope * np.ptp(x) > RISES * np.abs(y).max():
-        problem = f"the first readings of {name!r} do not rise: no zero to be found"
-        raise InputError(path, at, problem)
+    if not slope * np.ptp(x) > min_rise * np.abs(y).max():
+        raise ValueError("the first readings do not rise")
     return float(-intercept / slope)
-
-
-PLACES = 61  # of the grid
 
 
 @dataclass(frozen=True, eq=False)
 class BendingScatter:
-    """Mean and deviation (k,) N of the repetitions (`count`) that reach each deflection, mm."""
+    """Mean and deviation of the repetitions that reach each deflection.
+
+    Attributes
+    ----------
+    deflection : (k,) array, mm
+    mean, deviation : (k,) arrays, N
+        NaN where no repetition, or one, reaches.
+    count : (k,) array of int
+        Number of repetitions.
+    """
 
     deflection: Array
     mean: Array
@@ -111,7 +170,19 @@ class BendingScatter:
 
 @dataclass(frozen=True)
 class BendingError:
-    """Errors (N, positive: too stiff) of a model's curve; relative : rms over the largest load."""
+    """Errors of a model's curve against the readings.
+
+    Attributes
+    ----------
+    rms, mean : float, N
+        Positive: too stiff.
+    relative : float
+        RMS over the largest load.
+    compared : int
+        Number of readings within the model's curve.
+    beyond : int
+        Number of readings at larger deflections.
+    """
 
     rms: float
     mean: float
@@ -120,42 +191,64 @@ class BendingError:
     beyond: int
 
 
-def scatter(curves: Sequence[BendingCurve], places: int = PLACES) -> BendingScatter:
-    """Return mean and sample standard deviation of the repetitions, interpolated linearly."""
+def scatter(curves: Sequence[BendingCurve], places: int = 61) -> BendingScatter:
+    """Return mean and sample standard deviation of the repetitions, interpolated linearly.
+
+    Parameters
+    ----------
+    curves : sequence of BendingCurve
+    places : int
+        Number of deflections.
+    """
     if not curves:
         raise ValueError("scatter: no repetitions")
-    low = min(float(c.deflection[0]) for c in curves)
-    high = max(float(c.deflection[-1]) for c in curves)
+    low = min(float(curve.deflection[0]) for curve in curves)
+    high = max(float(curve.deflection[-1]) for curve in curves)
     grid = np.linspace(low, high, places)
-    each = []
-    for c in curves:  # without repeats, with the mean load of each deflection
-        x, which = np.unique(c.deflection, return_inverse=True)
-        mean = np.bincount(which, c.load) / np.bincount(which)
-        each.append(np.interp(grid, x, mean, left=np.nan, right=np.nan))
-    loads = np.array(each)
-    there = np.isfinite(loads)
-    count = there.sum(axis=0)
-    total = np.where(there, loads, 0.0).sum(axis=0)
+    loads = np.array([_load_at(grid, curve) for curve in curves])
+    is_reached = np.isfinite(loads)
+    count = is_reached.sum(axis=0)
+    total = np.where(is_reached, loads, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(places, np.nan), where=count > 0)
-    square = (np.where(there, loads - mean, 0.0) ** 2).sum(axis=0)
-    variance = np.divide(square, count - 1, out=np.full(places, np.nan), where=count > 1)
+    squares = (np.where(is_reached, loads - mean, 0.0) ** 2).sum(axis=0)
+    variance = np.divide(squares, count - 1, out=np.full(places, np.nan), where=count > 1)
     return BendingScatter(grid, mean, np.sqrt(variance), count)
+
+
+def _load_at(grid: Array, curve: BendingCurve) -> Array:
+    """Return the mean load (N) at each deflection (mm); NaN beyond the curve."""
+    x, index = np.unique(curve.deflection, return_inverse=True)
+    mean = np.bincount(index, curve.load) / np.bincount(index)
+    return np.interp(grid, x, mean, left=np.nan, right=np.nan)
 
 
 def model_error(
     curves: Sequence[BendingCurve], deflection: ArrayLike, load: ArrayLike
 ) -> BendingError | None:
-    """Return the load of a model (frames,) N less that read; None where it reaches no load."""
+    """Return the load of a model less that of the readings.
+
+    Parameters
+    ----------
+    curves : sequence of BendingCurve
+    deflection : (frames,) array, mm
+        Of the model.
+    load : (frames,) array, N
+
+    Returns
+    -------
+    BendingError or None
+        None where no reading within the model's deflections has a load.
+    """
     x = np.asarray(deflection, dtype=float)
     y = np.asarray(load, dtype=float)
-    way = np.concatenate([c.deflection for c in curves]) if curves else np.empty(0)
-    read = np.concatenate([c.load for c in curves]) if curves else np.empty(0)
-    inside = (way >= x[0]) & (way <= x[-1])
-    largest = float(np.abs(read[inside]).max(initial=0.0))
+    measured = np.concatenate([[], *(curve.deflection for curve in curves)])
+    measured_load = np.concatenate([[], *(curve.load for curve in curves)])
+    is_within = (measured >= x[0]) & (measured <= x[-1])
+    largest = float(np.abs(measured_load[is_within]).max(initial=0.0))
     if not largest > 0:
         return None
-    off = np.interp(way[inside], x, y) - read[inside]
-    rms = float(np.sqrt(np.mean(off**2)))
-    return BendingError(
-        rms, float(off.mean()), rms / largest, int(inside.sum()), int((way > x[-1]).sum())
-    )
+    error = np.interp(measured[is_within], x, y) - measured_load[is_within]
+    rms = float(np.sqrt(np.mean(error**2)))
+    compared = int(is_within.sum())
+    beyond = int((measured > x[-1]).sum())
+    return BendingError(rms, float(error.mean()), rms / largest, compared, beyond)

@@ -14,10 +14,11 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError, check_one_of
-from . import tables
 from .frames import Array, FrameSource
 from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
+from .quantities import DIRECTION_ALIASES, distance_to_strip, is_between_grips
 from .registry import read_file
+from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS
 
 #: Units that a caller may name: per width, or of the whole strip; an elongation, or a strain.
 LoadUnit = Literal["N", "kN", "lbf", "kN/m", "N/mm", "N/5cm", "lbf/in"]
@@ -29,11 +30,25 @@ DIRECTIONS = ("warp", "fill", "bias")
 
 @dataclass(frozen=True, eq=False)
 class LoadCurve:
-    """Load (n,) N of the whole strip over elongation (n,) mm of one specimen or series.
+    """Load over elongation of one specimen or series.
 
-    time : (n,) where the file has it. frame : (n,) numbers from 0, of a strain gauge.
-    between_grips : the column where it is the machine's travel. cut : rows left out after the
-    largest load.
+    Attributes
+    ----------
+    direction : str
+        warp, fill or bias.
+    specimen : str
+    elongation : (n,) array, mm
+    load : (n,) array, N
+        Of the strip in its full width.
+    path : Path or None
+    time : (n,) array or None
+        Times in the file.
+    frame : (n,) array of int or None
+        Numbers of the frames from 0, of a strain gauge.
+    between_grips : str
+        The column of elongation if it is the machine's travel, else "".
+    cut : int
+        Number of rows left out after the largest load.
     """
 
     direction: str
@@ -53,23 +68,31 @@ class LoadCurve:
         end = int(np.argmax(self.load)) + 1
         return self.part(slice(end), cut=len(self.load) - end)
 
-    def part(self, rows: slice, **changes: Any) -> LoadCurve:
+    def part(self, rows: slice | Sequence[int], **changes: Any) -> LoadCurve:
         """Return the curve of these rows, with other values of its fields."""
-        kept = {
-            n: v[rows]
-            for n in ("elongation", "load", "time", "frame")
-            if (v := getattr(self, n)) is not None
-        }
-        return replace(self, **kept, **changes)
+        return replace(
+            self,
+            elongation=self.elongation[rows],
+            load=self.load[rows],
+            time=None if self.time is None else self.time[rows],
+            frame=None if self.frame is None else self.frame[rows],
+            **changes,
+        )
 
 
 def direction_named(name: str, path: Path | None = None, field: str = "direction") -> str:
-    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`."""
+    """Return warp, fill or bias for any of the names in `DIRECTION_ALIASES`.
+
+    Raises
+    ------
+    InputError
+        Of `path` and `field`: the name is none of them.
+    """
     plain = re.sub(r"[\W_]+", "", name.casefold())
-    if plain not in tables.DIRECTION_ALIASES:
-        known = ", ".join(tables.DIRECTION_ALIASES)
-        raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {known}")
-    return tables.DIRECTION_ALIASES[plain]
+    if plain not in DIRECTION_ALIASES:
+        aliases = ", ".join(DIRECTION_ALIASES)
+        raise InputError(path, field, f"unknown direction {name[:40]!r}; use one of {aliases}")
+    return DIRECTION_ALIASES[plain]
 
 
 def read_load_curves(
@@ -88,116 +111,191 @@ def read_load_curves(
 ) -> tuple[LoadCurve, ...]:
     """Read the curves of one export: one a direction and specimen, in the order of the file.
 
-    columns : the file's own names of `elongation`, `load`, `specimen`, `direction`, `time` (only if
-    named). load_unit, length_unit : where the file names none. width : mm, for loads per width.
-    gauge_length : mm, by direction, for engineering strains. direction : of a file without such a
-    column; else the rows to keep. decimal : where 1,234 is in doubt. sheet : of a workbook.
+    Parameters
+    ----------
+    path : path
+        Export of a test machine: text, workbook, or a plug-in's format.
+    columns : mapping, optional
+        The file's names of `elongation`, `load`, `specimen`, `direction`, `time`.
+    load_unit, length_unit : str, optional
+        Units where the file names none.
+    width : float, mm, optional
+        Width of the strip, for loads per width.
+    gauge_length : mapping, mm, optional
+        Gauge length by direction, for engineering strains.
+    comment : str
+        What comments begin with.
+    direction : str, optional
+        Direction of a file without such a column; else that of the rows to keep.
+    decimal : {".", ","}, optional
+        Decimal mark, where 1,234 is in doubt.
+    format : str, optional
+        Name of the format; recognised by the content if omitted.
+    sheet : str, optional
+        Sheet of a workbook.
+
+    Returns
+    -------
+    tuple of LoadCurve
+
+    Raises
+    ------
+    InputError
+        The table has no such columns or no unit, or may be read in two ways.
     """
     path = Path(path)
-    named = dict(columns or {})
-    for name in named:
-        check_one_of(name, QUANTITIES, "columns")
+    columns = dict(columns or {})
+    for quantity in columns:
+        check_one_of(quantity, QUANTITIES, "columns")
     check_one_of(decimal, (".", ","), "decimal")
-    wanted = None if direction is None else direction_named(direction)
-    options = TableOptions(named, comment=comment, decimal=decimal, sheet=sheet)
-    found = read_machine_table(path, options, format)
-    column = {quantity: found.column(quantity) for quantity in QUANTITIES}
-    said = column["elongation"]
-    units = tables.LENGTH_UNITS | tables.STRAIN_UNITS
-    elongation = found.values(said, units, Channel(unit=length_unit), "length_unit")
-    units = dict(tables.LOAD_UNITS)
-    own = found.units[column["load"]]
-    if own in tables.WIDTH_LOAD_UNITS or load_unit in tables.WIDTH_LOAD_UNITS:
-        if width is None:
-            problem = f"{own or load_unit} is a load per width; say the strip's width"
-            raise found.error(column["load"], problem)
-        units |= {name: scale * width for name, scale in tables.WIDTH_LOAD_UNITS.items()}
-    load = found.values(column["load"], units, Channel(unit=load_unit), "load_unit")
-    notes = found.notes + found.choice("elongation")
-    if notes != found.notes and not np.ptp(elongation):
+    selected = None if direction is None else direction_named(direction)
+    options = TableOptions(columns, comment=comment, decimal=decimal, sheet=sheet)
+    table = read_machine_table(path, options, format)
+    column_of = {quantity: table.column(quantity) for quantity in QUANTITIES}
+    column = column_of["elongation"]
+    channel = Channel(unit=length_unit)
+    elongation = table.values(column, LENGTH_UNITS | STRAIN_UNITS, channel, "length_unit")
+    load = _read_loads(table, column_of["load"], load_unit, width)
+    notes = table.notes + table.choice("elongation")
+    if notes != table.notes and not np.ptp(elongation):
         problem = "does not move: name another column of elongation with columns"
-        raise found.error(said, problem)
-    grips = said if tables.is_between_grips(said, "elongation" in named) else ""
-    asked = {"elongation": length_unit, "load": load_unit}
-    time = found.table.numbers(column["time"]) if column["time"] else found.times()
-    labels = _labels(found, column, wanted)
-    if (found.units[said] or length_unit) in tables.STRAIN_UNITS:
-        gauges = gauge_length or {}
-        lacks = [d for d, _ in labels if d not in gauges and wanted in (None, d)]
-        if lacks:
-            problem = f"is a strain, no elongation: say the {lacks[0]} strip's gauge_length"
-            raise found.error(said, problem)
-        elongation = elongation * np.array([gauges.get(d, np.nan) for d, _ in labels])
-        doubtful = "; its name does not say of what" if tables.distance_to_strip(said) else ""
-        words = f"{path.name}: the elongation is the strain of column {said!r} times gauge_length"
-        notes = (*notes, words + doubtful)
-    places: dict[tuple[str, str], list[int]] = {}
+        raise table.error(column, problem)
+    time_column = column_of["time"]
+    time = table.table.numbers(time_column) if time_column else table.times()
+    labels = _labels(table, column_of, selected)
+    if (table.units[column] or length_unit) in STRAIN_UNITS:
+        gauges = _gauge_lengths(table, column, labels, gauge_length or {}, selected)
+        elongation = elongation * gauges
+        notes = (*notes, _describe_strain(path, column))
+    units = {"elongation": length_unit, "load": load_unit}
+    source = table.source(column_of, units, notes)
+    travel = column if is_between_grips(column, "elongation" in columns) else ""
+    rows_by_label = _rows_by_label(labels, selected)
+    if not rows_by_label:
+        directions = ", ".join(dict.fromkeys(direction for direction, _ in labels))
+        field = f"column {column_of['direction']!r}"
+        raise InputError(path, field, f"no {selected}; it has: {directions}")
+    curve = LoadCurve("", "", elongation, load, path, time, None, notes, source, travel)
+    return tuple(
+        curve.part(rows, direction=direction, specimen=specimen)
+        for (direction, specimen), rows in rows_by_label.items()
+    )
+
+
+def _read_loads(
+    table: MachineTable, column: str, load_unit: LoadUnit | None, width: float | None
+) -> Array:
+    """Return the loads (rows,) N of the strip in its full width, mm."""
+    units = dict(LOAD_UNITS)
+    file_unit = table.units[column]
+    if file_unit in WIDTH_LOAD_UNITS or load_unit in WIDTH_LOAD_UNITS:
+        if width is None:
+            problem = f"{file_unit or load_unit} is a load per width; say the strip's width"
+            raise table.error(column, problem)
+        units |= {name: scale * width for name, scale in WIDTH_LOAD_UNITS.items()}
+    return table.values(column, units, Channel(unit=load_unit), "load_unit")
+
+
+def _gauge_lengths(
+    table: MachineTable,
+    column: str,
+    labels: Sequence[tuple[str, str]],
+    gauge_length: Mapping[str, float],
+    selected: str | None,
+) -> Array:
+    """Return the gauge length (rows,) mm of each row; NaN of directions that are not selected."""
+    for direction, _ in labels:
+        if direction not in gauge_length and selected in (None, direction):
+            problem = f"is a strain, no elongation: say the {direction} strip's gauge_length"
+            raise table.error(column, problem)
+    return np.array([gauge_length.get(direction, np.nan) for direction, _ in labels])
+
+
+def _describe_strain(path: Path, column: str) -> str:
+    doubt = "; its name does not say of what" if distance_to_strip(column) else ""
+    return (
+        f"{path.name}: the elongation is the strain of column {column!r} times gauge_length{doubt}"
+    )
+
+
+def _rows_by_label(
+    labels: Sequence[tuple[str, str]], selected: str | None
+) -> dict[tuple[str, str], list[int]]:
+    """Return the rows of each direction and specimen, of the direction that is selected."""
+    rows: dict[tuple[str, str], list[int]] = {}
     for row, label in enumerate(labels):
-        places.setdefault(label, []).append(row)
-    source = found.source(column, asked, notes)
-    curves = []
-    for key, rows in places.items():
-        if wanted in (None, key[0]):
-            taken = None if time is None else time[rows]
-            values = elongation[rows], load[rows]
-            curves.append(LoadCurve(*key, *values, path, taken, None, notes, source, grips))
-    if not curves:
-        there = ", ".join(dict.fromkeys(key[0] for key in places))
-        raise InputError(path, f"column {column['direction']!r}", f"no {wanted}; it has: {there}")
-    return tuple(curves)
+        if selected in (None, label[0]):
+            rows.setdefault(label, []).append(row)
+    return rows
+
+
+def _labels(
+    table: MachineTable, columns: Mapping[str, str], selected: str | None
+) -> list[tuple[str, str]]:
+    """Return direction and specimen of each row; `selected` is that of a file without a column."""
+    cells = table.table
+    direction_column = columns["direction"]
+    specimen_column = columns["specimen"]
+    if not direction_column and selected is None:
+        problem = (
+            "no column says the direction; say direction, in a project files = { warp = [...] }."
+            f" The file has: {', '.join(filter(None, table.names))[:300]}"
+        )
+        raise InputError(cells.path, f"line {table.header}", problem)
+    series = list(cells.text(direction_column)) if direction_column else []
+    specimens = list(cells.text(specimen_column)) if specimen_column else series
+    labels = []
+    for row, line in enumerate(cells.lines):
+        direction = str(selected)
+        if series:
+            field = f"line {line}, column {direction_column!r}"
+            direction = direction_named(series[row], cells.path, field)
+        specimen = specimens[row] if specimens else cells.path.stem
+        if not specimen:
+            field = f"line {line}, column {specimen_column!r}"
+            raise InputError(cells.path, field, "expected the specimen's name, found nothing")
+        labels.append((direction, specimen))
+    return labels
 
 
 def split_at_restarts(curve: LoadCurve) -> tuple[LoadCurve, ...]:
     """Return specimens listed without names: one starts where the elongation halves."""
-    u = curve.elongation
+    elongation = curve.elongation
+    noise = 1e-2 * elongation.max()  # about zero, before the load comes on: no restart
     starts = [0]
-    reached = 0.0
-    for i, value in enumerate(u):
-        if 0 < reached and value < 0.5 * reached:
-            starts.append(i)
-            reached = 0.0
-        # Noise about zero, before the load comes on, is no restart.
-        reached = max(reached, value if value > 1e-2 * u.max() else 0.0)
+    largest = 0.0
+    for row, value in enumerate(elongation):
+        if 0 < largest and value < 0.5 * largest:
+            starts.append(row)
+            largest = 0.0
+        if value > noise:
+            largest = max(largest, value)
     return tuple(
-        curve.part(slice(a, b), specimen=f"{curve.specimen} {number}")
-        for number, (a, b) in enumerate(pairwise([*starts, len(u)]), start=1)
+        curve.part(slice(start, end), specimen=f"{curve.specimen} {number}")
+        for number, (start, end) in enumerate(pairwise([*starts, len(elongation)]), start=1)
     )
 
 
-def _labels(
-    found: MachineTable, column: Mapping[str, str], wanted: str | None
-) -> Sequence[tuple[str, str]]:
-    """Return direction and specimen of each row."""
-    table = found.table
-    if not column["direction"] and wanted is None:
-        there = ", ".join(filter(None, found.names))[:300]
-        problem = (
-            "no column says the direction; say direction, in a project files = { warp = [...] }."
-            f" The file has: {there}"
-        )
-        raise InputError(table.path, f"line {found.header}", problem)
-    series = list(table.text(column["direction"])) if column["direction"] else None
-    specimens = list(table.text(column["specimen"])) if column["specimen"] else None
-    labels = []
-    for i, line in enumerate(table.lines):
-        at = f"line {line}, column {column['direction']!r}"
-        way = direction_named(series[i], table.path, at) if series else str(wanted)
-        specimen = specimens[i] if specimens else series[i] if series else table.path.stem
-        if not specimen:
-            at = f"line {line}, column {column['specimen']!r}"
-            raise InputError(table.path, at, "expected the specimen's name, found nothing")
-        labels.append((way, specimen))
-    return labels
-
-
-MAX_ORDER = 12  # beyond, the powers of one elongation tell nothing apart
+#: Beyond, the powers of one elongation tell nothing apart.
+MAX_ORDER = 12
 
 
 @dataclass(frozen=True, eq=False)
 class LoadPolynomial:
-    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ... in N over mm, up to `end` mm.
+    """A polynomial P(u) = c0 + c1 u + c2 u^2 + ..., load in N over elongation in mm.
 
-    r_squared : about the mean load, as in Table 3.1. rmse : N; both NaN, points 0, if unknown.
+    Attributes
+    ----------
+    coefficients : (order + 1,) array
+        c0, c1, c2 ... in N / mm^k.
+    end : float, mm
+        Largest elongation for which it holds.
+    r_squared : float
+        About the mean load, as in Table 3.1; NaN if unknown.
+    rmse : float, N
+        NaN if unknown.
+    points : int
+        Number of points that were fitted; 0 if unknown.
     """
 
     coefficients: Array
@@ -208,38 +306,62 @@ class LoadPolynomial:
 
     @property
     def order(self) -> int:
+        """Return the highest power."""
         return len(self.coefficients) - 1
 
     def __call__(self, elongation: ArrayLike) -> Array:
         """Return the load in N at elongations in mm, of the same shape."""
-        at = np.asarray(elongation, dtype=float)
-        return np.asarray(polynomial.polyval(at, self.coefficients))
+        u = np.asarray(elongation, dtype=float)
+        return np.asarray(polynomial.polyval(u, self.coefficients))
 
 
 def fit_load_polynomial(
     elongation: ArrayLike, load: ArrayLike, order: int = 4, through_origin: bool = True
 ) -> LoadPolynomial:
-    """Fit a polynomial to the points (n,) mm and (n,) N by least squares."""
+    """Fit a polynomial to the points of a curve by least squares.
+
+    Parameters
+    ----------
+    elongation : (n,) array, mm
+    load : (n,) array, N
+    order : int
+        Highest power.
+    through_origin : bool
+        Whether c0 is zero.
+
+    Raises
+    ------
+    InputError
+        The points are too few, or settle fewer coefficients.
+    """
     u, f = checked_points(elongation, load)
     terms, scale, lowest = terms_of(u, order, through_origin)
     solution, _, rank, _ = np.linalg.lstsq(terms, f, rcond=1e-13)
     if rank < terms.shape[1]:
         problem = f"the elongations settle only {rank} of {terms.shape[1]} coefficients; lower it"
         raise InputError(None, f"order {order}", problem)
-    left = f - terms @ solution
+    residual = f - terms @ solution
     coefficients = np.zeros(order + 1)
     coefficients[lowest:] = solution / scale ** np.arange(lowest, order + 1)
-    about_mean = ((f - f.mean()) ** 2).sum()
-    r_squared = float(1.0 - (left**2).sum() / about_mean)
-    return LoadPolynomial(
-        coefficients, float(u.max()), r_squared, float(np.sqrt((left**2).mean())), len(u)
-    )
+    squares_about_mean = ((f - f.mean()) ** 2).sum()
+    r_squared = float(1.0 - (residual**2).sum() / squares_about_mean)
+    rmse = float(np.sqrt((residual**2).mean()))
+    return LoadPolynomial(coefficients, float(u.max()), r_squared, rmse, len(u))
 
 
 def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -> float:
-    """Return the deviation (N) of all points from a polynomial, about their own mean (n - 1).
+    """Return the standard deviation of all points from a polynomial, about their mean (n - 1).
 
-    It is the published 21.7, 64.1 and 40.3 N.
+    Parameters
+    ----------
+    elongation : (n,) array, mm
+    load : (n,) array, N
+    fitted : LoadPolynomial
+
+    Returns
+    -------
+    float, N
+        The published values are 21.7, 64.1 and 40.3 N.
     """
     if len(load) < 2:
         raise InputError(None, "curves", f"scatter needs two points, there are {len(load)}")
@@ -247,7 +369,7 @@ def specimen_deviation(elongation: Array, load: Array, fitted: LoadPolynomial) -
 
 
 def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array]:
-    """Return the points as arrays (n,) mm and (n,) N, after checks of counts and values."""
+    """Return the points as arrays, (n,) mm and (n,) N; InputError if they are none to fit."""
     u = np.asarray(elongation, dtype=float)
     f = np.asarray(load, dtype=float)
     if u.ndim != 1 or u.shape != f.shape:
@@ -263,7 +385,24 @@ def checked_points(elongation: ArrayLike, load: ArrayLike) -> tuple[Array, Array
 
 
 def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, int]:
-    """Return powers (n, terms) of u / scale, the scale, and the lowest power."""
+    """Return the powers of scaled elongations.
+
+    Parameters
+    ----------
+    u : (n,) array, mm
+    order : int
+        Highest power.
+    through_origin : bool
+        Whether the power 0 is left out.
+
+    Returns
+    -------
+    terms : (n, coefficients) array
+        Powers of u / scale.
+    scale : float, mm
+    lowest : int
+        Lowest power.
+    """
     if not 1 <= order <= MAX_ORDER:
         raise InputError(None, "order", f"expected 1 to {MAX_ORDER}, got {order}")
     lowest = int(through_origin)
@@ -277,7 +416,17 @@ def terms_of(u: Array, order: int, through_origin: bool) -> tuple[Array, float, 
 
 @dataclass(frozen=True, eq=False)
 class PublishedPolynomial:
-    """One direction's load over elongation of a gauge (mm); scatter of specimens in N, or NaN."""
+    """One direction's load over elongation of a gauge, as published.
+
+    Attributes
+    ----------
+    direction : str
+    gauge_length, final_length : float, mm
+        Length of the gauge at rest and at the end of the polynomial.
+    polynomial : LoadPolynomial
+    scatter : float, N
+        Standard deviation of specimens; NaN if unknown.
+    """
 
     direction: str
     gauge_length: float
@@ -289,6 +438,18 @@ class PublishedPolynomial:
 def read_published_polynomials(
     path: Path | str, format: str | None = None
 ) -> dict[str, PublishedPolynomial]:
-    """Read load polynomials by direction: N, of the full strip, over mm."""
+    """Read published polynomials of load (N, of the full strip) over elongation (mm).
+
+    Parameters
+    ----------
+    path : path
+    format : str, optional
+        Name of the format; recognised by the content if omitted.
+
+    Returns
+    -------
+    dict
+        Polynomial by direction.
+    """
     polynomials: dict[str, PublishedPolynomial] = read_file("load polynomials", path, format)
     return polynomials

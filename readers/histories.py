@@ -1,8 +1,4 @@
-"""Histories that turn: load over strain of a specimen through its cycles, pressures of a sheet.
-
-A sheet may be inflated several times: inflations and releases are found in its frames' pressures.
-The apex of a conditioned sheet is higher than that of the first loading at the same pressure.
-"""
+"""Histories that turn: load over strain of a specimen through its cycles and holds."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,28 +7,42 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, check_one_of
-from . import tables
 from .frames import Array
 from .machine_tables import Channel, MachineTable, TableOptions, read_machine_table
+from .quantities import distance_to_strip, is_between_grips, means, strain_columns
+from .units import LENGTH_UNITS, LOAD_UNITS, STRAIN_UNITS
 
 QUANTITIES = ("load", "strain", "elongation", "travel", "time")
-#: Of the rise before it, the part that an unloading goes back; of the unloading, that a loading
-#: rises again; and of the range of all loads, the least change that is no noise.
-BACK, AGAIN, FLOOR = 0.7, 0.2, 0.005
 #: A strain without a unit is a number of one where it changes by less than this, else not known.
-PLAIN = 0.5
-#: A hold: a way along the curve slower than this share of the cycle's usual speed.
-SLOW, FEWEST = 0.2, 4
+MAX_PLAIN_CHANGE = 0.5
+#: Rows of an unloading at least.
+MIN_UNLOADING_ROWS = 5
+#: Rows of a hold at least, beside the first.
+MIN_HOLD_ROWS = 4
+#: A hold: a path along the curve slower than this share of the cycle's usual speed.
+HOLD_SPEED = 0.2
 #: Of the peak: the loads between which the rate of strain of a loading is taken.
-RISE = (0.4, 0.9)
+RATE_LEVELS = (0.4, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Load (n,) N, strain (n,); time (s) and machine's travel (mm) or None; where strain was."""
+    """Load over strain of one specimen, as recorded.
+
+    Attributes
+    ----------
+    load : (n,) array, N
+    strain : (n,) array
+    time : (n,) array, s, or None
+    travel : (n,) array, mm, or None
+        Of the machine.
+    measured : {"extensometer", "grips"}
+        Where the strain was measured.
+    notes : tuple of str
+        Choices made while reading.
+    """
 
     path: Path
     load: Array
@@ -55,67 +65,102 @@ def read_history(
     sheet: str | None = None,
     format: str | None = None,
 ) -> LoadHistory:
-    """Read a whole load history: a plain table, or the export of an Instron, Zwick or MTS machine.
+    """Read a load history from a plain table, or the export of an Instron, Zwick or MTS machine.
 
-    columns : the file's own names of `QUANTITIES`. The strain is that of the column nearest to the
-    specimen; length : mm between the points an elongation is of. units : where the file names none.
+    Parameters
+    ----------
+    path : path
+    columns : mapping, optional
+        The file's names of `QUANTITIES`; otherwise the strain is that of the column nearest to the
+        specimen.
+    length : float, mm, optional
+        Distance of the points that an elongation is measured between.
+    load_unit, strain_unit, length_unit : str, optional
+        Units where the file names none.
+    decimal, sheet, format : optional
+        As in `TableOptions` and `read_machine_table`.
+
+    Raises
+    ------
+    InputError
+        The table has no such columns or no unit, or its strain does not change.
     """
     path = Path(path)
-    named = dict(columns or {})
-    for name in named:
-        check_one_of(name, QUANTITIES, "columns")
+    columns = dict(columns or {})
+    for quantity in columns:
+        check_one_of(quantity, QUANTITIES, "columns")
     if length is not None and not length > 0:
         raise InputError(None, "length", f"expected a length above 0 mm, got {length:g}")
-    along = {**named, **({"elongation": named["strain"]} if "strain" in named else {})}
-    found = read_machine_table(path, TableOptions(along, decimal=decimal, sheet=sheet), format)
-    force = Channel(unit=load_unit)
-    way = Channel(unit=length_unit)
-    load = found.values(found.column("load"), tables.LOAD_UNITS, force, "load_unit")
-    names = found.names
-    notes = found.notes
-    # A strain that is computed from the travel is the travel's.
-    strains = [] if "elongation" in named else tables.strain_columns(names, found.units, named)
-    strains = [n for n in strains if "strain" in named or not tables.is_between_grips(n, False)]
-    grips = False
+    table_columns = {**columns, "elongation": columns["strain"]} if "strain" in columns else columns
+    options = TableOptions(table_columns, decimal=decimal, sheet=sheet)
+    table = read_machine_table(path, options, format)
+    load = table.values(table.column("load"), LOAD_UNITS, Channel(unit=load_unit), "load_unit")
+    channel = Channel(unit=length_unit)
+    strain_channel = Channel(unit=strain_unit)
+    notes = table.notes
+    is_travel = False
+    strains = _columns_of_strain(table, columns)
     if strains:
         column = strains[0]
-        strain, more = _strain(found, column, Channel(unit=strain_unit))
-        others = f", not {' and '.join(map(repr, strains[1:]))}" if strains[1:] else ""
-        notes += (f"{path.name}: the strain is column {column!r}{others}{more}",)
+        strain, unit_note = _read_strain(table, column, strain_channel)
+        unused = f", not {' and '.join(map(repr, strains[1:]))}" if strains[1:] else ""
+        notes = (*notes, f"{path.name}: the strain is column {column!r}{unused}{unit_note}")
     else:
-        column = found.column("elongation")
-        if found.units[column] in tables.STRAIN_UNITS:
-            strain, _ = _strain(found, column, Channel(unit=strain_unit))
-        elif length is None:
-            problem = "is an elongation: say the length in mm that it is of, length"
-            raise found.error(column, problem)
+        column = table.column("elongation")
+        is_travel = is_between_grips(column, "elongation" in columns)
+        if table.units[column] in STRAIN_UNITS:
+            strain, _ = _read_strain(table, column, strain_channel)
         else:
-            strain = found.values(column, tables.LENGTH_UNITS, way, "length_unit") / length
-        grips = tables.is_between_grips(column, "elongation" in named)
-    machine = [
-        n
-        for n in names
-        if n
-        and n != column
-        and tables.means(n, "elongation")
-        and tables.distance_to_strip(n)
-        and found.units[n] in tables.LENGTH_UNITS
-    ]
-    moved = named.get("travel") or (machine[0] if machine else "")
-    travel = found.values(moved, tables.LENGTH_UNITS, way, "length_unit") if moved else None
+            strain = _strain_of_elongation(table, column, channel, length)
+    travel_column = columns.get("travel") or _travel_column(table, column)
+    travel = None
+    if travel_column:
+        travel = table.values(travel_column, LENGTH_UNITS, channel, "length_unit")
     if len(load) < 2 or not np.ptp(strain) > 0:
         raise InputError(path, f"column {column!r}", "the strain does not change: nothing to read")
-    where: Literal["extensometer", "grips"] = "grips" if grips else "extensometer"
-    return LoadHistory(path, load, strain, found.times(), travel, where, notes)
+    measured: Literal["extensometer", "grips"] = "grips" if is_travel else "extensometer"
+    return LoadHistory(path, load, strain, table.times(), travel, measured, notes)
 
 
-def _strain(found: MachineTable, column: str, channel: Channel) -> tuple[Array, str]:
-    if found.units[column] or channel.unit:
-        return found.values(column, tables.STRAIN_UNITS, channel, "strain_unit"), ""
-    strain = found.table.numbers(column)
-    if np.ptp(strain) > PLAIN:
+def _columns_of_strain(table: MachineTable, columns: Mapping[str, str]) -> list[str]:
+    """Return the columns of strains of the specimen, the nearest to it first."""
+    if "elongation" in columns:
+        return []
+    strains = strain_columns(table.names, table.units, columns)
+    if "strain" in columns:
+        return strains
+    # A strain that is computed from the travel is the travel's.
+    return [name for name in strains if not is_between_grips(name, False)]
+
+
+def _strain_of_elongation(
+    table: MachineTable, column: str, channel: Channel, length: float | None
+) -> Array:
+    """Return the strain (rows,) of an elongation over a length in mm."""
+    if length is None:
+        problem = "is an elongation: say the length in mm that it is of, length"
+        raise table.error(column, problem)
+    return table.values(column, LENGTH_UNITS, channel, "length_unit") / length
+
+
+def _travel_column(table: MachineTable, strain_column: str) -> str:
+    """Return the column of the machine's travel, "" where there is none."""
+    for name in table.names:
+        if not name or name == strain_column or table.units[name] not in LENGTH_UNITS:
+            continue
+        if means(name, "elongation") and distance_to_strip(name):
+            return name
+    return ""
+
+
+def _read_strain(table: MachineTable, column: str, channel: Channel) -> tuple[Array, str]:
+    """Return a strain (rows,), and a note on a unit that is assumed."""
+    if table.units[column] or channel.unit:
+        return table.values(column, STRAIN_UNITS, channel, "strain_unit"), ""
+    strain = table.table.numbers(column)
+    if np.ptp(strain) > MAX_PLAIN_CHANGE:
         problem = f"changes by {np.ptp(strain):.3g} and names no unit; say strain_unit, % or mm/mm"
-        raise found.error(column, problem)
+        raise table.error(column, problem)
     return strain, ", which names no unit: mm/mm is taken"
 
 
@@ -131,34 +176,53 @@ class Cycle:
 
 
 def find_cycles(load: Array) -> list[Cycle]:
-    """Return the cycles of loads (n,); those whose unloading has fewer than 5 rows have none."""
+    """Return the cycles of loads (n,); an unloading of fewer than 5 rows is none."""
     rows = turns(load)
-    least = len(load) - 1
+    last = len(load) - 1
     cycles = []
     for k in range(0, len(rows) - 1, 2):
-        end = rows[k + 2] if k + 2 < len(rows) else least
-        unloaded = k + 2 < len(rows) and end - rows[k + 1] >= 5
-        cycles.append(Cycle(k // 2 + 1, rows[k], rows[k + 1], end, unloaded))
+        is_last = k + 2 >= len(rows)
+        end = last if is_last else rows[k + 2]
+        is_unloaded = not is_last and end - rows[k + 1] >= MIN_UNLOADING_ROWS
+        cycles.append(Cycle(k // 2 + 1, rows[k], rows[k + 1], end, is_unloaded))
     return cycles
 
 
-def turns(load: Array, back: float = BACK, again: float = AGAIN, floor: float = FLOOR) -> list[int]:
-    """Return rows of a valley, the peak after it, the next valley and so on."""
-    least = floor * float(np.ptp(load)) if len(load) else 0.0
-    if not least > 0:
+def turns(
+    load: Array,
+    unloading_share: float = 0.7,
+    loading_share: float = 0.2,
+    noise_share: float = 0.005,
+) -> list[int]:
+    """Return the rows of a valley, the peak after it, the next valley and so on.
+
+    Parameters
+    ----------
+    load : (n,) array
+    unloading_share : float
+        Part of the rise before it that an unloading goes back.
+    loading_share : float
+        Part of the unloading before it that a loading rises again.
+    noise_share : float
+        Of the range of all loads, the least change that is no noise.
+    """
+    noise = noise_share * float(np.ptp(load)) if len(load) else 0.0
+    if not noise > 0:
         return []
-    found: list[int] = []
-    far, sign = 0, -1.0  # the first turn is a valley
-    for i, value in enumerate(load):
-        if sign * (value - load[far]) > 0:
-            far = i
+    rows: list[int] = []
+    extreme = 0
+    sign = -1.0  # the first turn is a valley
+    for row, value in enumerate(load):
+        if sign * (value - load[extreme]) > 0:
+            extreme = row
             continue
-        before = abs(load[far] - load[found[-1]]) if found else 0.0
-        if sign * (load[far] - value) > max(least, (back if sign > 0 else again) * before):
-            found.append(far)
-            far = i
+        previous_change = abs(load[extreme] - load[rows[-1]]) if rows else 0.0
+        share = unloading_share if sign > 0 else loading_share
+        if sign * (load[extreme] - value) > max(noise, share * previous_change):
+            rows.append(extreme)
+            extreme = row
             sign = -sign
-    return [*found, far]
+    return [*rows, extreme]
 
 
 @dataclass(frozen=True)
@@ -172,27 +236,39 @@ class Hold:
 
 
 def find_holds(history: LoadHistory, cycles: Sequence[Cycle]) -> list[Hold]:
-    """Return the holds in order of time; none where the file has no time."""
-    found: list[Hold] = []
-    ends = [*(c.start for c in cycles[1:]), len(history.load) - 1]
-    for c, end in zip(cycles, ends, strict=True):
-        rows = slice(c.start, max(end, c.end) + FEWEST)
-        if history.time is None or not np.ptp(history.strain[rows]) > 0:
-            continue
-        load, strain = (x[rows] / np.ptp(x[rows]) for x in (history.load, history.strain))
-        way = np.hypot(np.diff(load), np.diff(strain))
-        speed = way / np.maximum(np.diff(history.time[rows]), 1e-9)
-        # Half of the way is gone slower: however long the holds are, hardly any way is theirs.
-        order = np.argsort(speed)
-        usual = speed[order][int(np.searchsorted(np.cumsum(way[order]), 0.5 * way.sum()))]
-        slow = np.array([False, *(speed < SLOW * usual), False])
-        runs = np.flatnonzero(slow[1:] != slow[:-1]).reshape(-1, 2) + c.start
-        for first, last in runs.tolist():
-            top = 2 * history.load[first] > history.load[c.peak] + history.load[c.start]
-            before = first < c.peak and not top  # the beginning of a first loading
-            if last - first >= FEWEST and not before and all(h.last < first for h in found):
-                found.append(Hold(c.number, "top" if top else "bottom", first, last))
-    return found
+    """Return the holds of a history in order of time; none where the file has no time."""
+    holds: list[Hold] = []
+    next_starts = [*(cycle.start for cycle in cycles[1:]), len(history.load) - 1]
+    for cycle, next_start in zip(cycles, next_starts, strict=True):
+        rows = slice(cycle.start, max(next_start, cycle.end) + MIN_HOLD_ROWS)
+        for start, end in _slow_rows(history, rows):
+            first = cycle.start + start
+            last = cycle.start + end
+            is_top = 2 * history.load[first] > history.load[cycle.peak] + history.load[cycle.start]
+            is_beginning = first < cycle.peak and not is_top
+            is_known = any(hold.last >= first for hold in holds)
+            if last - first >= MIN_HOLD_ROWS and not is_beginning and not is_known:
+                holds.append(Hold(cycle.number, "top" if is_top else "bottom", first, last))
+    return holds
+
+
+def _slow_rows(history: LoadHistory, rows: slice) -> list[list[int]]:
+    """Return first and last row of each slow stretch of some rows, counted from the first of them.
+
+    Speeds are those along the curve of load over strain, each as a share of its range.
+    """
+    if history.time is None or not np.ptp(history.strain[rows]) > 0:
+        return []
+    load = history.load[rows] / np.ptp(history.load[rows])
+    strain = history.strain[rows] / np.ptp(history.strain[rows])
+    path = np.hypot(np.diff(load), np.diff(strain))
+    speed = path / np.maximum(np.diff(history.time[rows]), 1e-9)
+    # Half of the path is passed slower: however long holds are, hardly any of the path is theirs.
+    order = np.argsort(speed)
+    usual = speed[order][int(np.searchsorted(np.cumsum(path[order]), 0.5 * path.sum()))]
+    is_slow = np.array([False, *(speed < HOLD_SPEED * usual), False])
+    stretches: list[list[int]] = np.flatnonzero(is_slow[1:] != is_slow[:-1]).reshape(-1, 2).tolist()
+    return stretches
 
 
 @dataclass(frozen=True)
@@ -205,122 +281,50 @@ class Pace:
 
 def pace_of(histories: Iterable[LoadHistory]) -> Pace:
     """Return the median of the mean rates of all loadings, and the longest hold at a top."""
-    rates = []
-    holds = [0.0]
-    for h in histories:
-        if h.time is None:
+    rates: list[float] = []
+    durations = [0.0]
+    for history in histories:
+        if history.time is None:
             continue
-        cycles = find_cycles(h.load)
-        for c in cycles:
-            up = slice(c.start, c.peak + 1)
-            levels = [share * h.load[c.peak] for share in RISE]
-            (a, b), (begin, end) = (
-                [passage(h.load[up], x[up], level)[1] for level in levels]
-                for x in (h.strain, h.time)
-            )
-            rates += [(b - a) / (end - begin)] * (end > begin)
-        holds += [h.time[k.last] - h.time[k.first] for k in find_holds(h, cycles) if k.at == "top"]
-    return Pace(float(np.median(rates)), float(max(holds))) if rates else Pace()
+        cycles = find_cycles(history.load)
+        for cycle in cycles:
+            rates += _loading_rate(history.load, history.strain, history.time, cycle)
+        for hold in find_holds(history, cycles):
+            if hold.at == "top":
+                durations.append(history.time[hold.last] - history.time[hold.first])
+    return Pace(float(np.median(rates)), float(max(durations))) if rates else Pace()
+
+
+def _loading_rate(load: Array, strain: Array, time: Array, cycle: Cycle) -> list[float]:
+    """Return the mean rate of strain (1/s) of a loading; nothing where it takes no time."""
+    rows = slice(cycle.start, cycle.peak + 1)
+    levels = [share * load[cycle.peak] for share in RATE_LEVELS]
+    strains = [passage(load[rows], strain[rows], level)[1] for level in levels]
+    times = [passage(load[rows], time[rows], level)[1] for level in levels]
+    duration = times[1] - times[0]
+    return [(strains[1] - strains[0]) / duration] if duration > 0 else []
 
 
 def passage(load: Array, strain: Array, level: float) -> tuple[int, float]:
-    """Return the row before the first passage of a load level and the strain there; NaN if none."""
-    side = load >= level
-    change = np.flatnonzero(side[1:] != side[:-1])
-    if not len(change):
-        return -1, float("nan")
-    i = int(change[0])
-    share = (level - load[i]) / (load[i + 1] - load[i])
-    return i, float(strain[i] + share * (strain[i + 1] - strain[i]))
+    """Return where a curve passes a load level first.
 
+    Parameters
+    ----------
+    load, strain : (n,) arrays
+    level : float
+        In the unit of the load.
 
-#: Of the rise before it, what a release goes back; of the release, what an inflation rises again.
-TURN = 0.3
-#: The inflation that is taken, from 1, or every frame of all.
-Which = int | Literal["all"]
-#: Frames of an inflation, at least; pressures of the terminal.
-LEAST_FRAMES, FEW = 3, 5
-
-
-def branches_of(pressures: Array) -> list[NDArray[np.intp]]:
-    """Return the frames of each inflation and release in turn, of frames (n,) in order of time.
-
-    Frames without a pressure (NaN) are in none. Where nothing rises, all are one inflation.
+    Returns
+    -------
+    row : int
+        Last row before the passage, -1 if there is none.
+    strain : float
+        Strain at the passage, NaN if there is none.
     """
-    known = np.flatnonzero(np.isfinite(pressures))
-    rows = turns(pressures[known], TURN, TURN)
-    if len(rows) < 2:
-        return [known]
-    between = [row + 1 for row in rows[1:-1]]
-    ends = zip([rows[0], *between], [*between, len(known)], strict=True)
-    return [known[a:b] for a, b in ends]
-
-
-def has_several(pressures: Array) -> bool:
-    """Return whether frames are of several inflations, and not only in another order than time."""
-    inflations = branches_of(pressures)[::2]
-    return len(inflations) > 1 and min(map(len, inflations)) >= LEAST_FRAMES
-
-
-@dataclass(frozen=True, eq=False)
-class Inflations:
-    """Frames of several inflations, pressure (n,) MPa, height (n,) mm of the apex; and `taken`."""
-
-    pressure: Array
-    height: Array
-    taken: Which
-
-    @property
-    def curves(self) -> list[tuple[Array, Array]]:
-        """Return pressures (MPa, rising) and heights (mm) of each inflation and release in turn."""
-        found = []
-        for branch in branches_of(self.pressure):
-            own = branch[np.isfinite(self.height[branch])]
-            pressure, first = np.unique(self.pressure[own], return_index=True)
-            found.append((pressure, self.height[own][first]))
-        return found
-
-    @property
-    def rows(self) -> list[tuple[int, float, float, float, float, float, float]]:
-        """Return a row a later inflation and common pressure, those of the first one's frames.
-
-        Number, kPa; mm of the first inflation, of the release before this one (NaN beyond its
-        pressures), of this one; mm and % that this one is higher than the first.
-        """
-        curves = self.curves
-        found = []
-        for k in range(2, len(curves), 2):
-            pressures = curves[0][0]
-            most, least = (f(curves[k][0]) for f in (np.max, np.min))
-            for p in pressures[(pressures >= least) & (pressures <= most) & (pressures > 0)]:
-                # Straight in the cube root of the pressure, as a flat sheet rises.
-                first, release, now = (
-                    float(np.interp(np.cbrt(p), np.cbrt(x), y, np.nan, np.nan))
-                    for x, y in (curves[0], curves[k - 1], curves[k])
-                )
-                more = now - first
-                found.append((1 + k // 2, 1e3 * p, first, release, now, more, 100 * more / first))
-        return found
-
-    @property
-    def line(self) -> str:
-        """Return which inflation is taken, in one line."""
-        count = (len(self.curves) + 1) // 2
-        if self.taken == "all":
-            return f"all frames of {count} inflations are taken, in their order"
-        state = "the first loading" if self.taken == 1 else "conditioned"
-        said = f"inflation {self.taken} of {count}, {state}, is taken"
-        return f"{said}; inflation = N or 'all' takes others"
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """Return how far the apex is higher at a few common pressures."""
-        said = []
-        for number in dict.fromkeys(row[0] for row in self.rows):
-            own = [row for row in self.rows if row[0] == number]
-            for _, kilo, first, _, now, more, percent in own[:: -(-len(own) // FEW)]:
-                said.append(
-                    f"inflation {number} at {kilo:.4g} kPa: apex {now:.4g} mm, {first:.4g} mm in "
-                    f"the first: {more:+.2g} mm, {percent:+.2g} %"
-                )
-        return said
+    is_above = load >= level
+    changes = np.flatnonzero(is_above[1:] != is_above[:-1])
+    if not len(changes):
+        return -1, float("nan")
+    row = int(changes[0])
+    share = (level - load[row]) / (load[row + 1] - load[row])
+    return row, float(strain[row] + share * (strain[row + 1] - strain[row]))

@@ -1,4 +1,4 @@
-"""A test machine's table: which column holds what, and its numbers in mm and N."""
+"""A test machine's table: which column holds what, and its numbers in mm, N, MPa and s."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,16 +9,32 @@ from typing import Literal
 import numpy as np
 
 from ..errors import InputError, check_one_of
-from . import tables
 from .frames import Array, FrameSource
+from .quantities import columns_of, distance_to_strip, nearest_to_strip
 from .registry import format_of, read_file
+from .tables import TextTable
+from .units import LOAD_UNITS, STRAIN_UNITS, TIME_UNITS, scale_of
 
 NEEDED = ("elongation", "load")
 
 
 @dataclass(frozen=True)
 class TableOptions:
-    """Names of columns, quantities that a table must hold, comment, decimal mark, sheet."""
+    """Options of a reader of machine tables.
+
+    Attributes
+    ----------
+    columns : mapping
+        The file's names of some quantities.
+    quantities : sequence of str
+        Quantities that the table must hold.
+    comment : str
+        What comments begin with.
+    decimal : str or None
+        Decimal mark; None: found by itself.
+    sheet : str or None
+        Sheet of a workbook.
+    """
 
     columns: Mapping[str, str] = field(default_factory=dict)
     quantities: Sequence[str] = NEEDED
@@ -29,7 +45,19 @@ class TableOptions:
 
 @dataclass(frozen=True)
 class Channel:
-    """A column of readings (None: by meaning): scale (per volt, or None) * reading + offset."""
+    """A column of readings, and how they become a quantity: scale * reading + offset, in `unit`.
+
+    Attributes
+    ----------
+    column : str or None
+        None for a column that is found by what its name means.
+    unit : str or None
+        None for the unit that the file says.
+    scale : float or None
+        Units per unit of the readings, such as kPa per volt; None: 1.
+    offset : float
+        In the channel's unit.
+    """
 
     column: str | None = None
     unit: str | None = None
@@ -43,12 +71,22 @@ AS_FOUND = Channel()
 
 @dataclass(frozen=True, eq=False)
 class MachineTable:
-    """A table as the file has it: units by column, line of the names, notes of choices made.
+    """A table as the file has it.
 
-    options, format : as `read_machine_table` was asked; a reader leaves them out.
+    Attributes
+    ----------
+    table : TextTable
+    units : mapping
+        Unit by column, "" where the file has none.
+    header : int
+        Line of the names.
+    notes : tuple of str
+        Choices made while reading.
+    options, format
+        As `read_machine_table` was called; a reader leaves them out.
     """
 
-    table: tables.TextTable
+    table: TextTable
     units: Mapping[str, str]
     header: int
     notes: tuple[str, ...] = ()
@@ -65,91 +103,159 @@ class MachineTable:
         return InputError(self.table.path, f"line {self.header}, column {column!r}", problem)
 
     def column(self, quantity: str) -> str:
-        """Return the column of a quantity, the nearest to the strip; "" where it may be absent."""
-        names = self.names
-        named = self.options.columns
-        may_lack = quantity not in (*named, *self.options.quantities)
-        if quantity == "time" and may_lack:
+        """Return the column of a quantity, the nearest to the strip.
+
+        Returns
+        -------
+        str
+            "" where the table has none and need not have one.
+
+        Raises
+        ------
+        InputError
+            The column is missing, or may be one of several.
+        """
+        is_optional = quantity not in (*self.options.columns, *self.options.quantities)
+        if quantity == "time" and is_optional:
             return ""
-        which = tables.columns_of(names, quantity, named)
-        if quantity == "elongation" and quantity not in named:
-            which = tables.nearest_to_strip(names, which)
-            lengths = [i for i in which if self.units[names[i]] not in tables.STRAIN_UNITS]
-            which = lengths or which
-        if len(which) == 1 or (not which and may_lack):
-            return names[which[0]] if which else ""
-        there = ", ".join(name for name in names if name)[:300]
-        several = " or ".join(repr(names[i]) for i in which[:6])
-        what = f"may be {several}; name one with columns" if which else "is missing"
-        if len(which) > len({names[i] for i in which}) == 1:
-            what = f"{names[which[0]]!r} appears twice, with other numbers; rename one in the file"
-        if quantity in named:
-            what = f"{named[quantity]!r} {'appears twice' if which else 'is missing'}"
-        problem = f"the column of {quantity} {what}; the file has: {there}"
+        candidates = self._candidates(quantity)
+        if len(candidates) == 1:
+            return candidates[0]
+        if not candidates and is_optional:
+            return ""
+        names = ", ".join(name for name in self.names if name)[:300]
+        state = self._describe_candidates(quantity, candidates)
+        problem = f"the column of {quantity} {state}; the file has: {names}"
         raise InputError(self.table.path, f"line {self.header}", problem)
+
+    def _candidates(self, quantity: str) -> list[str]:
+        """Return the columns that may hold a quantity."""
+        names = self.names
+        indices = columns_of(names, quantity, self.options.columns)
+        if quantity != "elongation" or quantity in self.options.columns:
+            return [names[i] for i in indices]
+        candidates = [names[i] for i in nearest_to_strip(names, indices)]
+        return [name for name in candidates if self.units[name] not in STRAIN_UNITS] or candidates
+
+    def _describe_candidates(self, quantity: str, candidates: Sequence[str]) -> str:
+        """Describe why a quantity has no column."""
+        if quantity in self.options.columns:
+            state = "appears twice" if candidates else "is missing"
+            return f"{self.options.columns[quantity]!r} {state}"
+        if not candidates:
+            return "is missing"
+        if len({*candidates}) == 1:
+            return f"{candidates[0]!r} appears twice, with other numbers; rename one in the file"
+        return f"may be {' or '.join(map(repr, candidates[:6]))}; name one with columns"
 
     def choice(self, quantity: str) -> tuple[str, ...]:
         """Return a note where `column` chose one of several columns, else nothing."""
-        names = self.names
-        named = self.options.columns
-        which = [] if quantity in named else tables.columns_of(names, quantity, named)
-        if len(which) < 2:
+        if quantity in self.options.columns:
             return ()
-        chosen = self.column(quantity)
-        others = " and ".join(repr(names[i]) for i in which if names[i] != chosen)
-        why = "" if tables.distance_to_strip(chosen) else ", measured on the strip"
+        candidates = [self.names[i] for i in columns_of(self.names, quantity, {})]
+        if len(candidates) < 2:
+            return ()
+        column = self.column(quantity)
+        unused = " and ".join(repr(name) for name in candidates if name != column)
+        reason = "" if distance_to_strip(column) else ", measured on the strip"
         return (
-            f"the {quantity} is column {chosen!r}{why}, not {others};"
+            f"the {quantity} is column {column!r}{reason}, not {unused};"
             f" columns = {{ {quantity} = ... }} names another",
         )
 
     def source(
-        self, columns: Mapping[str, str], asked: Mapping[str, str | None], notes: Sequence[str] = ()
+        self,
+        columns: Mapping[str, str],
+        units: Mapping[str, str | None],
+        notes: Sequence[str] = (),
     ) -> FrameSource:
-        """Return the record of what was read: columns by quantity, units where none is named."""
-        taken = {quantity: column for quantity, column in columns.items() if column}
-        units = {q: self.units.get(column) or asked.get(q) or "" for q, column in taken.items()}
+        """Return the record of what was read.
+
+        Parameters
+        ----------
+        columns : mapping
+            Column by quantity, "" where there is none.
+        units : mapping
+            The caller's unit by quantity, for columns without one.
+        notes : sequence of str
+        """
+        columns = {quantity: column for quantity, column in columns.items() if column}
+        units = {q: self.units.get(column) or units.get(q) for q, column in columns.items()}
         name = self.format or format_of("machine table", self.table.path).name
-        return FrameSource(name, taken, {q: unit for q, unit in units.items() if unit}, (*notes,))
+        return FrameSource(name, columns, {q: u for q, u in units.items() if u}, tuple(notes))
 
     def values(
         self, column: str, units: Mapping[str, float], channel: Channel = AS_FOUND, key: str = ""
     ) -> Array:
-        """Return a column (rows,), converted by the table `units`; times without a unit are in s.
+        """Return the numbers of a column in the base unit.
 
-        key : the caller's argument that is the unit of the channel, which must be one of `units`.
+        Parameters
+        ----------
+        column : str
+        units : mapping
+            Table of units of the quantity; times without a unit are in s.
+        channel : Channel
+            What the caller says of the column.
+        key : str
+            The caller's argument that is the unit of the channel, one of `units`.
+
+        Returns
+        -------
+        (rows,) array
+
+        Raises
+        ------
+        InputError
+            A cell is no number, or the unit is missing, unknown or contradicted.
         """
         if key:
             check_one_of(channel.unit, units, key)
-        own = self.units[column]
-        if units is tables.TIME_UNITS:
-            if (stamps := self.table.stamps(column)) is not None:
+        unit = self.units[column]
+        if units is TIME_UNITS:
+            stamps = self.table.stamps(column)
+            if stamps is not None:
                 return stamps
-            at_the_end = re.search(rf"[_\s]({'|'.join(units)})$", column)
-            own = own or (at_the_end[1] if at_the_end else "")
-            channel = channel if own or channel.unit else replace(channel, unit="s")
+            match = re.search(rf"[_\s]({'|'.join(units)})$", column)
+            if not unit and match:
+                unit = match[1]
+            if not unit and not channel.unit:
+                channel = replace(channel, unit="s")
         readings = self.table.numbers(column)
-        at = f"line {self.header}, column {column!r}"
-        return in_unit(readings, own, channel, units, self.table.path, at, key)
+        location = f"line {self.header}, column {column!r}"
+        return in_unit(readings, unit, channel, units, self.table.path, location, key)
 
     def times(self) -> Array | None:
         """Return the column of times in s that never falls, None where the table has none."""
-        for i in tables.columns_of(self.names, "time", self.options.columns):
+        for index in columns_of(self.names, "time", self.options.columns):
             try:
-                values = self.values(self.names[i], tables.TIME_UNITS)
+                times = self.values(self.names[index], TIME_UNITS)
             except InputError:
                 if "time" in self.options.columns:
                     raise
                 continue
-            if (np.diff(values) >= 0).all():
-                return values
+            if (np.diff(times) >= 0).all():
+                return times
         return None
 
 
 def read_machine_table(
     path: Path | str, options: TableOptions = TableOptions(), format: str | None = None
 ) -> MachineTable:
-    """Read the first table with a column of each quantity that `options` ask for."""
+    """Read the first table with a column of each quantity that the options require.
+
+    Parameters
+    ----------
+    path : path
+        Export of a test machine: text, workbook, or a plug-in's format.
+    options : TableOptions
+    format : str, optional
+        Name of the format; recognised by the content if omitted.
+
+    Raises
+    ------
+    InputError
+        There is no such table, or it may be read in two ways.
+    """
     table: MachineTable = read_file("machine table", path, format, options)
     return replace(table, options=options, format=format)
 
@@ -164,12 +270,31 @@ def read_machine_loads(
     decimal: Literal[".", ","] | None = None,
     format: str | None = None,
 ) -> tuple[Array, Array | None]:
-    """Read the loads (k,) N of an export, with `timed` the times (k,) s too, else None."""
-    needed = ("load", "time") if timed else ("load",)
-    found = read_machine_table(path, TableOptions(columns or {}, needed, comment, decimal), format)
-    unit = Channel(unit=load_unit)
-    load = found.values(found.column("load"), tables.LOAD_UNITS, unit, "load_unit")
-    return load, found.values(found.column("time"), tables.TIME_UNITS) if timed else None
+    """Read the loads of an export.
+
+    Parameters
+    ----------
+    path : path
+    columns : mapping, optional
+        The file's names of `load` and `time`.
+    timed : bool
+        Whether times are required.
+    load_unit : {"N", "kN", "lbf"}, optional
+        Unit of loads where the file names none.
+    comment, decimal, format
+        As in `TableOptions` and `read_machine_table`.
+
+    Returns
+    -------
+    loads : (k,) array, N
+    times : (k,) array, s, or None
+    """
+    quantities = ("load", "time") if timed else ("load",)
+    options = TableOptions(columns or {}, quantities, comment, decimal)
+    table = read_machine_table(path, options, format)
+    channel = Channel(unit=load_unit)
+    loads = table.values(table.column("load"), LOAD_UNITS, channel, "load_unit")
+    return loads, table.values(table.column("time"), TIME_UNITS) if timed else None
 
 
 def read_times(
@@ -178,44 +303,85 @@ def read_times(
     comment: str = "#",
     decimal: Literal[".", ","] | None = None,
 ) -> Array:
-    """Read times (n,) in s, one a row, such as those of pictures in the camera's log."""
-    named = {} if column is None else {"time": column}
-    found = read_machine_table(path, TableOptions(named, ("time",), comment, decimal))
-    return found.values(found.column("time"), tables.TIME_UNITS)
+    """Read times, one a row, such as those of pictures in the camera's log.
+
+    Parameters
+    ----------
+    path : path
+    column : str, optional
+        Name of the column; found by its meaning if omitted.
+    comment, decimal
+        As in `TableOptions`.
+
+    Returns
+    -------
+    (n,) array, s
+    """
+    columns = {} if column is None else {"time": column}
+    table = read_machine_table(path, TableOptions(columns, ("time",), comment, decimal))
+    return table.values(table.column("time"), TIME_UNITS)
 
 
 def in_unit(
     readings: Array,
-    own: str,
+    file_unit: str,
     channel: Channel,
     units: Mapping[str, float],
     path: Path,
-    at: str,
+    location: str,
     key: str = "",
 ) -> Array:
-    """Return readings (rows,) by `units` from `own`, the file's; InputError: no or two units.
+    """Return readings in the base unit of a table of units.
 
-    key : the caller's name of the channel's unit.
+    Parameters
+    ----------
+    readings : (rows,) array
+    file_unit : str
+        Unit that the file says, "" if it says none.
+    channel : Channel
+    units : mapping
+    path : Path
+    location : str
+        Line and column, for messages.
+    key : str
+        The caller's name of the channel's unit, "" for that of a project.
+
+    Raises
+    ------
+    InputError
+        No unit, or two that contradict each other; numbers that are too large.
     """
-    known = ", ".join(units)
-    said = tables.scale_of(own, units) if own else None
-    raw = channel.scale is not None
+    is_known = bool(file_unit) and scale_of(file_unit, units) is not None
+    unit = channel.unit or (file_unit if channel.scale is None or is_known else "")
+    try:
+        scale = _scale(unit, file_unit, channel, units, key)
+    except ValueError as error:
+        raise InputError(path, location, str(error)) from None
     factor = 1.0 if channel.scale is None else channel.scale
-    if factor != 1.0 and said is not None:
-        raise InputError(path, at, f"is in {own} already: leave the scale {factor:g} out")
-    unit = channel.unit or ("" if raw and said is None else own)
+    with np.errstate(over="ignore"):
+        values = np.asarray((factor * readings + channel.offset) * scale)
+    if not np.isfinite(values).all():
+        raise InputError(path, location, f"numbers too large; is the unit {unit!r} right?")
+    return values
+
+
+def _scale(
+    unit: str, file_unit: str, channel: Channel, units: Mapping[str, float], key: str
+) -> float:
+    """Return base units in one unit; ValueError says why it is none or contradicts the file."""
+    file_scale = scale_of(file_unit, units) if file_unit else None
+    is_scaled = channel.scale is not None
+    if file_scale is not None and channel.scale not in (None, 1.0):
+        raise ValueError(f"is in {file_unit} already: leave the scale {channel.scale:g} out")
     if not unit:
-        what = "after scaling" if raw else "of the readings"
-        raise InputError(path, at, f"say {key or 'the unit'} {what}, one of {known}")
-    scale = tables.scale_of(unit, units)
+        stage = "after scaling" if is_scaled else "of the readings"
+        raise ValueError(f"say {key or 'the unit'} {stage}, one of {', '.join(units)}")
+    scale = scale_of(unit, units)
     if scale is None:
         advice = "a sensor in volts needs scale and unit" if unit in ("V", "mV") else "convert it"
-        raise InputError(path, at, f"unit {unit[:20]!r} is not one of {known}; {advice}")
-    if channel.unit and own and (not raw or said is not None) and said != scale:
-        asked = f"{key or 'the project'} {channel.unit!r}"
-        raise InputError(path, at, f"the file says {own!r}, {asked}; correct one of them")
-    with np.errstate(over="ignore"):
-        value = (factor * readings + channel.offset) * scale
-    if not np.isfinite(value).all():
-        raise InputError(path, at, f"numbers too large; is the unit {unit!r} right?")
-    return np.asarray(value)
+        raise ValueError(f"unit {unit[:20]!r} is not one of {', '.join(units)}; {advice}")
+    is_comparable = file_scale is not None or (file_unit and not is_scaled)
+    if channel.unit and is_comparable and file_scale != scale:
+        statement = f"{key or 'the project'} {channel.unit!r}"
+        raise ValueError(f"the file says {file_unit!r}, {statement}; correct one of them")
+    return scale

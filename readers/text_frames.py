@@ -1,61 +1,104 @@
-"""Points of a frame from text: columns by pandas, else cell by cell so that errors name lines."""
+"""Frames of image correlation from text tables, pass by pass.
 
-import csv
-import re
-from collections.abc import Iterable, Mapping, Sequence
+- header: `find_header` takes the row that names most quantities, at the best separator;
+- units: `find_units` takes them from rows of words below the names;
+- columns: `headings.columns_of`, then `quantity_columns` and `flag_columns`, name the columns;
+- summary rows: `drop_summary` cuts means and remarks off the end of the numbers;
+- numbers: `read_numbers` reads them by pandas, else cell by cell so that errors name their line.
+
+`find_layout` runs the first four, `read_text_rows` all.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import pandas as pd
-from . import frames, tables
+from .cells import (
+    MAX_LINES_ABOVE,
+    SEPARATORS,
+    Cells,
+    Lines,
+    Row,
+    check_name,
+    check_row,
+    check_width,
+    has_statistic,
+    is_numeric,
+    padded,
+    row_of,
+    split_cells,
+)
+from .frames import (
+    BELOW,
+    FLAGGED,
+    PLACES,
+    QUANTITIES,
+    Array,
+    Frame,
+    FrameOptions,
+    FrameRows,
+    frame_of,
+)
+from .headings import LENGTHS, PIXELS, Heading, columns_of, heading_of
+from .numerals import HOLES, decimal_mark, is_number
+from .quantities import MAX_COLUMNS
+from .tables import TextTable, read_lines
+from .units import without_brackets
 
-Array = NDArray[np.float64]
-#: Line number from 1 and text.
-Lines = list[tuple[int, str]]
-#: None is any number of blanks.
-SEPARATORS = ("\t", ";", ",", None)
-#: The row of names stands within so many lines; rows looked at for the decimal mark.
-TOP, SAMPLE = 300, 500
 #: Rows of units and other words between the names and the numbers.
-MOST_BELOW = 3
+MAX_UNIT_ROWS = 3
+#: Rows looked at for the decimal mark.
+MARK_ROWS = 500
+#: Rows that a numbered frame has at least, on average; where there are fewer, rows are numbered.
+MIN_ROWS_PER_FRAME = 3
+#: Flags in words, in small letters.
+FLAG_WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
+#: Names of columns that say whether a row is good, but not in which way.
+UNCLEAR_FLAGS = frozenset({"flag", "mask", "status", "quality", "state"})
+_NO_VALUE = {*HOLES, *FLAG_WORDS}
 
 
 @dataclass(frozen=True)
 class TextLayout:
-    """Layout of a file; separator None: blanks; header: line of names; below: rows left out."""
+    """Layout of a file of points.
+
+    Attributes
+    ----------
+    separator : str or None
+        What separates cells; None stands for blanks.
+    columns : mapping
+        Columns that may hold each quantity.
+    header : int
+        Line of the names.
+    body : list of (int, str)
+        Lines of the numbers.
+    summary_count : int
+        Number of rows below the points that are left out.
+    """
 
     separator: str | None
-    headings: Sequence[frames.Heading]
+    headings: Sequence[Heading]
     columns: Mapping[str, Sequence[int]]
     header: int
     body: Lines
     decimal: str
-    below: int = 0
+    summary_count: int = 0
 
+    @property
+    def names(self) -> Cells:
+        """Return the names of the columns."""
+        return [heading.name for heading in self.headings]
 
-_INCH = re.compile(r'[\[(]"[\])]')
-
-
-def cells_of(text: str, separator: str | None) -> list[str] | None:
-    """Return the cells of one line; None where a quotation mark is not closed on it."""
-    if separator is None and '"' not in text:
-        return text.split()
-    if '"' not in text:
-        return [cell.strip() for cell in text.split(separator)]
-    text = _INCH.sub("[in]", text)
-    if text.count('"') % 2:
-        return None
-    try:
-        row = next(csv.reader([text.strip()], delimiter=separator or " ", skipinitialspace=True))
-    except csv.Error:
-        return None
-    return [cell.strip(' "') for cell in row if cell or separator is not None]
+    def cells(self, text: str) -> Cells:
+        """Return the cells of a line; none if a quotation mark is not closed."""
+        return split_cells(text, self.separator) or []
 
 
 def find_layout(
@@ -66,338 +109,461 @@ def find_layout(
     decimal: str | None = None,
     upper: bool = False,
 ) -> TextLayout:
-    """Find the layout of a file, by its own names of some quantities; names may be a comment."""
-    lines = tables.read_lines(path, comment, any_encoding=True)
-    found = _best_header(lines, quantities, named, upper)
-    if found is None and comment:
+    """Find the layout of a file, by the user's names of some quantities; names may be a comment."""
+    lines = read_lines(path, comment, any_encoding=True)
+    header = find_header(lines, quantities, named, upper)
+    if header is None and comment:
         # The names may be a comment, as numpy.savetxt writes them.
-        above = [
-            (n, t.lstrip(comment).strip())
-            for n, t in tables.read_lines(path, "", any_encoding=True)
-        ]
-        first = lines[0][0] if lines else 0
-        heads = [one for one in above if one[0] < first][-2:]
-        found = _best_header(heads + lines, quantities, named, upper)
-        lines = heads + lines if found is not None else lines
-    if found is None:
-        raise InputError(path, "", _nothing_found(lines))
-    index, separator, names = found
-    header = lines[index][0]
-    body = lines[index + 1 :]
-    units = [""] * len(names)
-    # A row of units, some of them lengths, among rows below the names that have no number.
-    for k, (_, text) in enumerate(body[:MOST_BELOW]):
-        plain = [cell.strip("()[]<>{} ") for cell in cells_of(text, separator) or []]
-        words = {cell.casefold() for cell in plain} - {*tables.HOLES, *WORDS}
-        if not words or any(map(tables.is_number, plain)):
-            body = body[k:] if any(units) else body
-            break
-        if {*frames.LENGTHS, *frames.PIXELS} & words:
-            units = plain + units
-    else:
-        body = body[MOST_BELOW:] if any(units) else body
-    headings = [frames.heading_of(name, unit) for name, unit in zip(names, units, strict=False)]
-    columns = frames.columns_of(headings, named, upper)
-    total = len(body)
-    while len(body) > 1 and _is_summary(body[-1][1], body[0][1], separator):
-        body = body[:-1]
+        lines_with_names = comments_above(path, comment, lines) + lines
+        header = find_header(lines_with_names, quantities, named, upper)
+        lines = lines if header is None else lines_with_names
+    if header is None:
+        raise InputError(path, "", describe_missing_header(lines))
+    _, position, separator, names = header
+    line = lines[position][0]
+    units, unit_row_count = find_units(lines[position + 1 :], separator)
+    rows_below = lines[position + 1 + unit_row_count :]
+    body = drop_summary(rows_below, separator)
     if not body:
         problem = "expected a header line and rows of numbers, found only a header line"
-        raise InputError(path, f"line {header}", problem)
-    tables.check_width(path, header, len(names), len(body), sum(len(text) for _, text in body))
-    wanted = [i for key, where in columns.items() if key not in ("valid", "invalid") for i in where]
-    sample = [(number, cells_of(text, separator) or []) for number, text in body[:SAMPLE]]
-    cells = [(number, names[i], row[i]) for number, row in sample for i in wanted if i < len(row)]
-    mark = decimal or tables.decimal_mark(path, cells)
-    return TextLayout(separator, headings, columns, header, body, mark, total - len(body))
+        raise InputError(path, f"line {line}", problem)
+    check_width(path, line, len(names), len(body), sum(len(text) for _, text in body))
+    padded_units = units + [""] * len(names)
+    headings = [heading_of(name, unit) for name, unit in zip(names, padded_units, strict=False)]
+    columns = columns_of(headings, named, upper)
+    if decimal is None:
+        decimal = decimal_mark(path, number_cells(body, names, columns, separator))
+    summary_count = len(rows_below) - len(body)
+    return TextLayout(separator, headings, columns, line, body, decimal, summary_count)
 
 
-def _is_summary(text: str, first: str, separator: str | None) -> bool:
-    """Return whether a row has a label, "Mean", or begins with a word, unlike the `first`."""
-    row, before = (cells_of(one, separator) or [""] for one in (text, first))
-    if tables.has_statistic(row) and not tables.has_statistic(before):
-        return True
-    known = row[0].casefold() in {*tables.HOLES, *WORDS}
-    return row[0][:1].isalpha() and not known and tables.is_number(before[0])
+# Header -----------------------------------------------------------------------------------------
 
 
-def _best_header(
+class Header(NamedTuple):
+    """A row that may be that of the names, and how well it fits."""
+
+    score: tuple[int, bool, bool, bool, int]
+    position: int
+    separator: str | None
+    names: Cells
+
+
+def find_header(
     lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
-) -> tuple[int, str | None, list[str]] | None:
-    """Return the row of names with most quantities: index, separator, names."""
-    best: tuple[tuple[int, bool, bool, bool, int], int, str | None, list[str]] | None = None
+) -> Header | None:
+    """Return the row of names with most quantities."""
+    candidates = header_candidates(lines, quantities, named, upper)
+    return max(candidates, key=lambda header: header.score, default=None)
+
+
+def header_candidates(
+    lines: Lines, quantities: Sequence[str], named: Mapping[str, str], upper: bool
+) -> Iterator[Header]:
+    """Yield the rows that name two quantities or more, at each separator."""
     for separator in SEPARATORS:
-        for index, (_, text) in enumerate(lines[:TOP]):
-            names = cells_of(text, separator)
-            if names is None or not 2 <= len(names) <= tables.MOST_NAMES or _is_numbers(names):
+        for index, (_, text) in enumerate(lines[:MAX_LINES_ABOVE]):
+            names = split_cells(text, separator)
+            if names is None or not 2 <= len(names) <= MAX_COLUMNS or is_numeric(names):
                 continue
-            columns = frames.columns_of([frames.heading_of(name) for name in names], named, upper)
-            known = {key.split()[0] for key, where in columns.items() if where}
-            hits = len(known & {*quantities})
-            rows = [cells_of(text, separator) for _, text in lines[index + 1 : index + 3]]
-            numbers = [row for row in rows if row is not None and _is_numbers(row)]
+            columns = columns_of([heading_of(name) for name in names], named, upper)
+            named_quantities = {key.split()[0] for key, indices in columns.items() if indices}
+            count = len(named_quantities & {*quantities})
+            if count < 2:
+                continue
+            rows = [row_of(*line, separator).cells for line in lines[index + 1 : index + 3]]
+            rows = list(filter(is_numeric, rows))
             # A heading with a blank in it makes more names than there are numbers.
-            fits = any(len(names) in (len(row), len(row) - (not row[-1])) for row in numbers)
-            score = (hits, bool(numbers), fits, separator is not None, len(names))
-            if hits >= 2 and (best is None or score > best[0]):
-                best = score, index, separator, names
-    return None if best is None else best[1:]
+            fits = any(len(names) in (len(row), len(row) - (not row[-1])) for row in rows)
+            score = count, bool(rows), fits, separator is not None, len(names)
+            yield Header(score, index, separator, names)
 
 
-def _is_numbers(row: Sequence[str]) -> bool:
-    """Return whether half of the cells or more are numbers."""
-    return 2 * sum(tables.is_number(cell) for cell in row) >= max(len(row), 1)
+def comments_above(path: Path, comment: str, lines: Lines) -> Lines:
+    """Return the last two comments above the first line, without their marks."""
+    first = lines[0][0] if lines else 0
+    with_comments = read_lines(path, "", any_encoding=True)
+    above = [(number, text) for number, text in with_comments if number < first]
+    return [(number, text.lstrip(comment).strip()) for number, text in above[-2:]]
 
 
-def _nothing_found(lines: Lines) -> str:
+def describe_missing_header(lines: Lines) -> str:
+    """Describe what a file without names has instead of them."""
     if len(lines) < 2:
-        found = "only a header line" if lines else "nothing"
-        return f"expected a header line and rows of numbers, found {found}"
+        content = "only a header line" if lines else "nothing"
+        return f"expected a header line and rows of numbers, found {content}"
     return (
         "no row of names with places and displacements (x, y, dx, dy, dz and the like) was found;"
         f" name them with columns. Line {lines[0][0]} is: {' '.join(lines[0][1].split())[:100]}"
     )
 
 
-#: Which column is a flag, and which of its values are those of good rows; None: all but zero.
-Flag = tuple[int, Sequence[int] | None]
+# Units, summary rows, decimal mark --------------------------------------------------------------
+
+
+def find_units(rows_below: Lines, separator: str | None) -> tuple[Cells, int]:
+    """Return the units in rows of words below the names, and the number of these rows."""
+    units: Cells = []
+    count = 0
+    for line in rows_below[:MAX_UNIT_ROWS]:
+        cells = [without_brackets(cell) for cell in row_of(*line, separator).cells]
+        words = {cell.casefold() for cell in cells} - _NO_VALUE
+        if not words or any(map(is_number, cells)):
+            break
+        if words & {*LENGTHS, *PIXELS}:
+            units = cells + units
+        count += 1
+    return units, count if any(units) else 0
+
+
+def drop_summary(rows: Lines, separator: str | None) -> Lines:
+    """Return the rows without means and remarks at their end."""
+    count = len(rows)
+    while count > 1 and is_summary(rows[count - 1][1], rows[0][1], separator):
+        count -= 1
+    return rows[:count]
+
+
+def is_summary(text: str, first_text: str, separator: str | None) -> bool:
+    """Return whether a row has a label, "Mean", or begins with a word, unlike the first row."""
+    cells = split_cells(text, separator) or [""]
+    first = split_cells(first_text, separator) or [""]
+    if has_statistic(cells) and not has_statistic(first):
+        return True
+    is_word = cells[0][:1].isalpha() and cells[0].casefold() not in _NO_VALUE
+    return is_word and is_number(first[0])
+
+
+def number_cells(
+    body: Lines, names: Cells, columns: Mapping[str, Sequence[int]], separator: str | None
+) -> list[tuple[int, str, str]]:
+    """Return line, column and text of cells that should be numbers, of the first rows."""
+    indices = [i for key in columns if key not in ("valid", "invalid") for i in columns[key]]
+    rows = [row_of(*line, separator) for line in body[:MARK_ROWS]]
+    return [(r.line, names[i], r.cells[i]) for r in rows for i in indices if i < len(r.cells)]
+
+
+# Columns ----------------------------------------------------------------------------------------
+
+
+class Flag(NamedTuple):
+    """A column that says which rows are good: by its values, None for all but zero."""
+
+    column: int
+    good_values: Sequence[int] | None
 
 
 def flag_columns(
     path: Path,
     layout: TextLayout,
     columns: Mapping[str, int],
-    options: frames.FrameOptions,
+    options: FrameOptions,
     status: tuple[str, Sequence[int]] | None,
 ) -> list[Flag]:
-    """Return the flags that are named, else those of `status` and the headings."""
-    names = [heading.name for heading in layout.headings]
-    asked: list[tuple[str | None, Sequence[int] | None]]
-    asked = [(options.flag_column, (0,)), (options.valid_column, None)]
-    found = [
-        (_named(path, names, name.strip(' "')), good) for name, good in asked if name is not None
-    ]
-    if found:
-        return found
+    """Return the flags that the user names, else those of `status` and the headings."""
+    names = layout.names
+    flags = []
+    if options.flag_column is not None:
+        flags.append(Flag(column_called(path, names, options.flag_column.strip(' "')), (0,)))
+    if options.valid_column is not None:
+        flags.append(Flag(column_called(path, names, options.valid_column.strip(' "')), None))
+    if flags:
+        return flags
     if status is not None and status[0] in names:
-        return [(names.index(status[0]), status[1])]
-    shown: list[tuple[str, Sequence[int] | None]] = [("valid", None), ("invalid", (0,))]
-    return [(columns[key], good) for key, good in shown if key in columns]
+        return [Flag(names.index(status[0]), status[1])]
+    by_heading: dict[str, tuple[int, ...] | None] = {"valid": None, "invalid": (0,)}
+    return [Flag(columns[key], good) for key, good in by_heading.items() if key in columns]
 
 
-def _one(
-    path: Path, layout: TextLayout, key: str, where: Sequence[int], named: Mapping[str, str]
-) -> int:
-    """Return the one column of a quantity."""
-    if len(where) == 1:
-        return where[0]
-    names = [heading.name for heading in layout.headings]
-    may = [names[i] for i in where]
-    if len({*may}) == 1:
-        cells = (cells_of(text, layout.separator) or [] for _, text in layout.body)
-        # A column that comes twice with the same cells is one.
-        if all(len({tuple(row[i : i + 1]) for i in where}) == 1 for row in cells):
-            return where[0]
-    if key in named or len({*may}) == 1:
-        return _named(path, names, named.get(key) or may[0])
-    several = " or ".join(repr(name) for name in may[:6])
-    problem = f"the column of {key} may be {several}; name one with columns"
-    raise InputError(path, f"line {layout.header}", problem)
-
-
-def _named(path: Path, names: Sequence[str], name: str) -> int:
-    tables.check_one(path, names, name)
+def column_called(path: Path, names: Cells, name: str) -> int:
+    """Return the column of a name, which must be there once."""
+    check_name(path, names, name)
     return names.index(name)
 
 
 def quantity_columns(
-    path: Path, layout: TextLayout, named: Mapping[str, str], options: frames.FrameOptions
+    path: Path, layout: TextLayout, named: Mapping[str, str], options: FrameOptions
 ) -> dict[str, int]:
-    """Return the one column of each quantity and flag; `named` gives the file's own names."""
-    # Numbers of frames and points help where they are there, clear, and of use.
-    unclear = {key for key in ("frame", "id") if not _numbers(layout, key)}
-    unclear |= {"id"} if options.quantities != frames.PLACES else set()
-    found = {key: where for key, where in layout.columns.items() if key not in unclear}
-    columns = {key: _one(path, layout, key, where, named) for key, where in found.items()}
-    if options.quantities == frames.PLACES and not {*frames.QUANTITIES} & {*columns}:
-        columns |= {
-            q: columns.pop(f"{q} deformed") for q in frames.PLACES if f"{q} deformed" in columns
-        }
-    planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
+    """Return the column of each quantity and flag; `named` are the user's names of some."""
+    columns = {
+        key: single_column(path, layout, key, candidates, named)
+        for key, candidates in layout.columns.items()
+        if key not in ("frame", "id") or has_numbers(layout, key, options)
+    }
+    if options.quantities == PLACES and not {*QUANTITIES} & {*columns}:
+        # Of a file of positions alone, those after the motion are meant.
+        for axis in PLACES:
+            if f"{axis} deformed" in columns:
+                columns[axis] = columns.pop(f"{axis} deformed")
+    is_planar = options.planar and not {"z", "dz", "z deformed"} & {*columns}
     for quantity in options.quantities:
-        axis = quantity[-1]
-        both = {axis, f"d{axis}"} - {quantity}
-        computed = f"{axis} deformed" in columns and both <= {*columns}
-        if quantity not in columns and not computed and not (planar and axis == "z"):
-            there = ", ".join(heading.name for heading in layout.headings)[:300]
-            problem = f"this column is missing; the file has: {there}"
+        if quantity in columns or is_computed(quantity, columns):
+            continue
+        if not (is_planar and quantity[-1] == "z"):
+            problem = f"this column is missing; the file has: {', '.join(layout.names)[:300]}"
             raise InputError(path, f"column {quantity!r}", problem)
     return columns
 
 
-def _numbers(layout: TextLayout, key: str) -> bool:
-    """Return whether one column is of this kind, and begins with a number, no name."""
-    where = layout.columns.get(key, ())
-    row = cells_of(layout.body[0][1], layout.separator) or []
-    return len(where) == 1 and where[0] < len(row) and tables.is_number(row[where[0]])
+def has_numbers(layout: TextLayout, key: str, options: FrameOptions) -> bool:
+    """Return whether numbers of frames or points are clear, of use, and no names."""
+    if key == "id" and options.quantities != PLACES:
+        return False
+    if len(layout.columns[key]) != 1:
+        return False
+    (column,) = layout.columns[key]
+    cells = layout.cells(layout.body[0][1])
+    return column < len(cells) and is_number(cells[column])
 
 
-#: Flags in words, in small letters.
-WORDS = {"true": 1.0, "false": 0.0, "yes": 1.0, "no": 0.0, "valid": 1.0, "invalid": 0.0}
+def is_computed(quantity: str, columns: Mapping[str, int]) -> bool:
+    """Return whether a position or displacement follows from the other and the position after."""
+    axis = quantity[-1]
+    counterpart = {axis, f"d{axis}"} - {quantity}
+    return f"{axis} deformed" in columns and counterpart <= {*columns}
+
+
+def single_column(
+    path: Path, layout: TextLayout, key: str, candidates: Sequence[int], named: Mapping[str, str]
+) -> int:
+    """Return the column of a quantity; a column that comes twice with the same cells is one."""
+    if len(candidates) == 1:
+        return candidates[0]
+    names = [layout.headings[i].name for i in candidates]
+    is_repeated = len({*names}) == 1
+    if is_repeated and have_same_cells(layout, candidates):
+        return candidates[0]
+    if is_repeated or key in named:
+        return column_called(path, layout.names, named.get(key) or names[0])
+    listed = " or ".join(map(repr, names[:6]))
+    problem = f"the column of {key} may be {listed}; name one with columns"
+    raise InputError(path, f"line {layout.header}", problem)
+
+
+def have_same_cells(layout: TextLayout, columns: Sequence[int]) -> bool:
+    """Return whether columns have the same cells in every row."""
+    rows = (layout.cells(text) for _, text in layout.body)
+    return all(len({tuple(row[i : i + 1]) for i in columns}) == 1 for row in rows)
+
+
+# Numbers ----------------------------------------------------------------------------------------
+
+#: Numbers (good rows,) by quantity, and the mask (rows,) of good rows.
+Numbers = tuple[dict[str, Array], NDArray[np.bool_]]
 
 
 def read_numbers(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
-) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Return the numbers (good rows,) by quantity, and the mask (rows,) of rows that flags pass."""
-    return _quick(layout, columns, flags) or _slow(path, layout, columns, flags)
+) -> Numbers:
+    """Return the numbers of all rows that pass the flags, and the mask of these rows."""
+    return _read_fast(layout, columns, flags) or _read_cells(path, layout, columns, flags)
 
 
-def _quick(
+def _read_fast(
     layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
-) -> tuple[dict[str, Array], NDArray[np.bool_]] | None:
-    """Read all rows by pandas; None where they have to be read one by one."""
-    separator = layout.separator
-    width = len(layout.headings)
+) -> Numbers | None:
+    """Read all rows by pandas; None where they have to be read cell by cell."""
     texts = [text for _, text in layout.body]
-    if separator is None and {len(text.split()) for text in texts} != {width}:
+    if not _is_regular(texts, layout.separator, len(layout.headings)):
         return None
-    if separator is not None:
-        # pandas takes what it needs of a row that is too long, so that a cell with a decimal
-        # comma would shift the rest.
-        counts = {text.count(separator) for text in texts}
-        if not (counts <= {width - 1} or counts <= {width}) or any('"' in text for text in texts):
-            return None
-        if counts == {width} and any(not text.rstrip().endswith(separator) for text in texts):
-            return None
-    wanted = sorted({*columns.values(), *(i for i, _ in flags)})
-    holes = [
-        word for hole in tables.HOLES for word in {hole, hole.upper(), hole.replace("nan", "NaN")}
-    ]
+    flag_indices = [flag for flag, _ in flags]
+    table = _parse_fast(texts, layout, sorted({*columns.values(), *flag_indices}))
+    if table is None or table[flag_indices].isna().any(axis=None):
+        return None
+    good = _pass_flags(((table[i].to_numpy(), values) for i, values in flags), len(table))
+    return {key: table[i].to_numpy(dtype=float)[good] for key, i in columns.items()}, good
+
+
+def _is_regular(texts: Sequence[str], separator: str | None, width: int) -> bool:
+    """Return whether all rows have a cell a name, perhaps with one more separator at the end.
+
+    pandas takes what it needs of a row that is too long, so that a cell with a decimal comma would
+    shift the others.
+    """
+    if separator is None:
+        return {len(text.split()) for text in texts} == {width}
+    if any('"' in text for text in texts):
+        return False
+    counts = {text.count(separator) for text in texts}
+    if counts == {width}:
+        return all(text.rstrip().endswith(separator) for text in texts)
+    return counts <= {width - 1}
+
+
+def _parse_fast(texts: list[str], layout: TextLayout, indices: list[int]) -> pd.DataFrame | None:
+    """Return columns as finite numbers, NaN for holes; None if a cell is neither."""
+    separator = layout.separator
+    holes = {form for hole in HOLES for form in (hole, hole.upper(), hole.replace("nan", "NaN"))}
     try:
         table = pd.read_csv(
             StringIO("\n".join(texts)),
             header=None,
             sep=separator or r"\s+",
             decimal=layout.decimal,
-            usecols=None if separator is None else wanted,
-            dtype=dict.fromkeys(wanted, float),
-            na_values=holes,
+            usecols=None if separator is None else indices,
+            dtype=dict.fromkeys(indices, float),
+            na_values=sorted(holes),
             keep_default_na=False,
             skipinitialspace=True,
         )
     except (ValueError, OverflowError, KeyError):
         return None
-    if len(table) != len(texts) or (separator is None and table.shape[1] != width):
+    if len(table) != len(texts):
         return None
-    if np.isinf(table[wanted].to_numpy()).any() or any(table[i].isna().any() for i, _ in flags):
+    if separator is None and table.shape[1] != len(layout.headings):
         return None
-    good = _passed(((table[i].to_numpy(), values) for i, values in flags), len(table))
-    return {key: table[i].to_numpy(dtype=float)[good] for key, i in columns.items()}, good
+    return None if np.isinf(table[indices].to_numpy()).any() else table
 
 
-def _passed(flags: Iterable[tuple[Array, Sequence[int] | None]], count: int) -> NDArray[np.bool_]:
+def _pass_flags(
+    flags: Iterable[tuple[Array, Sequence[int] | None]], count: int
+) -> NDArray[np.bool_]:
     """Return the mask of rows whose flags are among the good values; None: all but zero."""
     good = np.ones(count, dtype=bool)
-    for flag, values in flags:
-        good &= (flag != 0) if values is None else np.isin(flag, values)
+    for flag, good_values in flags:
+        good &= flag != 0 if good_values is None else np.isin(flag, good_values)
     return good
 
 
-def _slow(
+def _read_cells(
     path: Path, layout: TextLayout, columns: Mapping[str, int], flags: Sequence[Flag]
-) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Read row by row, flags first: a doubtful row may hold anything."""
-    width = len(layout.headings)
-    rows = []
-    for number, text in layout.body:
-        row = cells_of(text, layout.separator)
-        if row is None:
-            problem = "a quotation mark that is opened and not closed"
-            raise InputError(path, f"line {number}", problem)
-        # Blanks leave no empty cells: a short row has lost its place.
-        tables.check_row(path, number, row, width, layout.separator, "the header", short=True)
-        rows.append((row + [""] * width)[:width])
-    lines = np.array([number for number, _ in layout.body])
-    # By position: names may appear twice where they are not asked for.
-    cells = pd.DataFrame(rows, dtype=str)
-
-    def table(i: int, keep: NDArray[np.bool_]) -> tuple[tables.TextTable, str]:
-        name = layout.headings[i].name
-        one = cells[[i]][keep].set_axis([name], axis=1)
-        return tables.TextTable(path, one, lines[keep], layout.decimal), name
-
-    def flag_of(i: int) -> Array:
-        flag = np.asarray(cells[i].str.casefold().map(WORDS), dtype=float)
-        one, name = table(i, np.ones(len(rows), dtype=bool))
-        return one.numbers(name) if np.isnan(flag).any() else flag
-
-    good = _passed(((flag_of(i), values) for i, values in flags), len(rows))
-    kept = {key: table(i, good) for key, i in columns.items()}
-    return {key: one.numbers(name, holes=True) for key, (one, name) in kept.items()}, good
+) -> Numbers:
+    """Read cell by cell, flags first: a doubtful row may hold anything."""
+    table = _CellTable(path, layout)
+    flag_values = ((table.flag(index), good_values) for index, good_values in flags)
+    good = _pass_flags(flag_values, len(layout.body))
+    return {key: table.numbers(index, good, holes=True) for key, index in columns.items()}, good
 
 
-#: Rows that a numbered frame has at least; fewer number the rows.
-LEAST_ROWS = 3
-#: Names of columns that say whether a row is good, but not in which way.
-UNCLEAR = frozenset({"flag", "mask", "status", "quality", "state"})
+class _CellTable:
+    """Cells of the body, by position: names may appear twice where they are not used."""
+
+    def __init__(self, path: Path, layout: TextLayout) -> None:
+        self.path = path
+        self.layout = layout
+        width = len(layout.headings)
+        rows = []
+        for number, text in layout.body:
+            cells = split_cells(text, layout.separator)
+            if cells is None:
+                problem = "a quotation mark that is opened and not closed"
+                raise InputError(path, f"line {number}", problem)
+            check_row(path, Row(number, cells), width, layout.separator, "the header")
+            rows.append(padded(cells, width))
+        self.cells = pd.DataFrame(rows, dtype=str)
+        self.lines = np.array([number for number, _ in layout.body])
+
+    def numbers(self, index: int, mask: NDArray[np.bool_], holes: bool) -> Array:
+        """Return the numbers of a column in some rows."""
+        name = self.layout.headings[index].name
+        column = self.cells[[index]][mask].set_axis([name], axis=1)
+        table = TextTable(self.path, column, self.lines[mask], self.layout.decimal)
+        return table.numbers(name, holes)
+
+    def flag(self, index: int) -> Array:
+        """Return the flags in a column, words or numbers."""
+        values = np.asarray(self.cells[index].str.casefold().map(FLAG_WORDS), dtype=float)
+        if not np.isnan(values).any():
+            return values
+        return self.numbers(index, np.ones(len(self.lines), dtype=bool), holes=False)
 
 
-def read_text(
-    path: Path, options: frames.FrameOptions, format: str, **settings: Any
-) -> list[frames.Frame]:
-    """Read the frames of a text file; format : its name. settings : of `read_text_rows`."""
-    every = read_text_rows(path, options, **settings)
-    return [frames.frame_of(rows, options, path, format) for rows in every]
+# Frames -----------------------------------------------------------------------------------------
+
+
+def read_text(path: Path, options: FrameOptions, format: str, **settings: Any) -> list[Frame]:
+    """Read the frames of a text file by a format's name and its settings of `read_text_rows`."""
+    rows_of_frames = read_text_rows(path, options, **settings)
+    return [frame_of(rows, options, path, format) for rows in rows_of_frames]
 
 
 def read_text_rows(
     path: Path,
-    options: frames.FrameOptions,
+    options: FrameOptions,
     *,
     comment: str | None = None,
     upper: bool = False,
     camera_axes: bool = False,
     names: Mapping[str, str] | None = None,
     status: tuple[str, Sequence[int]] | None = None,
-) -> list[frames.FrameRows]:
+) -> list[FrameRows]:
     """Read the rows of the frames in a text file: one, or as many as a column numbers.
 
-    names : the format's names, after the user's. status : a column of states, its good values.
+    Parameters
+    ----------
+    path : Path
+    options : FrameOptions
+        Quantities that are needed, and what the user says of the file.
+    comment : str, optional
+        What comments begin with, in place of that of the options.
+    upper : bool
+        Whether of two names that differ in case the large one is a length.
+    camera_axes : bool
+        Whether y points down and z away from the camera.
+    names : mapping, optional
+        The format's names of quantities; those of the user come first.
+    status : (str, sequence of int), optional
+        A column of states, and the values of good rows.
+
+    Returns
+    -------
+    list of FrameRows
+
+    Raises
+    ------
+    InputError
+        There is no table of points, or it may be read in two ways.
     """
-    own = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
-    named = {**(names or {}), **own}
+    user_names = {key: name.strip(' "') for key, name in (options.columns or {}).items()}
+    named = {**(names or {}), **user_names}
     mark = options.comment if comment is None else comment
     layout = find_layout(path, options.quantities, named, mark, options.decimal, upper)
     columns = quantity_columns(path, layout, named, options)
     flags = flag_columns(path, layout, columns, options, status)
-    numbers = {key: i for key, i in columns.items() if key not in ("valid", "invalid")}
-    values, good = read_numbers(path, layout, numbers, flags)
-    sigma, ids, frame = (values.pop(key, None) for key in ("sigma", "id", "frame"))
-    headings = {key: layout.headings[i] for key, i in numbers.items() if key in values}
-    notes = tuple(
-        f"column {heading.name!r} is not used; flag_column or valid_column says what it means"
-        for heading in layout.headings
-        if heading.name.casefold() in UNCLEAR
-        and heading.name not in (options.flag_column, options.valid_column)
+    columns = {key: index for key, index in columns.items() if key not in ("valid", "invalid")}
+    values, good = read_numbers(path, layout, columns, flags)
+    sigma, ids, frame_numbers = (values.pop(key, None) for key in ("sigma", "id", "frame"))
+    headings = {key: layout.headings[columns[key]] for key in values}
+    rows = FrameRows(
+        values,
+        names={key: heading.name for key, heading in headings.items()},
+        units={key: heading.unit for key, heading in headings.items() if heading.unit},
+        sigma=sigma,
+        camera_axes=camera_axes,
+        dropped={FLAGGED: int((~good).sum()), BELOW: layout.summary_count},
+        notes=unused_flags(layout, options),
+        ids=ids,
     )
-    named = {key: heading.name for key, heading in headings.items()}
-    units = {key: heading.unit for key, heading in headings.items() if heading.unit}
-    lost = {frames.FLAGGED: int((~good).sum()), frames.BELOW: layout.below}
-    whole = frames.FrameRows(values, named, units, None, sigma, camera_axes, lost, notes, ids)
-    if frame is None:
-        return [whole]
-    every = np.unique(frame)
-    if len(every) < 2 or LEAST_ROWS * len(every) > len(frame) or np.isnan(every).any():
-        return [whole]
-    return [
-        replace(
-            whole,
-            values={key: value[frame == number] for key, value in values.items()},
-            sigma=None if sigma is None else sigma[frame == number],
-            number=float(number),
-            ids=None if ids is None else ids[frame == number],
-            dropped=lost if number == every[0] else {},
+    return [rows] if frame_numbers is None else split_frames(rows, frame_numbers)
+
+
+def unused_flags(layout: TextLayout, options: FrameOptions) -> tuple[str, ...]:
+    """Return a note on each column that may be a flag and is not used."""
+    return tuple(
+        f"column {name!r} is not used; flag_column or valid_column says what it means"
+        for name in layout.names
+        if name.casefold() in UNCLEAR_FLAGS
+        and name not in (options.flag_column, options.valid_column)
+    )
+
+
+def split_frames(rows: FrameRows, frame_numbers: Array) -> list[FrameRows]:
+    """Return the rows of each frame by numbers (rows,); all together where rows are numbered."""
+    numbers = np.unique(frame_numbers)
+    row_count = len(frame_numbers)
+    if not 1 < len(numbers) <= row_count / MIN_ROWS_PER_FRAME or np.isnan(numbers).any():
+        return [rows]
+    frames = []
+    for number in numbers:
+        in_frame = frame_numbers == number
+        frames.append(
+            replace(
+                rows,
+                values={key: value[in_frame] for key, value in rows.values.items()},
+                sigma=None if rows.sigma is None else rows.sigma[in_frame],
+                number=float(number),
+                ids=None if rows.ids is None else rows.ids[in_frame],
+                dropped=rows.dropped if number == numbers[0] else {},
+            )
         )
-        for number in every
-    ]
+    return frames

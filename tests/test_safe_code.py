@@ -10,7 +10,7 @@ from bubblefit.errors import InputError
 from bubblefit.experiments.kinds import Output
 from bubblefit.materials.card import MaterialCard, read_card, write_card
 from bubblefit.project.project import read_project
-from bubblefit.readers.pressure_log import number_in_name
+from bubblefit.readers.numbers_in_names import number_in_name
 from bubblefit.readers.sections import PRESSURE_UNITS
 from bubblefit.reports.charts import Chart, Charts, Series
 from bubblefit.reports.content import Download, Facts, Listing, Report, Section, Table, Words
@@ -218,7 +218,7 @@ def test_a_pattern_of_names_takes_a_number_and_nothing_else(tmp_path):
 
 
 def test_a_pattern_that_never_ends_is_given_up(monkeypatch):
-    monkeypatch.setattr("bubblefit.readers.pressure_log.SEARCH_SECONDS", 0.3)
+    monkeypatch.setattr("bubblefit.readers.numbers_in_names.SEARCH_SECONDS", 0.3)
     begun = time.monotonic()
     path = Path("a" * 60 + "!kPa")
     said = complaint(number_in_name, path, PRESSURE_UNITS, "(a+)+$", "kPa", "from_name")

@@ -29,7 +29,8 @@ from bubblefit.readers.sections import (
     beside,
     first_error,
 )
-from bubblefit.readers.tables import LOAD_UNITS, WIDTH_LOAD_UNITS, read_lines
+from bubblefit.readers.tables import read_lines
+from bubblefit.readers.units import LOAD_UNITS, WIDTH_LOAD_UNITS
 from bubblefit.solvers.marc.settings import site_settings
 from pydantic import Field, TypeAdapter, ValidationError
 

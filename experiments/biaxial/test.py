@@ -24,8 +24,9 @@ from ...meshes.strip_models import PatchModel
 from ...readers.frames import FrameSource
 from ...readers.histories import LoadHistory, Pace, pace_of, turns
 from ...readers.machine_tables import Channel, TableOptions, read_machine_table
+from ...readers.quantities import PAIRS
 from ...readers.sections import Length, Name, Number, Positive, Section
-from ...readers.tables import LOAD_UNITS, PAIRS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
+from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ..kinds import Array, Place, Reach, Refined, SectionTest, listed_files, named_format
 
 #: Ratios that a pair of loads may be taken for.

@@ -8,11 +8,11 @@ import numpy as np
 from ...errors import Against, Note, NoteKind, apart
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import METRIC
-from ...readers.pressure_log import ClockOffset
+from ...readers.clock_offset import ClockOffset
 from ..kinds import Array, FittedTest
 from .objective import FieldObjective
-from .point_files import RecordedFrames
 from .prepared import PreparedBubble
+from .recorded_frames import RecordedFrames
 from .registration import Registration
 from .section import DIRECTIONS
 
@@ -139,7 +139,11 @@ def constant_field(fitted: FittedTest) -> tuple[Array, Array]:
 
 def recorded_numbers(taken: RecordedFrames) -> dict[str, Any]:
     """Return the entries of result.json on the frames: pressures in kPa, the offset in s."""
-    kilos = {"pressure_kPa": taken.pressure, "asked_kPa": taken.asked, "uncertain_kPa": taken.doubt}
+    kilos = {
+        "pressure_kPa": taken.pressure,
+        "asked_kPa": taken.requested,
+        "uncertain_kPa": taken.doubt,
+    }
     known = {name: own for name, own in kilos.items() if own is not None}
     numbers: dict[str, Any] = {
         "from": taken.source,
@@ -163,9 +167,9 @@ def recorded_lines(taken: RecordedFrames) -> list[str]:
     left_out = "".join(f", {count} {why}" for why, count in taken.left_out.items())
     count = f"{len(taken.names)} of {taken.count} frames taken{left_out}"
     lines = [f"pressures from {taken.source}: {count}"]
-    if taken.asked is not None:
-        worst = int(np.argmax(np.abs(taken.pressure - taken.asked)))
-        found, asked = apart(1e3 * taken.pressure[worst], 1e3 * taken.asked[worst], 4)
+    if taken.requested is not None:
+        worst = int(np.argmax(np.abs(taken.pressure - taken.requested)))
+        found, asked = apart(1e3 * taken.pressure[worst], 1e3 * taken.requested[worst], 4)
         if found != asked:
             lines[0] += f"; farthest from the pressure asked for: {found} in place of {asked} kPa"
     lines += [] if taken.inflations is None else [taken.inflations.line]

@@ -20,8 +20,8 @@ from ...materials.forms.base import COMPONENTS
 from ...materials.law import HypoelasticLaw
 from ...meshes.bubble_model import BubbleModel
 from ...meshes.disk import Outline
+from ...readers.clock_offset import ClockOffset
 from ...readers.fields import DisplacementField, surface_table
-from ...readers.pressure_log import ClockOffset
 from ...reports import bubbles
 from ...reports.charts import Chart, Charts, dots
 from ...reports.content import Exhibit, Part, Table
@@ -45,8 +45,9 @@ from . import findings as wording
 from .doubts import View
 from .findings import fitted_model, objective_of
 from .objective import OFFSETS, amounts_of
-from .point_files import PointFiles, RecordedFrames
+from .point_files import PointFiles
 from .prepared import PreparedBubble
+from .recorded_frames import RecordedFrames
 from .registration import Registration
 from .section import DIRECTIONS, CorrelationSection, Sheet
 from .sheet import at_nodes, states
@@ -415,9 +416,9 @@ def recorded_table(taken: RecordedFrames) -> Table:
         "frame": taken.names,
         "pressure, kPa": [1e3 * p for p in taken.pressure.tolist()],
     }
-    if taken.asked is not None:
-        columns["asked for, kPa"] = [1e3 * float(a) for a in taken.asked]
-        columns["farther by, kPa"] = [1e3 * float(off) for off in taken.pressure - taken.asked]
+    if taken.requested is not None:
+        columns["asked for, kPa"] = [1e3 * float(a) for a in taken.requested]
+        columns["farther by, kPa"] = [1e3 * float(off) for off in taken.pressure - taken.requested]
     if taken.doubt is not None and taken.clock is not None and taken.clock.misfit is not None:
         columns["uncertain by the clocks, +- kPa"] = [1e3 * float(d) for d in taken.doubt]
     rows = [list(row) for row in zip(*columns.values(), strict=True)]

@@ -13,7 +13,8 @@ from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
 from ...meshes.disk import Outline, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
-from ...readers.histories import LoadHistory, Pace, Which, pace_of
+from ...readers.histories import LoadHistory, Pace, pace_of
+from ...readers.inflations import InflationChoice
 from ...readers.sections import whole_in_base_units
 from ...solvers.base import History
 from ..kinds import Place, Reach, Refined, SectionTest, Studied, divided
@@ -104,7 +105,7 @@ class BubbleTest(SectionTest):
     facet: Facet | None = None
     of_clamp: bool = False  # the radius is that of the clamp, found in the data
     registration: Mapping[str, float] = field(default_factory=dict)
-    inflation: Which = 1
+    inflation: InflationChoice = 1
     cords: tuple[SheetCord, ...] = ()
     kind: str = "bubble"
     reach: ClassVar[Reach] = Reach()  # known only when its law is

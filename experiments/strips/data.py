@@ -20,7 +20,7 @@ from ...readers.curves import (
 )
 from ...readers.frames import FrameSource
 from ...readers.registry import format_of
-from ...readers.tables import STRAIN_UNITS
+from ...readers.units import STRAIN_UNITS
 from ..kinds import Array, DataFile, Doubt, Expected
 
 

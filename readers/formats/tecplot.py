@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...files import pandas as pd
-from ..frames import Frame, FrameOptions, FrameRows, Heading, columns_of, frame_of, heading_of
+from ..frames import Frame, FrameOptions, FrameRows, frame_of
+from ..headings import Heading, columns_of, heading_of
+from ..numerals import is_number
 from ..registry import Format, register_format
-from ..tables import is_number, read_lines
+from ..tables import read_lines
 
 _VARIABLES = re.compile(rb"^[ \t]*+VARIABLES[ \t]*+=", re.IGNORECASE | re.MULTILINE)
 _WORD = re.compile(r"^\s*(TITLE|VARIABLES|ZONE|DATASETAUXDATA|TEXT|GEOMETRY)\b", re.IGNORECASE)

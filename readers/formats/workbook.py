@@ -11,10 +11,11 @@ from typing import Any
 
 from ...errors import InputError
 from ...files import content_of
-from ..machine_export import Row, Rows, find_header, quantity_words, table_from_rows
+from ..cells import Row, Rows
+from ..machine_export import find_header, quantity_words, table_from_rows
 from ..machine_tables import MachineTable, TableOptions
+from ..quantities import MAX_COLUMNS
 from ..registry import Format, register_format
-from ..tables import MOST_NAMES
 
 #: Bytes of a workbook, and of all its parts unpacked; cells of a sheet.
 LARGEST, UNPACKED, MOST_CELLS = 50 * 2**20, 500 * 2**20, 5_000_000
@@ -65,7 +66,7 @@ def _rows(path: Path, sheet: Any) -> Rows:
     sheet.reset_dimensions()  # what a file says of its size may be wrong
     found: Rows = []
     cells = 0
-    for number, row in enumerate(sheet.iter_rows(max_col=MOST_NAMES, values_only=True), start=1):
+    for number, row in enumerate(sheet.iter_rows(max_col=MAX_COLUMNS, values_only=True), start=1):
         cells += len(row) + 1
         if cells > MOST_CELLS:
             raise InputError(path, "", f"a sheet has more than {MOST_CELLS} cells; save it as CSV")

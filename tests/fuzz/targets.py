@@ -15,15 +15,16 @@ from bubblefit.experiments.kinds import Reach
 from bubblefit.materials.card import MaterialCard, read_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
-from bubblefit.readers import mat_files, pressure_log
+from bubblefit.readers import mat_files, numbers_in_names
 from bubblefit.readers.bending import read_bending_curves
 from bubblefit.readers.curves import read_load_curves, read_published_polynomials
 from bubblefit.readers.fields import read_fields
 from bubblefit.readers.frames import FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, read_machine_loads, read_times
-from bubblefit.readers.pressure_log import read_pressure_log, values_in_file
+from bubblefit.readers.pressure_log import read_pressure_log
 from bubblefit.readers.registry import format_names
-from bubblefit.readers.tables import PRESSURE_UNITS
+from bubblefit.readers.units import PRESSURE_UNITS
+from bubblefit.readers.values_in_files import values_in_file
 from bubblefit.runs.setup import bounds_of, law_of
 from bubblefit.solvers.calculix.frd import FrdFile
 from bubblefit.solvers.exports import FORMATS
@@ -39,7 +40,7 @@ from ..places import EXAMPLES, ROOT
 from ..solvers.calculix import test_frd
 
 # A damaged HDF5 file is given up sooner than a user's.
-mat_files.SECONDS = pressure_log.SEARCH_SECONDS = 2.0
+mat_files.SECONDS = numbers_in_names.SEARCH_SECONDS = 2.0
 
 #: What the data of a test would say of the law.
 REACH = Reach((0.2, 0.2, 0.5), ((0.3, 0.6), (0.3, 0.6), (0.3, 0.6)))

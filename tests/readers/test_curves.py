@@ -12,7 +12,7 @@ from bubblefit.readers.curves import LoadCurve, read_load_curves, split_at_resta
 from bubblefit.readers.formats import workbook as xlsx
 from bubblefit.readers.machine_tables import read_machine_loads, read_times
 from bubblefit.readers.pressure_log import read_pressure_log
-from bubblefit.readers.tables import split_unit
+from bubblefit.readers.units import split_unit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

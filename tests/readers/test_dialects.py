@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from bubblefit.experiments.biaxial.test import read_biaxial_table
 from bubblefit.readers.curves import read_load_curves
-from bubblefit.readers.frames import BELOW, LENGTHS, FrameOptions, read_frames
+from bubblefit.readers.frames import BELOW, FrameOptions, read_frames
+from bubblefit.readers.headings import LENGTHS
 from bubblefit.readers.pressure_log import read_pressure_log
 
 from ..complaints import complaint_with

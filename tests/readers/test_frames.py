@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from bubblefit.experiments.strips.gauge import virtual_strain_gauge
 from bubblefit.readers.fields import QUANTITIES, read_fields
+from bubblefit.readers.frame_choice import AT_REST_FRAME_CHOICE as AT_REST
+from bubblefit.readers.frame_choice import BEYOND, RELEASED, REPEATED, choose_frames
 from bubblefit.readers.frames import FrameOptions, FrameRows, frame_files, frame_of, read_frames
 from bubblefit.readers.mat_files import read_variables
-from bubblefit.readers.pressure_log import AT_REST_FRAME_CHOICE as AT_REST
-from bubblefit.readers.pressure_log import BEYOND, RELEASED, REPEATED, choose_frames
 from bubblefit.readers.registry import format_of
 from hypothesis import given
 from hypothesis import strategies as st

@@ -4,24 +4,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers import tables
 from bubblefit.readers.bending import read_bending_curves
+from bubblefit.readers.clock_offset import find_offset
 from bubblefit.readers.curves import LoadCurve, split_at_restarts
 from bubblefit.readers.fields import DisplacementField, fit_surface
 from bubblefit.readers.formats import text_exports
+from bubblefit.readers.frame_choice import REPEATED, choose_frames
 from bubblefit.readers.frames import Frame, FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, in_unit
-from bubblefit.readers.pressure_log import (
-    REPEATED,
-    apex_height,
-    check_pattern,
-    choose_frames,
-    find_offset,
-    number_in_name,
-    read_pressure_log,
-    values_in_file,
+from bubblefit.readers.numbers_in_names import check_pattern, number_in_name
+from bubblefit.readers.pressure_log import apex_height, read_pressure_log
+from bubblefit.readers.quantities import means, nearest_to_strip
+from bubblefit.readers.units import (
+    LENGTH_UNITS,
+    LOAD_UNITS,
+    PRESSURE_UNITS,
+    TIME_UNITS,
+    WIDTH_LOAD_UNITS,
+    scale_of,
+    split_unit,
 )
-from bubblefit.readers.tables import PRESSURE_UNITS, TIME_UNITS
+from bubblefit.readers.values_in_files import values_in_file
 
 from ..complaints import complaint, complaint_with
 
@@ -31,22 +34,20 @@ def test_units_of_columns_are_those_of_si():
         "Pa": 1, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "psi": 0.45359237 * 9.80665 / 0.0254**2,
         "bar": 1e5, "MPa": 1e6,
     }  # fmt: skip
-    assert {k: 1e6 * v for k, v in tables.PRESSURE_UNITS.items()} == pytest.approx(pascal)
+    assert {k: 1e6 * v for k, v in PRESSURE_UNITS.items()} == pytest.approx(pascal)
     lengths = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8, "um": 1e-3, "mil": 0.0254}
-    assert (
-        pytest.approx(lengths | dict.fromkeys(("\u00b5m", "\u03bcm"), 1e-3)) == tables.LENGTH_UNITS
-    )
+    assert pytest.approx(lengths | dict.fromkeys(("\u00b5m", "\u03bcm"), 1e-3)) == LENGTH_UNITS
     pond, pound = 9.80665e-3, 0.45359237 * 9.80665
     loads = {"N": 1.0, "kN": 1e3, "daN": 10.0, "mN": 1e-3, "gf": pond, "lbf": pound}
     loads |= {"kip": 1e3 * pound, "ozf": pound / 16}
-    assert pytest.approx(loads | {"kgf": 1e3 * pond, "kp": 1e3 * pond}) == tables.LOAD_UNITS
+    assert pytest.approx(loads | {"kgf": 1e3 * pond, "kp": 1e3 * pond}) == LOAD_UNITS
     per_metre = {"kN/m": 1e3, "N/mm": 1e3, "N/m": 1.0, "N/cm": 1e2, "N/50mm": 20.0}
     per_metre |= {"N/5cm": 20.0, "daN/5cm": 200.0, "lbf/in": pound / 0.0254}
-    found = {k: 1e3 * v for k, v in tables.WIDTH_LOAD_UNITS.items()}
+    found = {k: 1e3 * v for k, v in WIDTH_LOAD_UNITS.items()}
     assert found == pytest.approx(per_metre)
-    assert tables.TIME_UNITS == {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+    assert TIME_UNITS == {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
     for unit, newton in {"n": 1.0, "kn": 1e3, "KN": 1e3, "N": 1.0, "MN": None}.items():
-        assert tables.scale_of(unit, tables.LOAD_UNITS) == newton
+        assert scale_of(unit, LOAD_UNITS) == newton
 
 
 @pytest.mark.parametrize(
@@ -61,7 +62,7 @@ def test_units_of_columns_are_those_of_si():
     ],
 )  # fmt: skip
 def test_what_columns_mean(name, quantity, yes):
-    assert tables.means(name, quantity) is bool(yes)
+    assert means(name, quantity) is bool(yes)
 
 
 @pytest.mark.parametrize(
@@ -76,13 +77,13 @@ def test_what_columns_mean(name, quantity, yes):
     ],
 )  # fmt: skip
 def test_units_in_names(name, plain, unit):
-    assert tables.split_unit(name) == (plain, unit)
+    assert split_unit(name) == (plain, unit)
 
 
 def test_the_elongation_nearest_to_the_strip():
     names = ["Crosshead (mm)", "Extension (mm)", "Video gauge (mm)", "Stroke", "Wegaufnehmer"]
     for which, nearest in (([0, 1, 2, 3, 4], [2, 4]), ([0, 1, 3], [1]), ([0, 3], [0, 3]), ([], [])):
-        assert tables.nearest_to_strip(names, which) == nearest
+        assert nearest_to_strip(names, which) == nearest
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bubblefit.readers.frames import FrameOptions, columns_of, heading_of, read_frames
-from bubblefit.readers.tables import decimal_mark, is_number, read_table
+from bubblefit.readers.frames import FrameOptions, read_frames
+from bubblefit.readers.headings import columns_of, heading_of
+from bubblefit.readers.numerals import decimal_mark, is_number
+from bubblefit.readers.tables import read_table
 from bubblefit.readers.text_frames import find_layout, quantity_columns, read_numbers
 
 from ..complaints import complaint, complaint_with

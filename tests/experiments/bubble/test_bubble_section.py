@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble.objective import at_points, at_rest
-from bubblefit.experiments.bubble.point_files import _frame_times
+from bubblefit.experiments.bubble.recorded_frames import frame_times
 from bubblefit.experiments.bubble.section import (
     LogSection,
     Sheet,
@@ -330,7 +330,7 @@ def times(folder, count=2, files=("p1.csv", "p7.csv"), **said):
     (folder / "t.csv").write_text("frame,time (ms)\n1,500\n2,1500\n")
     section = LogSection(file="l.csv", **said)
     own, files = [None] * count, [folder / f for f in files]
-    return _frame_times(section, files, own, PLACE, folder)[0].tolist()
+    return frame_times(section, files, own, PLACE, folder)[0].tolist()
 
 
 def test_times_of_frames(tmp_path):

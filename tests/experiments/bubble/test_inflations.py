@@ -10,8 +10,8 @@ from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.materials.memory import NAMES, Memory
 from bubblefit.meshes.bubble_model import BubbleModel, default_increments
 from bubblefit.meshes.disk import disk_mesh
-from bubblefit.readers.histories import branches_of, has_several
-from bubblefit.readers.pressure_log import OTHER, RELEASED, choose_frames
+from bubblefit.readers.frame_choice import OTHER, RELEASED, choose_frames
+from bubblefit.readers.inflations import branches_of, has_several
 from bubblefit.runs.setup import prepare_fit
 from bubblefit.solvers.membrane.solver import MembraneSolver
 

@@ -11,7 +11,7 @@ from bubblefit.experiments.bubble.prepared import prepare
 from bubblefit.experiments.bubble.report import clock_picture, recorded_table
 from bubblefit.experiments.kinds import Output
 from bubblefit.project.project import read_project
-from bubblefit.readers.pressure_log import picture_numbers
+from bubblefit.readers.numbers_in_names import picture_numbers
 
 from ...complaints import complaint_with
 
@@ -96,7 +96,7 @@ def test_the_frames_nearest_to_the_pressures(folder, said):
     assert "2 of 17 frames taken, 3 at no pressure" in line and "10 in place of 10.5 kPa" in line
     near = replace(test.data.recorded, pressure=np.array([0.0105001, 0.06]))
     assert "10.5001 in place of 10.5 kPa" in recorded_lines(near)[0]
-    same = replace(near, pressure=near.asked * (1 + 1e-15))
+    same = replace(near, pressure=near.requested * (1 + 1e-15))
     assert "in place of" not in recorded_lines(same)[0]
     table = recorded_table(test.data.recorded)
     assert table.header[1:4] == ["pressure, kPa", "asked for, kPa", "farther by, kPa"]

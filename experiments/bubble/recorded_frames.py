@@ -1,0 +1,407 @@
+"""The frames that a bubble test takes, by the pressures that were recorded with them.
+
+[bubble.data.points.pressure] says where a frame's pressure stands: in the file's name, in a column
+of the file, or in the log of a sensor with a clock of its own.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ...files import is_file, no_file_words
+from ...readers.clock_offset import ClockOffset, find_offset, given_offset
+from ...readers.frame_choice import choose_frames
+from ...readers.frames import FrameOptions, read_frames
+from ...readers.inflations import InflationChoice, Inflations, has_several
+from ...readers.machine_tables import Channel, read_times
+from ...readers.numbers_in_names import check_pattern, number_in_name, picture_numbers
+from ...readers.pressure_log import apex_height, read_pressure_log
+from ...readers.units import PRESSURE_UNITS, TIME_UNITS
+from ...readers.values_in_files import values_in_file
+from ..kinds import Array, Place, named_format
+from .section import LogSection, PressureSection
+
+#: Key of the section that says the pressures, below that of the test.
+SECTION = "data.points.pressure"
+
+
+@dataclass(frozen=True)
+class FrameFiles:
+    """Files of frames, how they are read, and where they are.
+
+    Attributes
+    ----------
+    files : tuple of Path
+    options : FrameOptions
+    format : str or None
+    place : Place
+        Of the test, for messages.
+    folder : Path
+        Of the data, where a log may be too.
+    """
+
+    files: tuple[Path, ...]
+    options: FrameOptions
+    format: str | None
+    place: Place
+    folder: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The pressures that were recorded at all frames of a test.
+
+    Attributes
+    ----------
+    pressure : (frames,) array, MPa
+    names : list of str
+        Of the frames.
+    source : str
+        Where the pressures are from, in words.
+    clock : ClockOffset or None
+        Of a log.
+    logs : tuple of Path
+        A log, a table of times.
+    doubts : list of str
+        On the frames' numbers, of which their times are made.
+    """
+
+    pressure: Array
+    names: Sequence[str]
+    source: str
+    clock: ClockOffset | None = None
+    logs: tuple[Path, ...] = ()
+    doubts: Sequence[str] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFrames:
+    """The frames that a test takes, by rising pressure.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        Of the frames taken; all files where one holds several frames.
+    frames : tuple of int or None
+        Numbers among all frames of the files; None where each file holds one.
+    names : tuple of str
+    pressure : (n,) array, MPa
+    requested : (n,) array, MPa, or None
+        Pressures for which the frames were chosen.
+    source : str
+        Where the pressures are from, in words.
+    count : int
+        Number of all frames.
+    left_out : mapping
+        Number of frames that are not used, by reason.
+    doubt : (n,) array, MPa, or None
+        By the uncertain offset of the clocks.
+    clock : ClockOffset or None
+        Of a log.
+    logs : tuple of Path
+        A log, a table of times.
+    numbers : tuple of str
+        Doubts about the frames' numbers, of which their times are made.
+    inflations : Inflations or None
+        All, where there are several.
+    """
+
+    files: tuple[Path, ...]
+    frames: tuple[int, ...] | None
+    names: tuple[str, ...]
+    pressure: Array
+    requested: Array | None
+    source: str
+    count: int
+    left_out: Mapping[str, int]
+    doubt: Array | None = None
+    clock: ClockOffset | None = None
+    logs: tuple[Path, ...] = ()
+    numbers: tuple[str, ...] = ()
+    inflations: Inflations | None = None
+
+
+def recorded_frames(
+    section: PressureSection | None,
+    requested: Sequence[float] | None,
+    files: FrameFiles,
+    inflation: InflationChoice,
+) -> RecordedFrames:
+    """Choose the frames of a test by the pressures that were recorded.
+
+    Parameters
+    ----------
+    section : PressureSection or None
+        None where `requested` are the pressures of the files.
+    requested : sequence of float, MPa, or None
+        The test's `pressures`; None takes all frames, or as many as the section says.
+    files : FrameFiles
+    inflation : int or "all"
+
+    Raises
+    ------
+    InputError
+        The pressures cannot be found, or there are no such frames.
+    """
+    if section is None:
+        recording = _listed_pressures(requested or (), files)
+        requested = None
+    else:
+        _check(section, requested, files.place, inflation)
+        recording = _recorded_pressures(section, files)
+    pressures = recording.pressure
+    has_inflations = has_several(pressures)
+    is_timed = has_inflations or inflation != 1 or recording.clock is not None or section is None
+    try:
+        chosen, left_out = choose_frames(
+            pressures,
+            requested,
+            None if section is None else section.frames,
+            None if section is None else section.tolerance,
+            inflation if is_timed else None,
+        )
+    except InputError as error:
+        is_of_test = error.field.startswith(("pressures", "inflation"))
+        field = error.field if is_of_test else f"{SECTION}.{error.field}"
+        raise files.place.error(field.rstrip("."), error.problem) from None
+    inflations = None
+    if has_inflations and all(map(is_file, files.files)):
+        inflations = Inflations(pressures, _heights(recording, files), inflation)
+    taken_indices = list(chosen)
+    is_frame_per_file = len(recording.names) == len(files.files)
+    return RecordedFrames(
+        files=tuple(files.files[i] for i in chosen) if is_frame_per_file else files.files,
+        frames=None if is_frame_per_file else chosen,
+        names=tuple(recording.names[i] for i in chosen),
+        pressure=pressures[taken_indices],
+        requested=None if requested is None else np.array(requested),
+        source=recording.source,
+        count=len(recording.names),
+        left_out=left_out,
+        doubt=None if recording.clock is None else recording.clock.doubt[taken_indices],
+        clock=recording.clock,
+        logs=recording.logs,
+        numbers=tuple(recording.doubts),
+        inflations=inflations,
+    )
+
+
+def _heights(recording: Recording, files: FrameFiles) -> Array:
+    """Return the heights (frames,) mm of the apex in all frames."""
+    if recording.clock is not None:
+        return recording.clock.heights
+    heights = []
+    for file in files.files:
+        heights += [apex_height(f) for f in read_frames([file], files.options, files.format)]
+    return np.array(heights)
+
+
+# Pressures --------------------------------------------------------------------------------------
+
+
+def _recorded_pressures(section: PressureSection, files: FrameFiles) -> Recording:
+    """Return the pressures where a section says that they stand."""
+    if section.log is not None:
+        return _pressures_by_log(section.log, files)
+    if section.column is not None:
+        return _pressures_in_files(section, section.column, files)
+    pattern = section.from_name if isinstance(section.from_name, str) else None
+    unit = section.unit or files.place.scales.pressure_unit
+    pressures = [
+        number_in_name(file, PRESSURE_UNITS, pattern, unit, "from_name") for file in files.files
+    ]
+    names = [file.name for file in files.files]
+    return Recording(np.array(pressures), names, "the files' names")
+
+
+def _listed_pressures(pressures: Sequence[float], files: FrameFiles) -> Recording:
+    """Return the pressures of a project's list, one a file, or a frame where no file is there."""
+    names = [file.name for file in files.files]
+    frame_names = names or [f"frame {number}" for number in range(1, len(pressures) + 1)]
+    return Recording(np.array(pressures), frame_names, "the list 'pressures'")
+
+
+def _pressures_in_files(section: PressureSection, column: str, files: FrameFiles) -> Recording:
+    """Return the pressures that the files of the frames say."""
+    channel = Channel(column, section.unit, section.scale, section.offset)
+    pressures = []
+    names = []
+    for file in files.files:
+        values = values_in_file(file, channel, PRESSURE_UNITS)
+        pressures.append(values)
+        names += _frame_names(file, len(values))
+    return Recording(np.concatenate(pressures), names, f"{column!r} in each file")
+
+
+def _pressures_by_log(section: LogSection, files: FrameFiles) -> Recording:
+    """Return the pressures by a log and the times of the frames."""
+    key = f"{SECTION}.log"
+    place = files.place
+    log_file = _find_beside(section.file, place, files.folder, f"{key}.file")
+    log_times, pressures = read_pressure_log(
+        log_file,
+        section.pressure.channel,
+        section.time.channel,
+        named_format(place, f"{key}.format", "machine table", section.format),
+        section.comment,
+        section.decimal,
+    )
+    heights: list[float] = []
+    names: list[str] = []
+    file_numbers: list[float | None] = []
+    for file in files.files:
+        # One file at a time: all frames of a test need not be in memory at once.
+        frames = read_frames([file], files.options, files.format)
+        heights += map(apex_height, frames)
+        file_numbers += [frame.number for frame in frames]
+        names += _frame_names(file, len(frames))
+    with place.naming(key):
+        times, doubts = frame_times(section, files.files, file_numbers, place, files.folder)
+        recorded = times, np.array(heights), log_times, pressures
+        if section.offset is None:
+            clock = find_offset(*recorded)
+        else:
+            clock = given_offset(section.offset, *recorded)
+    logs = [log_file]
+    if section.times:
+        logs.append(_find_beside(section.times, place, files.folder, f"{key}.times"))
+    return Recording(clock.pressure, names, f"the log {section.file}", clock, tuple(logs), doubts)
+
+
+def _frame_names(file: Path, count: int) -> list[str]:
+    """Return the names of the frames of a file."""
+    if count == 1:
+        return [file.name]
+    return [f"{file.name}, frame {number}" for number in range(1, count + 1)]
+
+
+# Times ------------------------------------------------------------------------------------------
+
+
+def frame_times(
+    section: LogSection,
+    files: Sequence[Path],
+    file_numbers: Sequence[float | None],
+    place: Place,
+    folder: Path,
+) -> tuple[Array, list[str]]:
+    """Return the times of frames by the camera's clock.
+
+    Parameters
+    ----------
+    section : LogSection
+        Says them by the rate of pictures, a table of times, or names of files.
+    files : sequence of Path
+    file_numbers : (frames,) sequence of float or None
+        Numbers of the frames in their files.
+    place : Place
+    folder : Path
+        Of the data.
+
+    Returns
+    -------
+    times : (frames,) array, s
+    doubts : list of str
+        On the numbers that times are made of.
+    """
+    count = len(file_numbers)
+    _check_times(section)
+    if section.times is not None:
+        path = _find_beside(section.times, place, folder, f"{SECTION}.log.times")
+        times = read_times(path, section.times_column, section.comment, section.decimal)
+        if len(times) != count:
+            problem = f"expected one time for each of the {count} frames, got {len(times)}"
+            raise InputError(path, "", problem)
+        return times, []
+    if section.time_in_name:
+        return _times_in_names(section, files, count), []
+    assert section.rate is not None
+    if section.time_in_name is not None:
+        return np.arange(count) / section.rate, []
+    numbers, doubts = picture_numbers(files, file_numbers, section.offset is not None)
+    return numbers / section.rate, doubts
+
+
+def _check_times(section: LogSection) -> None:
+    """Refuse a section that does not say the times of the frames in one way."""
+    has_times = section.times is not None
+    has_rate = section.rate is not None
+    if bool(section.time_in_name) + has_times != 1 and (section.time_in_name or not has_rate):
+        problem = "expected one of 'rate', 'times' and 'time_in_name' for the times of the frames"
+        raise InputError(None, "", problem)
+    if section.times_column is not None and not has_times:
+        raise InputError(None, "times_column", "means nothing without 'times'")
+    if has_times and has_rate:
+        raise InputError(None, "rate", "means nothing beside 'times'")
+
+
+def _times_in_names(section: LogSection, files: Sequence[Path], count: int) -> Array:
+    """Return the times (frames,) s in the names of the files."""
+    if len(files) != count:
+        problem = "a file holds several frames; give 'rate' or 'times'"
+        raise InputError(None, "time_in_name", problem)
+    pattern = section.time_in_name if isinstance(section.time_in_name, str) else None
+    if section.rate is not None and pattern is None:
+        problem = "with 'rate', expected a pattern whose group is the number of the picture"
+        raise InputError(None, "time_in_name", problem)
+    numbers = [number_in_name(file, TIME_UNITS, pattern, None, "time_in_name") for file in files]
+    return np.array(numbers) / (section.rate or 1.0)
+
+
+def _find_beside(name: str, place: Place, folder: Path, field: str) -> Path:
+    """Return a file beside the frames, in the folder of the data, or beside the project."""
+    for home in (folder, place.path.parent):
+        if is_file(home / name):
+            return home / name
+    problem = f"{no_file_words(folder / name)}; --data DIR names another folder"
+    raise place.error(field, problem)
+
+
+# Checks -----------------------------------------------------------------------------------------
+
+
+def _check(
+    section: PressureSection,
+    requested: Sequence[float] | None,
+    place: Place,
+    inflation: InflationChoice,
+) -> None:
+    """Refuse a section with keys that contradict each other or mean nothing."""
+    if requested is not None and inflation == "all":
+        raise place.error("pressures", "means nothing where inflation = 'all' takes all frames")
+    sources = bool(section.from_name) + (section.column is not None) + (section.log is not None)
+    if sources != 1:
+        raise place.error(SECTION, "expected exactly one of 'from_name', 'column' and 'log'")
+    is_scaled = section.scale is not None or section.offset
+    for is_wrong, key, problem in (
+        (section.frames and requested, "frames", "means nothing where 'pressures' are asked for"),
+        (
+            section.tolerance and requested is None,
+            "tolerance",
+            "means nothing without 'pressures'",
+        ),
+        (
+            section.column is None and is_scaled,
+            "scale",
+            "'scale' and 'offset' here are of a 'column'",
+        ),
+        (
+            section.log and section.unit,
+            "unit",
+            "say the unit of a log in [...log] pressure = { unit }",
+        ),
+    ):
+        if is_wrong:
+            raise place.error(f"{SECTION}.{key}", problem)
+    _check_pattern("from_name", section.from_name, place)
+    if section.log is not None:
+        _check_pattern("log.time_in_name", section.log.time_in_name, place)
+
+
+def _check_pattern(key: str, pattern: str | bool | None, place: Place) -> None:
+    fault = check_pattern(pattern) if isinstance(pattern, str) else None
+    if fault is not None:
+        raise place.error(f"{SECTION}.{key}", fault)

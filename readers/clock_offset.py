@@ -1,0 +1,307 @@
+"""The offset between the clocks of a camera and of a pressure log, from heights and pressures.
+
+At the right offset, heights and pressures are rising functions of each other; at a wrong one not,
+wherever the pressure was held, released or raised unevenly. Both functions are found by isotonic
+regression, the sheet at rest at the least pressure of the log.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .frames import Array
+
+#: Frames that tell something, at least.
+MIN_FRAMES = 6
+#: Share of the frames that must lie within the log.
+MIN_SHARE_IN_LOG = 0.8
+#: Misfit above which the heights do not follow the pressures.
+MAX_MISFIT = 0.05
+#: Mean doubt of the frames' pressures, as a share of their range, above which it is unknown.
+MAX_DOUBT = 0.015
+
+
+@dataclass(frozen=True, eq=False)
+class ClockOffset:
+    """The log's clock less that of the frames.
+
+    Attributes
+    ----------
+    offset : float, s
+    lower, upper : float, s
+        Range of the offsets that may be right.
+    misfit : float or None
+        Share of the variance that is unexplained; None where the offset is given.
+    pressure : (frames,) array, MPa
+        NaN beyond the log.
+    doubt : (frames,) array, MPa
+        Half of the range of a frame's pressure.
+    times : (frames,) array, s
+    heights : (frames,) array, mm
+    """
+
+    offset: float
+    lower: float
+    upper: float
+    misfit: float | None
+    pressure: Array
+    doubt: Array
+    times: Array
+    heights: Array
+
+
+def given_offset(
+    offset: float, times: Array, heights: Array, log_times: Array, pressures: Array
+) -> ClockOffset:
+    """Return the pressures of frames by an offset of the clocks that is known.
+
+    Parameters
+    ----------
+    offset : float, s
+    times : (frames,) array, s
+        By the camera's clock.
+    heights : (frames,) array, mm
+        Of the apex.
+    log_times : (k,) array, s
+        By the log's clock.
+    pressures : (k,) array, MPa
+
+    Raises
+    ------
+    InputError
+        No frame lies within the log.
+    """
+    pressure = log_at(offset, times, log_times, pressures)
+    if not np.isfinite(pressure).any():
+        problem = (
+            f"no frame lies within the log: frames from {times.min() + offset:.2f} to"
+            f" {times.max() + offset:.2f} s by its clock, the log from {log_times[0]:.2f} to"
+            f" {log_times[-1]:.2f} s"
+        )
+        raise InputError(None, "offset", problem)
+    doubt = np.zeros(len(times))
+    return ClockOffset(offset, offset, offset, None, pressure, doubt, times, heights)
+
+
+def find_offset(times: Array, heights: Array, log_times: Array, pressures: Array) -> ClockOffset:
+    """Return the offset at which heights rise with the pressures.
+
+    Parameters
+    ----------
+    times, heights, log_times, pressures
+        As in `given_offset`; heights may be NaN.
+
+    Raises
+    ------
+    InputError
+        There is no such offset, or several that differ in the frames' pressures.
+    """
+    has_height = np.isfinite(heights)
+    if has_height.sum() < MIN_FRAMES:
+        problem = f"{has_height.sum()} frames are too few to find it by; give it in s"
+        raise InputError(None, "offset", problem)
+    offsets, misfits = offset_misfits(times[has_height], heights[has_height], log_times, pressures)
+    best = int(np.argmin(misfits))
+    if misfits[best] > MAX_MISFIT:
+        problem = (
+            f"at no offset does the sheet rise with the pressure: at best, {offsets[best]:.2f} s,"
+            f" {misfits[best]:.0%} of the variance is left; are these the log and the frames of one"
+            " test, and their times right? else give the offset in s"
+        )
+        raise InputError(None, "offset", problem)
+    may_be_right = _may_be_right(misfits)
+    possible = offsets[may_be_right]
+    offset = _middle_about(best, offsets, may_be_right)
+    pressure = log_at(offset, times, log_times, pressures)
+    doubt = _pressure_doubt(possible, times, log_times, pressures)
+    lower = float(possible[0])
+    upper = float(possible[-1])
+    mean_doubt = float(np.nanmean(doubt))
+    if mean_doubt > MAX_DOUBT * float(np.ptp(pressure[np.isfinite(pressure)])):
+        problem = (
+            f"cannot be found: offsets from {lower:.2f} to {upper:.2f} s do as well, and"
+            f" leave the frames' pressures uncertain by {1e3 * mean_doubt:.3g} kPa on"
+            " average; give it in s. Where the pressure was held, released or began to rise while"
+            " frames were taken, it can be found"
+        )
+        raise InputError(None, "offset", problem)
+    return ClockOffset(offset, lower, upper, float(misfits[best]), pressure, doubt, times, heights)
+
+
+def _may_be_right(misfits: Array, noise: float = 1e-6, factor: float = 2.0) -> NDArray[np.bool_]:
+    """Return the mask of offsets that may be right.
+
+    Parameters
+    ----------
+    misfits : (offsets,) array
+    noise : float
+        Share of the variance that no measurement is without: 0.1 % of the amplitude.
+    factor : float
+        Largest misfit of such an offset, as a multiple of the smallest misfit.
+    """
+    return np.asarray(misfits <= factor * max(misfits.min(), noise))
+
+
+def _middle_about(best: int, offsets: Array, may_be_right: NDArray[np.bool_]) -> float:
+    """Return the middle of the range about the best offset in which all may be right."""
+    wrong = np.flatnonzero(~may_be_right)
+    first = wrong[wrong < best].max(initial=-1) + 1
+    last = wrong[wrong > best].min(initial=len(offsets)) - 1
+    return float(offsets[first] + offsets[last]) / 2
+
+
+def _pressure_doubt(
+    offsets: Array, times: Array, log_times: Array, pressures: Array, samples: int = 200
+) -> Array:
+    """Return half of the range (frames,) MPa of each frame's pressure at some of the offsets."""
+    sampled = np.append(offsets[:: max(1, len(offsets) // samples)], offsets[-1])
+    possible = np.array([log_at(offset, times, log_times, pressures) for offset in sampled])
+    in_log = np.isfinite(possible)
+    highest = np.where(in_log, possible, -np.inf).max(axis=0)
+    lowest = np.where(in_log, possible, np.inf).min(axis=0)
+    has_pressure = in_log.any(axis=0)
+    doubt = np.full(len(times), np.nan)
+    doubt[has_pressure] = (highest - lowest)[has_pressure] / 2
+    return doubt
+
+
+def log_at(offset: float, times: Array, log_times: Array, pressures: Array) -> Array:
+    """Return (frames,) MPa, the log's pressures at an offset (s); NaN beyond the log."""
+    return np.interp(times + offset, log_times, pressures, left=np.nan, right=np.nan)
+
+
+def offset_misfits(
+    times: Array, heights: Array, log_times: Array, pressures: Array, refinement: int = 20
+) -> tuple[Array, Array]:
+    """Return the misfit at many offsets.
+
+    Parameters
+    ----------
+    times, heights, log_times, pressures
+        As in `given_offset`.
+    refinement : int
+        Offsets about the best are so many times closer together.
+
+    Returns
+    -------
+    offsets : (offsets,) array, s
+        Rising.
+    misfits : (offsets,) array
+    """
+    order = np.argsort(times, kind="stable")
+    t = times[order]
+    h = heights[order]
+    h = np.where(h > _rest_height(h), h, 0.0)
+    coarse = _offsets(t, log_times)
+    h = h ** _straightest_power(h, [log_at(s, t, log_times, pressures) for s in coarse])
+    # A hundredth of the log is below its least pressure, by noise.
+    rest = float(np.quantile(pressures, 0.01))
+
+    def misfits_at(offsets: Array) -> Array:
+        return np.array([_misfit(log_at(s, t, log_times, pressures), h, rest) for s in offsets])
+
+    misfits = misfits_at(coarse)
+    step = coarse[1] - coarse[0]
+    fine = coarse[np.argmin(misfits)] + step * np.linspace(-2, 2, 4 * refinement + 1)
+    fine = fine[(fine >= coarse[0]) & (fine <= coarse[-1])]
+    offsets = np.concatenate([coarse, fine])
+    misfits = np.append(misfits, misfits_at(fine))
+    order = np.argsort(offsets, kind="stable")
+    return offsets[order], misfits[order]
+
+
+def _offsets(t: Array, log_times: Array, max_count: int = 20_000) -> Array:
+    """Return the offsets at which most frames lie within the log, half a frame apart."""
+    required = int(np.ceil(MIN_SHARE_IN_LOG * len(t)))
+    lowest = log_times[0] - t[len(t) - required]
+    highest = log_times[-1] - t[required - 1]
+    if lowest > highest:
+        durations = f"the log lasts {np.ptp(log_times):g} s, the frames {np.ptp(t):g} s"
+        raise InputError(None, "", f"{durations}; are the units of time and the rate right?")
+    gaps = np.diff(t)
+    step = float(np.median(gaps[gaps > 0])) / 2 if (gaps > 0).any() else highest - lowest
+    count = min((highest - lowest) / step if step else 0, max_count)
+    return np.linspace(lowest, highest, 2 + int(count))
+
+
+def _rest_height(h: Array, deviations: float = 6.0, max_share: float = 0.02) -> float:
+    """Return the height up to which a frame is at rest, from the noise between frames.
+
+    Parameters
+    ----------
+    h : (frames,) array, mm
+    deviations : float
+        Standard deviations above the lowest.
+    max_share : float
+        Largest such height, as a share of the highest.
+    """
+    noise = float(np.median(np.abs(np.diff(h, 2)))) / 0.6745 / np.sqrt(6)
+    return min(float(h.min()) + deviations * noise, max_share * float(h.max()))
+
+
+def _straightest_power(h: Array, pressures: Sequence[Array]) -> int:
+    """Return the power of the heights that correlates best with the pressures at any offset.
+
+    Heights to one of these powers go nearly straight with the pressures, those of a sheet that was
+    taut or flat, so that noise counts alike all along; any rising function of them would do.
+    """
+    best = {}
+    for power in (1, 2, 3):
+        raised = h**power
+        best[power] = max((_correlation(raised, p) for p in pressures), default=0.0)
+    return max(best, key=lambda power: best[power])
+
+
+def _correlation(raised: Array, p: Array) -> float:
+    """Return the correlation of heights with pressures, 0 where it is none or not known."""
+    in_log = np.isfinite(p)
+    if not _are_enough(in_log):
+        return 0.0
+    x = raised[in_log] - raised[in_log].mean()
+    y = p[in_log] - p[in_log].mean()
+    size = float(np.sqrt((x @ x) * (y @ y)))
+    return max(0.0, float(x @ y) / size) if size > 0 else 0.0
+
+
+def _are_enough(in_log: NDArray[np.bool_]) -> bool:
+    """Return whether enough frames lie within the log; one may be beyond its end by rounding."""
+    return bool(in_log.sum() >= max(MIN_FRAMES, MIN_SHARE_IN_LOG * len(in_log) - 1))
+
+
+def _misfit(p: Array, h: Array, rest: float) -> float:
+    """Return the share of variance that rising functions leave, 1 without variance.
+
+    Parameters
+    ----------
+    p : (frames,) array, MPa
+        NaN beyond the log.
+    h : (frames,) array
+        Heights, to a power.
+    rest : float, MPa
+        Pressure at which the height is zero.
+    """
+    in_log = np.isfinite(p)
+    if not _are_enough(in_log):
+        return 1.0
+    p = p[in_log]
+    h = h[in_log]
+    # The state of rest weighs as much as all frames together, in the functions only.
+    return (_unexplained(p, h, rest, 0.0) + _unexplained(h, p, 0.0, rest)) / 2
+
+
+def _unexplained(x: Array, y: Array, x_rest: float, y_rest: float) -> float:
+    """Return share of the variance of y that no rising function of x through the rest explains."""
+    total = float(np.sum((y - y.mean()) ** 2))
+    if not total > 0:
+        return 1.0
+    weight = np.append(np.ones(len(x)), float(len(x)))
+    # A function has one value where x has one: readings of one pressure are put together.
+    group = np.unique(np.append(x, x_rest), return_inverse=True)[1]
+    sums = np.bincount(group, weight)
+    means = np.bincount(group, weight * np.append(y, y_rest)) / sums
+    rising = scipy.optimize.isotonic_regression(means, weights=sums).x
+    return float(np.sum((y - rising[group[:-1]]) ** 2)) / total
