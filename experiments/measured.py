@@ -110,34 +110,34 @@ class PreparedParts(PreparedWhole):
     @property
     def whole(self) -> dict[str, Any]:
         """Return the masks that leave everything, by comparison."""
-        every = self.test.matched.items()
-        return {self.part(name): np.ones(self.count(own), dtype=bool) for name, own in every}
+        parts = self.test.matched.items()
+        return {self.part(name): np.ones(self.count(data), dtype=bool) for name, data in parts}
 
     def without_each(self, sort: str) -> dict[str, dict[str, Masks]]:
         """Return masks without each part, by sort and name; nothing where there is one part."""
-        whole, names = self.whole, self.test.matched
+        all_values, names = self.whole, self.test.matched
         masks: dict[str, Masks] = {
-            name: {**whole, self.part(name): ~whole[self.part(name)]} for name in names
+            name: {**all_values, self.part(name): ~all_values[self.part(name)]} for name in names
         }
         return {sort: masks} if len(masks) > 1 else {}
 
     def kept(self, masks: Masks | None) -> dict[str, Any]:
         """Return the data of the parts in which masks leave anything to match, by name."""
-        known, every = masks or {}, self.test.matched.items()
-        return {name: own for name, own in every if known.get(self.part(name), np.True_).any()}
+        chosen, parts = masks or {}, self.test.matched.items()
+        return {name: data for name, data in parts if chosen.get(self.part(name), np.True_).any()}
 
     def fitted_parts(self, fitted: FittedTest) -> tuple[FittedPart, ...]:
         """Return the data of each part of a fit, with what was found."""
-        every = zip(self.test.matched.values(), fitted.comparisons, fitted.histories, strict=True)
-        return tuple(FittedPart(own, c.model, c.objective, history) for own, c, history in every)
+        parts = zip(self.test.matched.values(), fitted.comparisons, fitted.histories, strict=True)
+        return tuple(FittedPart(data, c.model, c.objective, history) for data, c, history in parts)
 
     def finer(
         self: Any, make_solver: MakeSolver, weighting: Weighting, factor: float
     ) -> tuple[Comparison, ...]:
         """Return the comparisons with other elements, if any; increments hardly matter."""
         models = self.test.models(what="elements", factor=factor)
-        own = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
-        return tuple(replace(comparison, model=models[name]) for name, comparison in own)
+        parts = zip(self.test.matched, self.comparisons(make_solver, weighting), strict=True)
+        return tuple(replace(comparison, model=models[name]) for name, comparison in parts)
 
 
 class StrainObjective:
@@ -177,10 +177,10 @@ class StrainObjective:
     def residual(self, history: History, nuisance: Mapping[str, float] | None = None) -> Array:
         return self.in_blocks(self.modelled(history) - self.measured)
 
-    def shifted(self, here: History, there: History) -> Self:
-        other = copy.copy(self)
-        other.strain = self.strain - (self.modelled(here) - self.modelled(there))
-        return other
+    def shifted(self, external: History, surrogate: History) -> Self:
+        objective = copy.copy(self)
+        objective.strain = self.strain - (self.modelled(external) - self.modelled(surrogate))
+        return objective
 
     def rms(self, history: History) -> Array:
         """Return the RMS error of each block, %."""

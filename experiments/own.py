@@ -61,19 +61,19 @@ class OwnTest:
 
     def changed(self, **values: float) -> Self:
         """Return the test with other values of attributes."""
-        other = copy.copy(self)
-        vars(other).update(values)
-        return other
+        test = copy.copy(self)
+        vars(test).update(values)
+        return test
 
     def values(self, law: HypoelasticLaw) -> Array:
         """Return `modelled`; InputError unless they are numbers, as many as measured."""
-        found, shape = self.modelled(law), np.shape(self.measured)
+        modelled, shape = self.modelled(law), np.shape(self.measured)
         try:
-            values = np.array(found, dtype=float)
+            values = np.array(modelled, dtype=float)
         except (TypeError, ValueError):
             values = np.empty(0)
         if values.shape != shape or len(shape) != 1 or not shape[0]:
-            problem = f"expected {shape} values as measured, (n,), got {np.shape(found)}"
+            problem = f"expected {shape} values as measured, (n,), got {np.shape(modelled)}"
             raise InputError(None, f"{self.name}.modelled", problem)
         return values
 
@@ -131,7 +131,7 @@ class ValuesObjective:
         assert history.load_slope is not None
         return np.asarray(history.load_slope / self.scale[:, None])
 
-    def shifted(self, here: History, there: History) -> ValuesObjective:
+    def shifted(self, external: History, surrogate: History) -> ValuesObjective:
         return self  # it is asked by the same solver, whichever leads
 
 

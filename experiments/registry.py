@@ -29,30 +29,30 @@ def kind_names() -> tuple[str, ...]:
 def kinds(names: Collection[str] | None = None) -> Mapping[str, Kind]:
     """Return kinds by name, all or some: ours, those that are fitted first, then plug-ins'.
     Plug-ins that do not work are logged and left out."""
-    found = list[Kind]()
+    found_kinds = list[Kind]()
     for name in kind_names() if names is None else names:
         try:
-            found.append(kind_named(name))
+            found_kinds.append(kind_named(name))
         except PlugInFailure as error:
             warn_once("%s", str(error))
     ours = _folders()  # False comes before True
-    found.sort(key=lambda k: (k.name not in ours, k.name in ours and not k.fitted, k.name))
-    return {kind.name: kind for kind in found}
+    found_kinds.sort(key=lambda k: (k.name not in ours, k.name in ours and not k.fitted, k.name))
+    return {kind.name: kind for kind in found_kinds}
 
 
 def kind_named(name: str) -> Kind:
     """Return the kind of this name, importing no other; raises InputError, PlugInFailure."""
-    made: Kind
+    kind: Kind
     if name == OWN.name:  # of objects, not of a project file: it is none of `kinds`
         return cast(Kind, OWN)
     if name in _folders():
-        made = import_module(f".{name}", __package__).KIND
-        return made
+        kind = import_module(f".{name}", __package__).KIND
+        return kind
     plug_in = plug_in_named(GROUP, name)
     if plug_in is None:
         raise InputError(None, "kind", f"{name!r} is not one of: {', '.join(kind_names())}")
-    made = plug_in.load("kind of test", NEEDED)
-    return made
+    kind = plug_in.load("kind of test", NEEDED)
+    return kind
 
 
 def report_of(name: str) -> Any:
@@ -73,5 +73,5 @@ def report_of(name: str) -> Any:
 @cache
 def _folders() -> tuple[str, ...]:
     """Return the folders of this package: each holds a `KIND` of that name."""
-    here = str(Path(__file__).parent)
-    return tuple(module.name for module in iter_modules([here]) if module.ispkg)
+    folder = str(Path(__file__).parent)
+    return tuple(module.name for module in iter_modules([folder]) if module.ispkg)

@@ -145,8 +145,8 @@ class Objective(Protocol):
     def jacobian(self, history: History, slope: Array) -> Array:
         """Return (m, parameters) from the solver's slope of the displacements."""
 
-    def shifted(self, here: History, there: History) -> Objective:
-        """Return the objective of a model that shows `here` where this one shows `there`."""
+    def shifted(self, external: History, surrogate: History) -> Objective:
+        """Return the objective for a model that shows `surrogate` where another shows `external`."""
 
 
 #: Relative step of a central difference; probes of what noise makes of a function's values.
@@ -226,10 +226,10 @@ class OwnObjective:
         problem = f"leave out {', '.join(names)}: a function of one's own has to allow for them"
         raise InputError(None, "objective", problem)
 
-    def shifted(self, here: History, there: History) -> OwnObjective:
-        other = copy.copy(self)
-        other.by = self.by + self._modelled(here) - self._modelled(there)
-        return other
+    def shifted(self, external: History, surrogate: History) -> OwnObjective:
+        objective = copy.copy(self)
+        objective.by = self.by + self._modelled(external) - self._modelled(surrogate)
+        return objective
 
 
 @dataclass(eq=False)

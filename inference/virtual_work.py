@@ -101,5 +101,5 @@ class GapObjective:
         """Return (m, names) zeros: rigid displacements are smoothed away."""
         return np.zeros((self.sizes[0], len(names)))
 
-    def shifted(self, here: History, there: History) -> GapObjective:
+    def shifted(self, external: History, surrogate: History) -> GapObjective:
         raise NotImplementedError("virtual work is led by no surrogate")

@@ -57,13 +57,13 @@ class BiaxialEvaluation:
     @property
     def notes(self) -> list[Note]:
         """Return notes for a reader of the constants."""
-        c, found = self.chosen.constants, []
+        c, notes = self.chosen.constants, []
         if not c.stable:
             words = (
                 f"nu_warp nu_fill is {c.nu_warp * c.nu_fill:.3g}: a fabric with these constants "
                 "has no stable strain; no program takes them"
             )
-            found.append(Note(UNSTABLE, words, self.test))
+            notes.append(Note(UNSTABLE, words, self.test))
         for name, values in self.spread.items():
             low, high = values
             if not low > 0 or high / low > WIDE:
@@ -71,9 +71,9 @@ class BiaxialEvaluation:
                     f"{name} lies between {low:.4g} and {high:.4g} by what is evaluated: say which "
                     "options are meant wherever the constants are given"
                 )
-                found.append(Note(UNCERTAIN, words, self.test))
+                notes.append(Note(UNCERTAIN, words, self.test))
         words = f"{self.test} pulls along the yarns only: it says nothing about the shear stiffness"
-        return [*found, Note(UNMATCHED, words)]
+        return [*notes, Note(UNMATCHED, words)]
 
     @property
     def spread(self) -> dict[str, tuple[float, float]]:
@@ -86,42 +86,44 @@ def evaluate_test(test: BiaxialTest, options: Options = USUAL) -> BiaxialEvaluat
     """Return the constants of a test by some options, beside those of all others."""
     paths = test.paths
     lines = tuple(line_of(path.ratio, path.load, path.since) for path in paths)
-    there = [line.ratio for line in lines]
-    missing = [ratio for ratio in options.ratios if ratio not in there]
+    measured = [line.ratio for line in lines]
+    missing = [ratio for ratio in options.ratios if ratio not in measured]
     if missing:
-        problem = f"there is no ratio {', '.join(missing)}; the test has: {', '.join(there)}"
+        problem = f"there is no ratio {', '.join(missing)}; the test has: {', '.join(measured)}"
         raise test.place.error("ratios", problem)
     with test.place.naming(field="data"):
         chosen = designers.evaluate(lines, options)
-    kept = []
+    kept_strains = []
     for table, cycles in zip(test.tables, test.cycles, strict=True):
         away = np.abs(table.load - table.load[0]).max(axis=1)
-        least = BACK * float(np.ptp(table.load.max(axis=1)))
+        threshold = BACK * float(np.ptp(table.load.max(axis=1)))
         for _, phase in groupby(cycles, key=lambda cycle: cycle.phase):
-            same = list(phase)
-            last = same[-1]
+            cycles_of_phase = list(phase)
+            last = cycles_of_phase[-1]
             later = [cycle.first for cycle in cycles if cycle.first > last.last]
             stop = (later[0] if later else len(table.load) - 1) + 1
             back = last.last + int(np.argmin(away[last.last : stop]))
-            before, after = (
-                PERCENT * (table.strain[row] - table.strain[0]) if away[row] <= least else NEITHER
-                for row in (same[0].first, back)
+            kept_before, kept_after = (
+                PERCENT * (table.strain[row] - table.strain[0])
+                if away[row] <= threshold
+                else NEITHER
+                for row in (cycles_of_phase[0].first, back)
             )
             row = {"file": table.path.name, "phase": last.phase, "ratio": last.ratio}
             strains = _by_yarn(
-                before_percent=before, after_percent=after, load_kN_per_m=table.load[0]
+                before_percent=kept_before, after_percent=kept_after, load_kN_per_m=table.load[0]
             )
-            kept.append({**row, "cycles": len(same), **strains})
-    others = tuple(designers.evaluate_others(lines, options))
+            kept_strains.append({**row, "cycles": len(cycles_of_phase), **strains})
+    alternatives = tuple(designers.evaluate_others(lines, options))
     ends = _of_cycle(test, 1, options), _of_cycle(test, "last", options)
-    strain = pd.DataFrame(kept)
-    return BiaxialEvaluation(test.name, paths, lines, chosen, others, *ends, strain)
+    strain = pd.DataFrame(kept_strains)
+    return BiaxialEvaluation(test.name, paths, lines, chosen, alternatives, *ends, strain)
 
 
-def _of_cycle(test: BiaxialTest, which: Which, options: Options) -> Evaluation | None:
+def _of_cycle(test: BiaxialTest, cycle: Which, options: Options) -> Evaluation | None:
     """Return the paths of another cycle of the same ratios, without conditioning."""
     section, ratios = test.section, [path.ratio for path in test.paths]
-    paths = evaluated_paths(test.tables, test.cycles, which, section.conditioning, ratios)
+    paths = evaluated_paths(test.tables, test.cycles, cycle, section.conditioning, ratios)
     with suppress(InputError):
         if section.range is not None:
             paths = [path.between(*section.range) for path in paths]
@@ -143,16 +145,16 @@ def in_words(options: Options) -> str:
     return f"least squares of {options.minimise}s, {reciprocal}, {unloaded} unloaded yarns{ratios}"
 
 
-def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
+def standard_table(evaluation: BiaxialEvaluation) -> pd.DataFrame:
     """Return what a report after EN 17117-1 lists: a row a phase of load cycles, then all together.
     Stiffness: change of a yarn's load over that of its strain along the loading that is evaluated;
     Poisson's ratios of one ratio where the other yarn is unloaded. NaN where it is neither."""
     evaluated = {
         (path.table.path.name, path.cycle.phase): (path, line)
-        for path, line in zip(found.paths, found.lines, strict=True)
+        for path, line in zip(evaluation.paths, evaluation.lines, strict=True)
     }
     table = []
-    for k in found.kept.to_dict("records"):
+    for k in evaluation.kept.to_dict("records"):
         path, line = evaluated.get((k["file"], k["phase"]), (None, None))
         row: dict[str, object] = {"file": k["file"], "ratio": k["ratio"]}
         row["load_cycles"] = k["cycles"]
@@ -160,16 +162,16 @@ def standard_table(found: BiaxialEvaluation) -> pd.DataFrame:
         ends = path.load[[0, -1]] if path is not None else (NEITHER, NEITHER)
         stiff, nu = NEITHER.copy(), NEITHER.copy()
         if line is not None:
-            for own, unloaded in enumerate(line.unloaded):
-                if not unloaded and line.strain[own] > SMALLEST_STRAIN:
-                    stiff[own] = line.load[own] / line.strain[own]
-                if unloaded and line.strain[1 - own] > SMALLEST_STRAIN:
-                    nu[own] = -line.strain[own] / line.strain[1 - own]
+            for yarn, unloaded in enumerate(line.unloaded):
+                if not unloaded and line.strain[yarn] > SMALLEST_STRAIN:
+                    stiff[yarn] = line.load[yarn] / line.strain[yarn]
+                if unloaded and line.strain[1 - yarn] > SMALLEST_STRAIN:
+                    nu[yarn] = -line.strain[yarn] / line.strain[1 - yarn]
         table.append(row | _by_yarn(
             from_kN_per_m=ends[0], to_kN_per_m=ends[1], stiffness_kN_per_m=stiff, poisson=nu,
             strain_kept_percent=(k["warp_after_percent"], k["fill_after_percent"]),
         ))  # fmt: skip
-    c, count = found.chosen.constants, int(found.kept["cycles"].sum())
+    c, count = evaluation.chosen.constants, int(evaluation.kept["cycles"].sum())
     row = {"file": "", "ratio": "all", "load_cycles": count, "cycle_evaluated": ""}
     together = _by_yarn(stiffness_kN_per_m=(c.warp, c.fill), poisson=(c.nu_warp, c.nu_fill))
     return pd.DataFrame([*table, row | together])
@@ -188,14 +190,19 @@ def _by_yarn(**pairs: ArrayLike) -> dict[str, float]:
 STANDARD = "en-17117"
 
 
-def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
+def tables_of(evaluation: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
     """Return all tables by name: constants E, A (direct form), kN/m; squares of strain, %^2."""
-    named = [("chosen", found.chosen), *(("", one) for one in found.others)]
-    ends = {"first cycle": found.first, "last cycle": found.last}
-    named += [(which, one) for which, one in ends.items() if one is not None]
-    options = [{"what": what, **designers.row_of(one)} for what, one in named]
+    named = [
+        ("chosen", evaluation.chosen),
+        *(("", alternative) for alternative in evaluation.others),
+    ]
+    ends = {"first cycle": evaluation.first, "last cycle": evaluation.last}
+    named += [
+        (cycle, alternative) for cycle, alternative in ends.items() if alternative is not None
+    ]
+    options = [{"what": name, **designers.row_of(alternative)} for name, alternative in named]
     table = []
-    for path, line in zip(found.paths, found.lines, strict=True):
+    for path, line in zip(evaluation.paths, evaluation.lines, strict=True):
         row = {
             "ratio": path.ratio, "file": path.table.path.name, "cycle": path.cycle.number,
             "cycles": path.cycles, "readings": len(path.load),
@@ -206,39 +213,39 @@ def tables_of(found: BiaxialEvaluation) -> dict[str, pd.DataFrame]:
             strain_change_percent=PERCENT * np.asarray(line.strain),
             rms_about_line_percent=PERCENT * np.asarray(line.residual),
         )
-        table.append(row | {"rms_of_constants_percent": found.chosen.rms[path.ratio]})
-    return {"constants": pd.DataFrame(options), STANDARD: standard_table(found),
-            "lines": pd.DataFrame(table), "kept": found.kept}  # fmt: skip
+        table.append(row | {"rms_of_constants_percent": evaluation.chosen.rms[path.ratio]})
+    return {"constants": pd.DataFrame(options), STANDARD: standard_table(evaluation),
+            "lines": pd.DataFrame(table), "kept": evaluation.kept}  # fmt: skip
 
 
-def lines_of(found: BiaxialEvaluation) -> list[str]:
+def lines_of(evaluation: BiaxialEvaluation) -> list[str]:
     """Return the results as lines for the terminal."""
-    c = found.chosen.constants
-    said = [
-        f"{found.test}: {in_words(found.chosen.options)};",
-        f"  {found.chosen.paths} strain paths of ratios "
-        f"{', '.join(line.ratio for line in found.lines)}",
+    c = evaluation.chosen.constants
+    lines = [
+        f"{evaluation.test}: {in_words(evaluation.chosen.options)};",
+        f"  {evaluation.chosen.paths} strain paths of ratios "
+        f"{', '.join(line.ratio for line in evaluation.lines)}",
         f"  E warp {c.warp:.4g} kN/m, E fill {c.fill:.4g} kN/m, nu_warp {c.nu_warp:.3g}, nu_fill "
-        f"{c.nu_fill:.3g}; S = {found.chosen.squares:.4g} %^2 at {POINTS} points a path",
+        f"{c.nu_fill:.3g}; S = {evaluation.chosen.squares:.4g} %^2 at {POINTS} points a path",
     ]
     if c.nu_warp * c.nu_fill < 1:
         a = c.stiffness
-        said.append(
+        lines.append(
             f"  direct form: A warp {a[0, 0]:.4g}, A fill {a[1, 1]:.4g}, A warp-fill "
             f"{a[0, 1]:.4g}, A fill-warp {a[1, 0]:.4g} kN/m"
         )
-    said.append(f"  {CONVENTION}")
-    said.append(f"  over {1 + len(found.others)} choices of what is evaluated:")
-    for name, (low, high) in found.spread.items():
-        said.append(f"    {name} {low:.4g} to {high:.4g}")
-    if found.first is not None and found.last is not None:
-        one, two = found.first.constants, found.last.constants
-        said.append(
-            f"  first cycles: E warp {one.warp:.4g}, E fill {one.fill:.4g} kN/m; last cycles: "
-            f"{two.warp:.4g}, {two.fill:.4g} kN/m"
+    lines.append(f"  {CONVENTION}")
+    lines.append(f"  over {1 + len(evaluation.others)} choices of what is evaluated:")
+    for name, (low, high) in evaluation.spread.items():
+        lines.append(f"    {name} {low:.4g} to {high:.4g}")
+    if evaluation.first is not None and evaluation.last is not None:
+        of_first, two = evaluation.first.constants, evaluation.last.constants
+        lines.append(
+            f"  first cycles: E warp {of_first.warp:.4g}, E fill {of_first.fill:.4g} kN/m; "
+            f"last cycles: {two.warp:.4g}, {two.fill:.4g} kN/m"
         )
-    back = found.kept.dropna(subset="warp_after_percent").to_dict("records")
-    return said + [
+    back = evaluation.kept.dropna(subset="warp_after_percent").to_dict("records")
+    return lines + [
         "  strain kept after {ratio}, the last that comes back to the loads of the beginning "
         "({warp_load_kN_per_m:.3g} and {fill_load_kN_per_m:.3g} kN/m): warp "
         "{warp_after_percent:.3g} %, fill {fill_after_percent:.3g} %".format_map(last)
@@ -246,15 +253,15 @@ def lines_of(found: BiaxialEvaluation) -> list[str]:
     ]
 
 
-def numbers_of(found: BiaxialEvaluation) -> dict[str, Any]:
+def numbers_of(evaluation: BiaxialEvaluation) -> dict[str, Any]:
     """Return the results for result.json."""
     plain = {
         name: table.astype(object).where(table.notna(), None).to_dict("records")
-        for name, table in tables_of(found).items()
+        for name, table in tables_of(evaluation).items()
     }
     return {
-        "options": in_words(found.chosen.options), "convention": CONVENTION,
+        "options": in_words(evaluation.chosen.options), "convention": CONVENTION,
         "points_a_path": POINTS, **plain,
-        "spread": {name: list(ends) for name, ends in found.spread.items()},
-        "notes": rows(found.notes),
+        "spread": {name: list(ends) for name, ends in evaluation.spread.items()},
+        "notes": rows(evaluation.notes),
     }  # fmt: skip

@@ -58,12 +58,12 @@ class PathObjective(StrainObjective):
 
     def modelled(self, history: History) -> Array:
         """Return the model's strains (n, 2) since the beginning of the path."""
-        own = elongations(history.displacement)
-        return np.asarray(own - own[0])
+        strains = elongations(history.displacement)
+        return np.asarray(strains - strains[0])
 
     def jacobian(self, history: History, slope: Array) -> Array:
-        own = elongations(slope)
-        return self.in_blocks(own - own[0])
+        slopes = elongations(slope)
+        return self.in_blocks(slopes - slopes[0])
 
     def of_points(self, values: Array) -> Array:
         return np.tile(values[1:], 2)
@@ -90,16 +90,16 @@ class PreparedBiaxial(PreparedParts):
     ) -> tuple[Comparison, ...]:
         """Return a comparison a ratio that masks leave; a patch hardly ever fails."""
         test, models = self.test, self.test.models()
-        kept, found = self.kept(masks), []
-        share = weighting.weight / (2 * max(1, len(kept))) if weighting.relative else 1.0
-        for path in kept.values():
+        fitted_paths, comparisons = self.kept(masks), []
+        share = weighting.weight / (2 * max(1, len(fitted_paths))) if weighting.relative else 1.0
+        for path in fitted_paths.values():
             largest = float(np.abs(path.since).max())
             if not largest > 0:
                 raise test.place.error("data", f"the strains of ratio {path.ratio} are all zero")
             objective = PathObjective(path.load, path.since, largest, share, test.noise)
-            own = self.part(path.ratio), models[path.ratio], make_solver(), objective
-            found.append(Comparison(*own, contracts=True))
-        return tuple(found)
+            parts = self.part(path.ratio), models[path.ratio], make_solver(), objective
+            comparisons.append(Comparison(*parts, contracts=True))
+        return tuple(comparisons)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
         used = {id(table): 0 for table in self.test.tables}
@@ -114,47 +114,49 @@ class PreparedBiaxial(PreparedParts):
 
     def doubts(self, expected: Expected) -> Sequence[Doubt]:
         paths = self.test.paths
-        found = [doubt for path in paths for doubt in _of_path(path)]
+        doubts = [doubt for path in paths for doubt in _of_path(path)]
         for path in paths if expected.moduli else ():
             yarn = int(np.argmax(path.load[-1] - path.load[0]))
             strain = float(path.since[-1, yarn])
             if not strain > 0:
                 continue
             load = float(path.load[-1, yarn] - path.load[0, yarn])
-            far = expected.outside(load / strain / self.test.place.fabric.thickness, ["E1", "E2"])
-            if far:
+            unlikely = expected.outside(
+                load / strain / self.test.place.fabric.thickness, ["E1", "E2"]
+            )
+            if unlikely:
                 text = (
-                    f"ratio {path.ratio}: load over strain and thickness is about {far}: are loads "
-                    "and strains in the units that are said, and is the thickness right?"
+                    f"ratio {path.ratio}: load over strain and thickness is about {unlikely}: "
+                    "are loads and strains in the units that are said, and is the thickness right?"
                 )
-                found.append(Doubt("modulus", True, text))
+                doubts.append(Doubt("modulus", True, text))
                 break
         ends = {path.ratio: path.since[-1] for path in paths}
-        for ratio, other in (("2:1", "1:2"), ("1:0", "0:1")):
-            if ratio not in ends or other not in ends:
+        for ratio, mirrored_ratio in (("2:1", "1:2"), ("1:0", "0:1")):
+            if ratio not in ends or mirrored_ratio not in ends:
                 continue
-            one, two = ends[ratio], ends[other]
-            if one[1] > STIFFER * one[0] and two[0] > STIFFER * two[1]:
+            first_end, two = ends[ratio], ends[mirrored_ratio]
+            if first_end[1] > STIFFER * first_end[0] and two[0] > STIFFER * two[1]:
                 text = (
-                    f"in ratios {ratio} and {other} the yarn that is pulled less stretches more: "
-                    "the strains of warp and fill seem to be swapped"
+                    f"in ratios {ratio} and {mirrored_ratio} the yarn that is pulled less "
+                    "stretches more: the strains of warp and fill seem to be swapped"
                 )
-                return [*found, Doubt("swapped", True, text)]
-        return found
+                return [*doubts, Doubt("swapped", True, text)]
+        return doubts
 
 
 def candidates(planning: Planning) -> Sequence[kinds.Candidate]:
     """Return each ratio by itself, up to the strains that the law is known for."""
-    own = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
-    noise_is = "assumed" if not own else f"that of {own[0].test.name}"
+    prepared = [test for test in planning.present if isinstance(test, PreparedBiaxial)]
+    noise_is = "assumed" if not prepared else f"that of {prepared[0].test.name}"
     noise_is = noise_is if planning.noise is None else "given"
     return [
-        kinds.Candidate(f"biaxial {ratio}", partial(_made, ratio, own, planning), noise_is)
+        kinds.Candidate(f"biaxial {ratio}", partial(_made, ratio, prepared, planning), noise_is)
         for ratio in (*RATIOS, *FURTHER)
     ]
 
 
-def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> PreparedBiaxial:
+def _made(ratio: str, present: Sequence[PreparedBiaxial], planning: Planning) -> PreparedBiaxial:
     """Return the path with the strains that the law gives."""
     thickness = planning.place.fabric.thickness
     highest = largest_load(planning.law, thickness, [shares(ratio)], planning.ends[:2])
@@ -169,19 +171,19 @@ def _made(ratio: str, own: Sequence[PreparedBiaxial], planning: Planning) -> Pre
     section = BiaxialSection(data=TablesSection(files=["computed"]))
     test = BiaxialTest(
         name=f"biaxial {ratio}", place=planning.place, weight=1.0, section=section,
-        tables=[table], paths=[path], noise=_noise(own, planning) / PERCENT,
+        tables=[table], paths=[path], noise=_noise(present, planning) / PERCENT,
     )  # fmt: skip
     return PreparedBiaxial(test)
 
 
-def _noise(own: Sequence[PreparedBiaxial], planning: Planning) -> float:
+def _noise(present: Sequence[PreparedBiaxial], planning: Planning) -> float:
     """Return the noise of independent strains, %."""
     if planning.noise is not None:
         return planning.noise
-    known = [planning.precision[t.part(p.ratio)] for t in own for p in t.test.paths]
-    if not known:
+    precisions = [planning.precision[t.part(p.ratio)] for t in present for p in t.test.paths]
+    if not precisions:
         return kinds.Precision(PERCENT * USUAL_NOISE, 1.0, INDEPENDENT).at(LOADS - 1)
-    return max(one.at(LOADS - 1) for one in known)
+    return max(precision.at(LOADS - 1) for precision in precisions)
 
 
 def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
@@ -200,11 +202,11 @@ def _of_path(path: BiaxialPath) -> Iterator[Doubt]:
         )
         yield Doubt("load-unit", True, text)
     warp, fill = (path.load[-1] - path.load[0]).tolist()
-    said = np.degrees(np.arctan2(*shares(path.ratio)[::-1]))
-    if abs(np.degrees(np.arctan2(fill, warp)) - said) > OFF:
-        seen = nearest_ratio([warp, fill])
+    expected_angle = np.degrees(np.arctan2(*shares(path.ratio)[::-1]))
+    if abs(np.degrees(np.arctan2(fill, warp)) - expected_angle) > OFF:
+        measured_ratio = nearest_ratio([warp, fill])
         text = (
             f"ratio {path.ratio}: the loads change by {warp:.4g} and {fill:.4g} kN/m along warp "
-            f"and fill, which is {seen}: are the columns of warp and fill right?"
+            f"and fill, which is {measured_ratio}: are the columns of warp and fill right?"
         )
-        yield Doubt("ratio", seen == ":".join(path.ratio.split(":")[::-1]), text)
+        yield Doubt("ratio", measured_ratio == ":".join(path.ratio.split(":")[::-1]), text)

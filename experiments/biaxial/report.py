@@ -33,9 +33,9 @@ CONTENT = {
 def misfit_table(paths: Sequence[FittedPart]) -> Table:
     """Return the misfit ratio by ratio."""
     rows: list[list[object]] = [
-        [own.ratio, *rms.tolist(), f"{own.cycle.number} of {own.cycles}", len(own.load),
-         *own.larger[[0, -1]].tolist(), *(PERCENT * own.residual).tolist()]
-        for own, rms in ((p.data, p.rms) for p in paths)
+        [path.ratio, *rms.tolist(), f"{path.cycle.number} of {path.cycles}", len(path.load),
+         *path.larger[[0, -1]].tolist(), *(PERCENT * path.residual).tolist()]
+        for path, rms in ((p.data, p.rms) for p in paths)
     ]  # fmt: skip
     header = [
         "ratio", "RMS error warp, %", "RMS error fill, %", "cycle", "points matched",
@@ -66,17 +66,17 @@ def simulate(
                 ratios[path.ratio] = {"failed": outcome.reason}
                 lines.append(f"{name}: ratio {path.ratio} failed: {outcome.reason}")
                 continue
-            own = elongations(outcome.displacement)
-            beyond = (np.log1p(own) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
-            shown = int(np.argmax(beyond)) if within_range and beyond.any() else len(own)
-            larger, strain = path.larger[:shown], PERCENT * (own - own[0])[:shown]
-            columns = _columns(path.load[:shown], "load_kN_per_m")
+            strains = elongations(outcome.displacement)
+            is_beyond = (np.log1p(strains) > card.law.strain_range[:2] * (1 + 1e-6)).any(axis=1)
+            count = int(np.argmax(is_beyond)) if within_range and is_beyond.any() else len(strains)
+            larger, strain = path.larger[:count], PERCENT * (strains - strains[0])[:count]
+            columns = _columns(path.load[:count], "load_kN_per_m")
             columns |= _columns(strain, "strain_percent")
             tables.append(pd.DataFrame({"card": name, "ratio": path.ratio, **columns}))
             warp, fill, end = None, None, 0.0
-            if shown:
+            if count:
                 curves.append((name, larger, strain))
-                off, end = strain - PERCENT * path.since[:shown], float(larger[-1])
+                off, end = strain - PERCENT * path.since[:count], float(larger[-1])
                 warp, fill = np.sqrt(np.mean(off**2, axis=0)).tolist()
                 lines.append(
                     f"{name}: ratio {path.ratio}: RMS of strain {warp:.3g} % along warp, "
@@ -113,8 +113,10 @@ def findings(prepared: PreparedBiaxial, fitted: FittedTest) -> Findings:
         f"{prepared.test.name} pulls along the yarns only: it says nothing of G12, which rests on "
         "other tests or stays where its fit began"
     )
-    said = dict.fromkeys(note for table in prepared.test.tables for note in table.source.notes)
-    notes = Note(kinds.UNMATCHED, words), *(Note(kinds.READING, words) for words in said)
+    reader_notes = dict.fromkeys(
+        note for table in prepared.test.tables for note in table.source.notes
+    )
+    notes = Note(kinds.UNMATCHED, words), *(Note(kinds.READING, words) for words in reader_notes)
     return Findings({"ratios": numbers}, notes, (summary,), summary, summary)
 
 
@@ -133,7 +135,7 @@ def fitted_paths(prepared: PreparedBiaxial, fitted: FittedTest) -> Charts:
 CHARTS = {"loads": fitted_paths}
 
 
-def show(prepared: PreparedBiaxial, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
+def show(prepared: PreparedBiaxial, fitted: FittedTest, findings: Findings, out: Output) -> Exhibit:
     """Write paths.csv and the figure of the ratios."""
     paths = prepared.fitted_parts(fitted)
     parts = []
@@ -162,10 +164,10 @@ def examine(prepared: PreparedBiaxial, out: Output) -> Exhibit:
     rows: list[list[object]] = []
     for read, cycles in zip(test.tables, test.cycles, strict=True):
         for cycle in cycles:
-            kept = PERCENT * (read.strain[cycle.first] - read.strain[0])
+            kept_strain = PERCENT * (read.strain[cycle.first] - read.strain[0])
             mark = "yes" if (id(read), cycle.count) in used else ""
             rows.append([read.path.name, cycle.count, cycle.ratio, cycle.number,
-                         *read.load[cycle.last].tolist(), *kept.tolist(), mark])  # fmt: skip
+                         *read.load[cycle.last].tolist(), *kept_strain.tolist(), mark])  # fmt: skip
     header = [
         "file", "cycle", "ratio", "of its ratio", "top load warp, kN/m", "fill, kN/m",
         "strain kept before it, warp, %", "fill, %", "evaluated",
@@ -197,43 +199,46 @@ STANDARD_HEADER = (
 )  # fmt: skip
 
 
-def constants_table(found: BiaxialEvaluation) -> Table:
+def constants_table(evaluation: BiaxialEvaluation) -> Table:
     """Return each constant with its ends over all choices, of first and of last cycles."""
-    chosen = row_of(found.chosen)
+    chosen = row_of(evaluation.chosen)
     named = {
         name: name.removesuffix("_kN_per_m").replace("_", " ")
         for name in chosen
         if name.startswith(("E_", "nu_", "A_"))
     }
-    every = pd.DataFrame([chosen, *map(row_of, found.others)])
-    ends = [None if one is None else row_of(one) for one in (found.first, found.last)]
+    alternatives = pd.DataFrame([chosen, *map(row_of, evaluation.others)])
+    ends = [
+        None if of_cycle is None else row_of(of_cycle)
+        for of_cycle in (evaluation.first, evaluation.last)
+    ]
     rows: list[list[object]] = [
-        [words, "kN/m" if key.endswith("_m") else "–", chosen[key], float(every[key].min()),
-         float(every[key].max()), *(end and end[key] for end in ends)]
+        [words, "kN/m" if key.endswith("_m") else "–", chosen[key], float(alternatives[key].min()),
+         float(alternatives[key].max()), *(end and end[key] for end in ends)]
         for key, words in named.items()
     ]  # fmt: skip
     header = ["constant", "unit", "value", "least of all choices", "largest", "of first cycles",
               "of last cycles"]  # fmt: skip
     note = (
-        f"Evaluated: {in_words(found.chosen.options)}, {found.chosen.paths} strain paths; the "
-        f"ends are over {1 + len(found.others)} choices of what is evaluated. E and nu: inverse "
-        f"form, A: direct form. {CONVENTION}. A biaxial test says nothing of the shear stiffness."
+        f"Evaluated: {in_words(evaluation.chosen.options)}, {evaluation.chosen.paths} strain paths; "
+        f"the ends are over {1 + len(evaluation.others)} choices of what is evaluated. "
+        f"E and nu: inverse form, A: direct form. {CONVENTION}. A biaxial test says nothing of the shear stiffness."
     )
     return Table("Constants per width", header, rows, note, text=(1,))
 
 
-def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
+def show_constants(evaluation: BiaxialEvaluation, out: Output) -> Exhibit:
     """Write all tables as CSV, and constants.png; return the constants for the page."""
-    tables = tables_of(found)
-    files = [out.write(f"{name}.csv", own, CONTENT[name]) for name, own in tables.items()]
+    tables = tables_of(evaluation)
+    files = [out.write(f"{name}.csv", table, CONTENT[name]) for name, table in tables.items()]
     panels = []
-    for measured in found.paths:
+    for measured in evaluation.paths:
         load = measured.load
-        strain = PERCENT * found.chosen.constants.strain(load - load[0])
-        curves, seen = (("constants", measured.larger, strain),), PERCENT * measured.since
-        panels.append(ratio_chart(measured.ratio, measured.larger, seen, curves))
+        strain = PERCENT * evaluation.chosen.constants.strain(load - load[0])
+        curves, measured_curve = (("constants", measured.larger, strain),), PERCENT * measured.since
+        panels.append(ratio_chart(measured.ratio, measured.larger, measured_curve, curves))
     caption = "Strain over the larger load: measured, and by the constants"
-    charts = Charts(f"{found.test} constants", panels, caption)
+    charts = Charts(f"{evaluation.test} constants", panels, caption)
     files.append(saved(out, "constants.png", charts, "picture of the ratios"))
     note = (
         "Stiffness: change of a yarn's load over that of its strain, along the cycle evaluated; "
@@ -243,11 +248,16 @@ def show_constants(found: BiaxialEvaluation, out: Output) -> Exhibit:
     rows = tables[STANDARD].to_numpy(dtype=object).tolist()
     standard = Table("Report after EN 17117-1", STANDARD_HEADER, rows, note, text=(1, 3))
     rows = [
-        [in_words(one.options), one.paths, *(getattr(one.constants, n) for n in NAMES), one.squares]
-        for one in (found.chosen, *found.others)
+        [
+            in_words(alternative.options),
+            alternative.paths,
+            *(getattr(alternative.constants, n) for n in NAMES),
+            alternative.squares,
+        ]
+        for alternative in (evaluation.chosen, *evaluation.others)
     ]
     header = ["what", "paths", "E warp, kN/m", "E fill, kN/m", "nu_warp", "nu_fill", "squares, %²"]
     choice = Table("Every choice", header, rows, "The first is the one chosen.")
     return Exhibit(
-        tables=[constants_table(found), standard], files=files, parts=[charts], record=[choice]
+        tables=[constants_table(evaluation), standard], files=files, parts=[charts], record=[choice]
     )

@@ -124,14 +124,14 @@ class FieldObjective:
         ends = np.cumsum([len(target.displacement) for target in self.targets])[:-1]
         return np.concatenate([np.tile(own, 3) for own in np.split(values, ends)])
 
-    def shifted(self, here: History, there: History) -> FieldObjective:
-        other = copy.copy(self)
-        by = here.displacement - there.displacement
-        other.targets = tuple(
+    def shifted(self, external: History, surrogate: History) -> FieldObjective:
+        objective = copy.copy(self)
+        by = external.displacement - surrogate.displacement
+        objective.targets = tuple(
             replace(target, displacement=target.displacement - target.of(by, k))
             for k, target in enumerate(self.targets)
         )
-        return other
+        return objective
 
     def residual(self, history: History, nuisance: Unknowns | None = None) -> Array:
         """Return the blocks laid end to end, (m,); the model is moved by the offsets."""

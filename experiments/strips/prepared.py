@@ -66,10 +66,10 @@ class LoadObjective:
     def of_points(self, values: Array) -> Array:
         return values
 
-    def shifted(self, here: History, there: History) -> LoadObjective:
-        other = copy.copy(self)
-        other.measured = self.measured - self.sample @ (here.load - there.load)
-        return other
+    def shifted(self, external: History, surrogate: History) -> LoadObjective:
+        objective = copy.copy(self)
+        objective.measured = self.measured - self.sample @ (external.load - surrogate.load)
+        return objective
 
     def modelled(self, history: History) -> Array:
         """Return the model's load at the measured elongations, (n,) N."""

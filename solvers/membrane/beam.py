@@ -17,7 +17,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
 from ...meshes.mesh import Array
 from ..base import EARLY, History
-from .newton import Asked, Done
+from .newton import RunRequest, Done
 
 #: Newton's iterations in a step; how often it is halved.
 MOST_ITERATIONS, MOST_CUTS = 30, 6
@@ -47,9 +47,9 @@ class Beam:
         if width > 0:
             # A strap over mid-span lies on both halves, as two straps do.
             middle = 0.5 * (self.s[1:] + self.s[:-1])
-            own = np.where(np.abs(middle - at) < width, self.length, 0.0)
-            shares[:-1] += own
-            shares[1:] += own
+            loaded_length = np.where(np.abs(middle - at) < width, self.length, 0.0)
+            shares[:-1] += loaded_length
+            shares[1:] += loaded_length
         else:
             shares[np.argmin(np.abs(self.s - at))] = 1.0
         self.load[1::3] = -0.5 * shares / shares.sum()
@@ -148,9 +148,9 @@ class Beam:
 
     def reach(self, x: Array, at: float, to: float, cuts: int = MOST_CUTS) -> Array | None:
         """Return the state at the deflection `to` from x at another, in halved steps if needed."""
-        found = self.equilibrium(x, to)
-        if found is not None or cuts == 0:
-            return found
+        state = self.equilibrium(x, to)
+        if state is not None or cuts == 0:
+            return state
         middle = 0.5 * (at + to)
         halfway = self.reach(x, at, middle, cuts - 1)
         return None if halfway is None else self.reach(halfway, middle, to, cuts - 1)
@@ -160,20 +160,20 @@ class Beam:
         p = self.model.mesh.points
         q = x[: 3 * len(self.s)].reshape(-1, 3)
         along, up, turn = (np.interp(p[:, 2], self.s, q[:, k]) for k in range(3))
-        moved = up + p[:, 1] * (np.cos(turn) - 1.0), along - p[:, 1] * np.sin(turn)
-        return np.column_stack([np.zeros(len(p)), *moved])
+        displacement = up + p[:, 1] * (np.cos(turn) - 1.0), along - p[:, 1] * np.sin(turn)
+        return np.column_stack([np.zeros(len(p)), *displacement])
 
 
 def prepare(model: BeamModel, law: HypoelasticLaw, tolerance: float, wall: object) -> Beam:
     return Beam(model, tolerance)
 
 
-def analyse(beam: Beam, model: BeamModel, asked: Asked) -> tuple[History, Array]:
+def analyse(beam: Beam, model: BeamModel, request: RunRequest) -> tuple[History, Array]:
     """Return the history: the inflated tube under its weight, then every reported deflection.
 
     SolverFailure : no equilibrium under its weight, or at the first deflection.
     """
-    if asked.parameters or asked.guess is not None:
+    if request.parameters or request.guess is not None:
         raise InputError(None, "parameters", "a beam takes no parameters or guess")
     x = beam.equilibrium(np.zeros(3 * len(beam.s) + 2), None)
     if x is None:
@@ -181,36 +181,36 @@ def analyse(beam: Beam, model: BeamModel, asked: Asked) -> tuple[History, Array]
     sag = -x[1]
     states = [x]
     early = ""
-    wanted = 0.0
+    previous = 0.0
     low = high = 0.0
     for i, deflection in enumerate(model.increments):
-        found = beam.reach(states[-1], sag + wanted, sag + deflection)
-        if found is None:
-            early = f"the run stopped early: no equilibrium between {wanted:.4g} and "
+        state_reached = beam.reach(states[-1], sag + previous, sag + deflection)
+        if state_reached is None:
+            early = f"the run stopped early: no equilibrium between {previous:.4g} and "
             early += f"{deflection:.4g} mm of deflection"
             break
-        states.append(found)
-        wanted = deflection
+        states.append(state_reached)
+        previous = deflection
         strain, bend = beam.strains
         reach = np.abs(bend) * model.section.radius
         low = min(low, float((strain - reach).min()))
         high = max(high, float((strain + reach).max()))
-        if asked.tell is not None:
-            asked.tell(Done(i + 1))
+        if request.tell is not None:
+            request.tell(Done(i + 1))
     if len(states) == 1:
         raise SolverFailure(f"no frame of the bending: {early}")
     frames = [0, *(i + 1 for i in model.reported if i + 1 < len(states))]
-    kept = np.array([states[i] for i in frames])
-    load = kept[:, -1] + model.friction * (np.arange(len(kept)) > 0)
-    none = np.zeros(len(kept))
-    volume = 2 * np.pi * model.section.radius**2 * (0.5 * model.span + kept[:, -5])
+    reported = np.array([states[i] for i in frames])
+    load = reported[:, -1] + model.friction * (np.arange(len(reported)) > 0)
+    none = np.zeros(len(reported))
+    volume = 2 * np.pi * model.section.radius**2 * (0.5 * model.span + reported[:, -5])
     history = History(
         load,
-        np.array([beam.surface(one) for one in kept]),
+        np.array([beam.surface(state) for state in reported]),
         np.array([low, 0.0, 0.0]),
         np.array([high, 0.0, 0.0]),
-        {"supports": np.column_stack([none, -2 * kept[:, -2], none])},
-        cavity_pressure=np.full(len(kept), model.pressure),
+        {"supports": np.column_stack([none, -2 * reported[:, -2], none])},
+        cavity_pressure=np.full(len(reported), model.pressure),
         cavity_volume=volume,
         iterations=beam.iterations,
         remarks=(Note(EARLY, early),) if early else (),

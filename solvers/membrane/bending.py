@@ -22,7 +22,7 @@ from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall
 from .closed import ClosedMembrane, brought_to_touch, closed_membrane, gaps
 from .newton import (
-    Asked,
+    RunRequest,
     Loading,
     NoEquilibrium,
     Record,
@@ -71,17 +71,17 @@ class Neighbours:
         acting = {"nu12", *(f"beta_{i}" for i in law.form.free)}  # others of a form stay zero
         self.steps = np.array([usual_step(law, name, 1.0, SHARE) for name in parameters])
         for name, step in zip(parameters, self.steps.tolist(), strict=True):
-            beside = law_beside(law, name, step) if name in acting else law
-            self.each.append(_copied(membrane, beside))
+            neighbour_law = law_beside(law, name, step) if name in acting else law
+            self.each.append(_copied(membrane, neighbour_law))
         self.moved = [np.zeros_like(membrane.reference) for _ in self.each]
 
     def on(self, membrane: ClosedMembrane) -> None:
         """Go on beside a membrane with other supports, which has the state of the one before."""
-        before = self.each
-        self.each = [_copied(membrane, own.law) for own in before]
-        for own, old in zip(self.each, before, strict=True):
-            own.strain_old[:] = old.strain_old
-            own.stress_old[:] = old.stress_old
+        originals = self.each
+        self.each = [_copied(membrane, copied.law) for copied in originals]
+        for copied, old in zip(self.each, originals, strict=True):
+            copied.strain_old[:] = old.strain_old
+            copied.stress_old[:] = old.stress_old
 
     def follow(self, membrane: ClosedMembrane, u: Array) -> None:
         """Move to the equilibria beside u (n, 3), that of the membrane, before it is accepted."""
@@ -90,30 +90,33 @@ class Neighbours:
         membrane.unbalance(u, membrane.pressure, with_tangent=True)
         membrane.factor()
         free = membrane.free
-        for k, own in enumerate(self.each):
+        for k, neighbour in enumerate(self.each):
             to = u.copy()
-            own.unbalance(to, membrane.pressure, with_tangent=False)
+            neighbour.unbalance(to, membrane.pressure, with_tangent=False)
             for _ in range(2):
-                off = (own.residual - membrane.residual)[free]
+                off = (neighbour.residual - membrane.residual)[free]
                 to.reshape(-1)[free] -= membrane.tangent.solve(off)
-                if not np.isfinite(own.unbalance(to, membrane.pressure, with_tangent=False)):
+                if not np.isfinite(neighbour.unbalance(to, membrane.pressure, with_tangent=False)):
                     raise SolverFailure("no derivative: no valid stress next to an equilibrium")
-            own.accept()
+            neighbour.accept()
             self.moved[k] = to
 
-    def slopes(self, here: Array, there: Sequence[Array]) -> Array:
+    def slopes(self, value: Array, neighbour_values: Sequence[Array]) -> Array:
         """Return derivatives (..., k) of a quantity by its values at the neighbours."""
-        columns = [(own - here) / step for own, step in zip(there, self.steps, strict=True)]
-        return np.stack(columns, axis=-1) if columns else np.zeros((*here.shape, 0))
+        columns = [
+            (neighbour_value - value) / step
+            for neighbour_value, step in zip(neighbour_values, self.steps, strict=True)
+        ]
+        return np.stack(columns, axis=-1) if columns else np.zeros((*value.shape, 0))
 
 
 def _copied(membrane: ClosedMembrane, law: HypoelasticLaw) -> ClosedMembrane:
     """Return a membrane with a state of its own, that of the other one, and another law."""
-    own = copy.copy(membrane)
+    copied = copy.copy(membrane)
     for name in ("strain_old", "stress_old", "strain_new", "stress_new", "wrinkle", "residual"):
-        setattr(own, name, getattr(membrane, name).copy())
-    own.law, own.cords = law, copy.deepcopy(membrane.cords)
-    return own
+        setattr(copied, name, getattr(membrane, name).copy())
+    copied.law, copied.cords = law, copy.deepcopy(membrane.cords)
+    return copied
 
 
 def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
@@ -129,22 +132,22 @@ def settled(membrane: ClosedMembrane, start: Array) -> Array | None:
     try:
         for _ in range(MOST_STEPS):
             membrane.drag(viscosity, u)
-            found = membrane.equilibrium(u, membrane.pressure)
-            if found is None:
+            viscous = membrane.equilibrium(u, membrane.pressure)
+            if viscous is None:
                 viscosity *= UP
                 if viscosity > MOST * unit:
                     return None
                 continue
-            moved = float(np.abs(found - u).max())
-            u = found
-            restless = viscosity > LITTLE * unit or moved > NEAR * facet
+            motion = float(np.abs(viscous - u).max())
+            u = viscous
+            restless = viscosity > LITTLE * unit or motion > NEAR * facet
             viscosity = max(DOWN * viscosity, LEAST * unit)
             if restless:
                 continue
             membrane.drag(0.0, u)
-            rest = membrane.equilibrium(u, membrane.pressure)
-            if rest is not None:
-                return rest
+            equilibrium = membrane.equilibrium(u, membrane.pressure)
+            if equilibrium is not None:
+                return equilibrium
         return None
     finally:
         membrane.drag(0.0, start)
@@ -174,17 +177,19 @@ class Bodies:
         self.membrane.gas = closed
         self.membrane.pressure = pressure
 
-    def move(self, moved: float) -> None:
+    def move(self, travel: float) -> None:
         """Move the collars by a way (mm) from where they touched."""
         self.membrane.bodies = list(self.posts)
         for body in self.collars:
-            to = np.asarray(body.centre) + moved * self.way
+            to = np.asarray(body.centre) + travel * self.way
             self.membrane.bodies.append(replace(body, centre=tuple(to.tolist())))
 
     def pushes(self) -> Array:
         """Return forces (bodies, 3) N on the meshed part, zero of collars that are not there."""
-        own = [push.sum(axis=0) for push in self.membrane.contact]
-        return np.array(own + [np.zeros(3)] * (len(self.posts) + len(self.collars) - len(own)))
+        forces = [push.sum(axis=0) for push in self.membrane.contact]
+        return np.array(
+            forces + [np.zeros(3)] * (len(self.posts) + len(self.collars) - len(forces))
+        )
 
 
 def analyse(
@@ -194,8 +199,8 @@ def analyse(
     pressure: float,
     extremes: tuple[Array, Array],
     sides: NDArray[np.bool_],
-    asked: Asked,
-    beside: Neighbours,
+    request: RunRequest,
+    neighbours: Neighbours,
 ) -> tuple[History, Array]:
     """Return the frames of the bending: the inflated state and every reported displacement.
 
@@ -208,18 +213,21 @@ def analyse(
     way = np.asarray(plan.direction, dtype=float)
     membrane.pressure = pressure
     bodies = Bodies(membrane, plan, inflated)
-    others = [Bodies(own, plan, u) for own, u in zip(beside.each, beside.moved, strict=True)]
+    neighbour_bodies = [
+        Bodies(bodies_of_neighbour, plan, u)
+        for bodies_of_neighbour, u in zip(neighbours.each, neighbours.moved, strict=True)
+    ]
     if plan.weight:
-        found = membrane.equilibrium(inflated, pressure)
-        found = settled(membrane, inflated) if found is None else found
-        if found is None:
+        displacement = membrane.equilibrium(inflated, pressure)
+        displacement = settled(membrane, inflated) if displacement is None else displacement
+        if displacement is None:
             raise SolverFailure("no equilibrium of the inflated tube under its weight")
-        beside.follow(membrane, found)
+        neighbours.follow(membrane, displacement)
         membrane.accept()
-        inflated = found
+        inflated = displacement
     bodies.close(plan, inflated, pressure)
-    for own, u in zip(others, beside.moved, strict=True):
-        own.close(plan, u, pressure)
+    for bodies_of_neighbour, u in zip(neighbour_bodies, neighbours.moved, strict=True):
+        bodies_of_neighbour.close(plan, u, pressure)
     volume, _ = membrane.cavity.measure(membrane.reference + inflated)
     membrane.keep_tangent = True
 
@@ -231,8 +239,11 @@ def analyse(
     pushes = [bodies.pushes()]
     rates = [
         (
-            beside.slopes(inflated, beside.moved),
-            beside.slopes(pushes[0], [own.pushes() for own in others]),
+            neighbours.slopes(inflated, neighbours.moved),
+            neighbours.slopes(
+                pushes[0],
+                [bodies_of_neighbour.pushes() for bodies_of_neighbour in neighbour_bodies],
+            ),
         )
     ]
     remarks: list[Note] = []
@@ -244,32 +255,35 @@ def analyse(
     moving = Moving(membrane, bodies.move)
     # A displacement without equilibrium ends the history, and is no failure.
     try:
-        steps = march(moving, plan.displacements, asked, (0.0, inflated), len(model.pressures))
-        for wanted, found in zip(plan.displacements, steps, strict=True):
-            if len(path) > 2 and np.abs(found - moving.expected).max() > LEAP * (
-                wanted - moves[-1]
+        steps = march(moving, plan.displacements, request, (0.0, inflated), len(model.pressures))
+        for travel, displacement in zip(plan.displacements, steps, strict=True):
+            if len(path) > 2 and np.abs(displacement - moving.expected).max() > LEAP * (
+                travel - moves[-1]
             ):
-                snaps.append(wanted)
-            for own in others:
-                own.move(wanted)
-            beside.follow(membrane, found)
+                snaps.append(travel)
+            for bodies_of_neighbour in neighbour_bodies:
+                bodies_of_neighbour.move(travel)
+            neighbours.follow(membrane, displacement)
             work = membrane.wrinkle_work(wrinkle)
             wrinkle = membrane.wrinkle.copy()
             membrane.accept()
-            path.append(found)
-            moves.append(wanted)
+            path.append(displacement)
+            moves.append(travel)
             gas.append((membrane.pressure, membrane.volume))
             pushes.append(bodies.pushes())
             rates.append(
                 (
-                    beside.slopes(found, beside.moved),
-                    beside.slopes(pushes[-1], [own.pushes() for own in others]),
+                    neighbours.slopes(displacement, neighbours.moved),
+                    neighbours.slopes(
+                        pushes[-1],
+                        [bodies_of_neighbour.pushes() for bodies_of_neighbour in neighbour_bodies],
+                    ),
                 )
             )
             wrinkled.append(membrane.wrinkled_share(sides))
             of_wrinkles = max(of_wrinkles, abs(work) / (moves[-1] - moves[-2]))
-            now = membrane.reference + found
-            deepest = max(deepest, *(-float(gaps(b, now)[0].min()) for b in membrane.bodies))
+            position = membrane.reference + displacement
+            deepest = max(deepest, *(-float(gaps(b, position)[0].min()) for b in membrane.bodies))
             np.minimum(low, membrane.strain_old.min(axis=(0, 1)), out=low)
             np.maximum(high, membrane.strain_old.max(axis=(0, 1)), out=high)
     except NoEquilibrium as failure:
@@ -284,20 +298,22 @@ def analyse(
         remarks.append(Note(SNAP, f"snaps, or nearly, before {where} mm of deflection"))
     words = f"rigid bodies penetrate {deepest:.3g} mm at most"
     remarks.append(Note(PENETRATION, words))
-    most = float(np.abs(np.array(pushes)[:, len(plan.supports) :].sum(axis=1) @ way).max())
-    if membrane.wrinkle_stiffness is not None and most > 0:
+    largest_push = float(np.abs(np.array(pushes)[:, len(plan.supports) :].sum(axis=1) @ way).max())
+    if membrane.wrinkle_stiffness is not None and largest_push > 0:
         words = (
             f"what stiffness is left to wrinkles ({membrane.wrinkle_stiffness:g} of the taut "
-            f"fabric's) carries {100 * of_wrinkles / most:.2g} % of the largest load"
+            f"fabric's) carries {100 * of_wrinkles / largest_push:.2g} % of the largest load"
         )
         remarks.append(Note(WRINKLES, words))
     # The other half takes up forces normal to a symmetry plane.
-    whole = model.copies * ~membrane.cavity.symmetric
-    force = np.array(pushes)[frames] * whole
+    copies = model.copies * ~membrane.cavity.symmetric
+    force = np.array(pushes)[frames] * copies
     reactions: dict[str, Array] = {}
     for i, body in enumerate((*plan.supports, *plan.collars)):
         reactions[body.name] = reactions.get(body.name, 0.0) + force[:, i]
-    by_collars = np.array([own[len(plan.supports) :].sum(axis=0) for _, own in rates])[frames]
+    by_collars = np.array(
+        [bodies_of_neighbour[len(plan.supports) :].sum(axis=0) for _, bodies_of_neighbour in rates]
+    )[frames]
     history = History(
         reactions[plan.collars[0].name] @ way,
         np.array(path)[frames],
@@ -312,9 +328,9 @@ def analyse(
         remarks=tuple(remarks),
         early=early,
         relaxed=membrane.wrinkle_stiffness is not None,
-        load_slope=np.einsum("fik,i->fk", by_collars, whole * way) if beside.each else None,
+        load_slope=np.einsum("fik,i->fk", by_collars, copies * way) if neighbours.each else None,
     )
-    return history, np.array([own for own, _ in rates])[frames]
+    return history, np.array([bodies_of_neighbour for bodies_of_neighbour, _ in rates])[frames]
 
 
 class Moving(Loading):
@@ -329,46 +345,48 @@ class Moving(Loading):
 
     def equilibrium(self, start: Array, level: float) -> Array | None:
         self.move(level)
-        found = self.membrane.equilibrium(start, self.membrane.pressure)
+        displacement = self.membrane.equilibrium(start, self.membrane.pressure)
         # Newton's iteration fails where wrinkles come and go, and at a limit load.
-        return found if found is not None else settled(self.membrane, start)
+        return displacement if displacement is not None else settled(self.membrane, start)
 
     def ahead(self, levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
         # The way from the inflated state to the first contact says nothing of what follows.
         self.expected = straight_on(levels, path, level) if len(path) > 2 else path[-1]
         return self.expected
 
-    def problem(self, before: float, level: float, place: str) -> str:
-        return f"no equilibrium between {before:.4g} and {level:.4g} mm of deflection"
+    def problem(self, previous: float, level: float, place: str) -> str:
+        return f"no equilibrium between {previous:.4g} and {level:.4g} mm of deflection"
 
 
-def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float) -> Array | None:
+def through_snap(membrane: ClosedMembrane, u: Array, previous: float, level: float) -> Array | None:
     """Return the equilibrium at `level` beyond a limit pressure, led there by the volume."""
-    outside = OVERPRESSURE * level
+    outer_pressure = OVERPRESSURE * level
     first, _ = membrane.cavity.measure(membrane.reference + u)
     volume = first
-    pressure = before
+    pressure = previous
     step = STEP
     slope = np.zeros_like(u)
     try:
         while step >= LEAST_STEP and volume < MOST_GROWTH * first:
-            membrane.gas = ClosedGas((outside + pressure) * volume * (1.0 + step), outside)
-            found = membrane.equilibrium(u + step * slope, 0.0)
-            if found is None and step < 0.5 * STEP:
+            membrane.gas = ClosedGas(
+                (outer_pressure + pressure) * volume * (1.0 + step), outer_pressure
+            )
+            displacement = membrane.equilibrium(u + step * slope, 0.0)
+            if displacement is None and step < 0.5 * STEP:
                 # Snapping gathers in one bulge, and the rest of the wall slackens.
-                found = membrane.equilibrium_from_slack(u, level)
-                if found is None:
-                    found = settled(membrane, u + step * slope)
-            if found is None:
+                displacement = membrane.equilibrium_from_slack(u, level)
+                if displacement is None:
+                    displacement = settled(membrane, u + step * slope)
+            if displacement is None:
                 step = 0.5 * step
                 slope = np.zeros_like(u)
                 continue
             if membrane.pressure >= level:
                 membrane.gas = None
-                return membrane.equilibrium(found, level)
+                return membrane.equilibrium(displacement, level)
             membrane.accept()
-            slope = (found - u) / step
-            u = found
+            slope = (displacement - u) / step
+            u = displacement
             volume = membrane.volume
             pressure = membrane.pressure
             step = min(STEP, 1.5 * step)
@@ -378,12 +396,12 @@ def through_snap(membrane: ClosedMembrane, u: Array, before: float, level: float
 
 
 def analyse_inflated(
-    membrane: ClosedMembrane, model: InflatedModel, asked: Asked
+    membrane: ClosedMembrane, model: InflatedModel, request: RunRequest
 ) -> tuple[History, Array]:
     """Return the history of inflation or bending of a fresh membrane, and derivatives."""
-    if asked.guess is not None:
+    if request.guess is not None:
         raise InputError(None, "guess", "a closed membrane takes none")
-    beside = Neighbours(membrane, asked.parameters)
+    neighbours = Neighbours(membrane, request.parameters)
     levels = np.array(model.pressures)
     volume = np.zeros(len(levels))
     wrinkled = np.zeros(len(levels))
@@ -392,19 +410,19 @@ def analyse_inflated(
     sides[model.mesh.element_sets.get("caps", np.empty(0, dtype=np.intp))] = False
     record = Record(membrane, len(levels))
     membrane.keep_tangent = False
-    rates = np.zeros((*record.path.shape, len(asked.parameters)))
-    for i, u in enumerate(march(filling, levels, asked)):
-        beside.follow(membrane, u)
-        rates[i] = beside.slopes(u, beside.moved)
+    rates = np.zeros((*record.path.shape, len(request.parameters)))
+    for i, u in enumerate(march(filling, levels, request)):
+        neighbours.follow(membrane, u)
+        rates[i] = neighbours.slopes(u, neighbours.moved)
         record.accept(i, u)
         volume[i], wrinkled[i] = membrane.volume, membrane.wrinkled_share(sides)
     remarks = tuple(
         Note(
             SNAP,
-            f"snaps, or nearly, between {before * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
+            f"snaps, or nearly, between {previous * 1e3:.4g} and {level * 1e3:.4g} kPa: passed by "
             "leading the volume",
         )
-        for before, level in filling.snaps
+        for previous, level in filling.snaps
     )
     if model.bending is not None:
         fixed = model.fixed(bent=True)
@@ -412,14 +430,17 @@ def analyse_inflated(
         bent.strain_old[:] = membrane.strain_old
         bent.stress_old[:] = membrane.stress_old
         bent.wrinkle[:] = membrane.wrinkle
-        beside.on(bent)
-        for own, u in [(bent, record.path[-1]), *zip(beside.each, beside.moved, strict=True)]:
-            if own.cords is not None:
-                own.cords.begin(own.reference + u)
+        neighbours.on(bent)
+        for copied, u in [
+            (bent, record.path[-1]),
+            *zip(neighbours.each, neighbours.moved, strict=True),
+        ]:
+            if copied.cords is not None:
+                copied.cords.begin(copied.reference + u)
         bent.iterations = membrane.iterations
         extremes = (record.low, record.high)
         start = (record.path[-1], float(levels[-1]))
-        history, slopes = analyse(bent, model, *start, extremes, sides, asked, beside)
+        history, slopes = analyse(bent, model, *start, extremes, sides, request, neighbours)
         return replace(history, remarks=(*remarks, *history.remarks)), slopes
     sets = model.mesh.node_sets
     reactions = {n: record.forces[:, sets[n]].sum(axis=1) for n in model.supports}
@@ -436,7 +457,7 @@ def analyse_inflated(
         wrinkled=wrinkled,
         remarks=remarks,
         relaxed=membrane.wrinkle_stiffness is not None,
-        load_slope=np.zeros((len(levels), len(beside.each))) if beside.each else None,
+        load_slope=np.zeros((len(levels), len(neighbours.each))) if neighbours.each else None,
     )
     return history, rates
 
@@ -462,18 +483,18 @@ class Filling(Loading):
     def reached(
         self, lower: float, u: Array, level: float, start: Array, cuts: int
     ) -> Array | None:
-        found = self._directly(lower, u, level, start, cuts)
-        if found is not None:
+        displacement = self._directly(lower, u, level, start, cuts)
+        if displacement is not None:
             cavity = self.membrane.cavity
             reference = self.membrane.reference
-            now, then = (cavity.measure(reference + at)[0] for at in (found, u))
-            if now < (1.0 + MOST_GROWTH_INFLATED) * then:
-                return found
+            volume, volume_before = (cavity.measure(reference + at)[0] for at in (displacement, u))
+            if volume < (1.0 + MOST_GROWTH_INFLATED) * volume_before:
+                return displacement
             # Newton may leap over a limit point, but the law needs the strain path across it.
         self.snaps.append((lower, level))
         return through_snap(self.membrane, u, lower, level)
 
-    def problem(self, before: float, level: float, place: str) -> str:
+    def problem(self, previous: float, level: float, place: str) -> str:
         return (
             f"no equilibrium at {level * 1e3:.4g} kPa ({place}); more increments usually help, "
             "unless the membrane has a limit pressure below this one"
@@ -482,24 +503,24 @@ class Filling(Loading):
     def _directly(
         self, lower: float, u: Array, level: float, start: Array, cuts: int
     ) -> Array | None:
-        found = self.equilibrium(start, level)
-        if found is None and cuts == self.most_cuts:
+        displacement = self.equilibrium(start, level)
+        if displacement is None and cuts == self.most_cuts:
             # Folds of a cap come and go: treat it as slack before trying smaller steps.
-            found = self.membrane.equilibrium_from_slack(u, level)
-        return found if found is not None else halved(self, lower, u, level, cuts)
+            displacement = self.membrane.equilibrium_from_slack(u, level)
+        return displacement if displacement is not None else halved(self, lower, u, level, cuts)
 
     def _from_slack(self, level: float, cuts: int) -> Array:
         """Return the first equilibrium: facets carry no pressure until they are stretched."""
         initial_moduli(self.membrane.law)
         none = np.zeros_like(self.membrane.reference)
-        found = self.membrane.equilibrium_from_slack(none, level)
-        if found is not None:
-            return found
+        displacement = self.membrane.equilibrium_from_slack(none, level)
+        if displacement is not None:
+            return displacement
         if cuts > 0:
             lower = self._from_slack(0.25 * level, cuts - 1)
-            found = self._directly(0.25 * level, lower, level, lower, cuts)
-            if found is not None:
-                return found
+            displacement = self._directly(0.25 * level, lower, level, lower, cuts)
+            if displacement is not None:
+                return displacement
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
 
 
@@ -511,9 +532,9 @@ def prepare(
 
 
 def analyse_cylinder(
-    membrane: ClosedMembrane, model: CylinderModel, asked: Asked
+    membrane: ClosedMembrane, model: CylinderModel, request: RunRequest
 ) -> tuple[History, Array]:
-    return analyse_inflated(membrane, closed_membrane_of(model), asked)
+    return analyse_inflated(membrane, closed_membrane_of(model), request)
 
 
 def closed_membrane_of(model: CylinderModel) -> InflatedModel:

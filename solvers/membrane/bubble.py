@@ -17,7 +17,7 @@ from .cords import cords_on_sheet
 from .factorisation import tangent_for
 from .kernel import reference_elements
 from .newton import (
-    Asked,
+    RunRequest,
     Derivatives,
     Loading,
     Membrane,
@@ -116,18 +116,18 @@ def prepare(model: BubbleModel, law: HypoelasticLaw, tolerance: float, wall: Wal
     )
 
 
-def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[History, Array]:
+def analyse(membrane: Membrane, model: BubbleModel, request: RunRequest) -> tuple[History, Array]:
     """Return the history of a fresh membrane, and the derivatives in the reported frames."""
     levels = np.array(model.increments)
     shape = membrane.reference.shape
-    derivatives = _derivatives(membrane, model, asked) if asked.parameters else None
-    rates = np.zeros((len(levels), *shape, len(asked.parameters)))
+    derivatives = _derivatives(membrane, model, request) if request.parameters else None
+    rates = np.zeros((len(levels), *shape, len(request.parameters)))
     record = Record(membrane, len(levels))
     keep = model.reported
     judged = set(keep.tolist())
     unstable = []
     membrane.keep_tangent = derivatives is not None or 0 in judged
-    for i, u in enumerate(march(Inflation(membrane, model), levels, asked)):
+    for i, u in enumerate(march(Inflation(membrane, model), levels, request)):
         if i in judged and not membrane.tangent.definite():
             unstable.append(i)
         if derivatives is not None:
@@ -146,30 +146,30 @@ def analyse(membrane: Membrane, model: BubbleModel, asked: Asked) -> tuple[Histo
         reactions,
         iterations=membrane.iterations,
         path=record.path,
-        path_slope=rates if asked.parameters else None,
+        path_slope=rates if request.parameters else None,
         unstable=named(1e3 * levels[unstable], "kPa"),
     )
     return history, rates[keep]
 
 
-def _derivatives(membrane: Membrane, model: BubbleModel, asked: Asked) -> Derivatives:
+def _derivatives(membrane: Membrane, model: BubbleModel, request: RunRequest) -> Derivatives:
     of_sheet = {*model.parameters} - {PRESSURE_OFFSET, THICKNESS}
-    slopes = {n: model.sheet_slope(n) for n in asked.parameters if n in of_sheet}
+    slopes = {n: model.sheet_slope(n) for n in request.parameters if n in of_sheet}
     at = (model.stress_free, model.yarn, model.stretch)
-    return Derivatives(membrane, asked.parameters, slopes, at)
+    return Derivatives(membrane, request.parameters, slopes, at)
 
 
-def balance(membrane: Membrane, model: MeasuredShape, asked: Asked) -> tuple[History, Array]:
+def balance(membrane: Membrane, model: MeasuredShape, request: RunRequest) -> tuple[History, Array]:
     """Return the motion from a measured shape to equilibrium, to first order, and its derivatives.
 
     It is a sum of the shape's fields in which their virtual work vanishes: Newton's step, of a
     frame at a time. SolverFailure : no valid stress, or no stiffness, in a frame.
     """
-    derivatives = _derivatives(membrane, model, asked)
-    still = np.zeros((membrane.reference.size, len(asked.parameters)))
+    derivatives = _derivatives(membrane, model, request)
+    still = np.zeros((membrane.reference.size, len(request.parameters)))
     record = Record(membrane, len(model.moved))
     inner = model.fields[membrane.free]
-    steps = np.zeros((*model.moved.shape, 1 + len(asked.parameters)))
+    steps = np.zeros((*model.moved.shape, 1 + len(request.parameters)))
     for i, (u, pressure) in enumerate(zip(model.moved, model.pressures, strict=True)):
         if not np.isfinite(membrane.unbalance(u, pressure, with_tangent=True)):
             raise SolverFailure(f"no valid stress in the shape at {pressure * 1e3:.4g} kPa")
@@ -210,33 +210,33 @@ class Inflation(Loading):
         x = np.cbrt(levels[-count:])
         return lagrange(x, np.array(path[-count:]), math.cbrt(level))
 
-    def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
+    def onward(self, u: Array, at: float, to: float, previous: Array | None) -> Array:
         return np.asarray(u * (to / at) ** (1.0 / 3.0))
 
-    def problem(self, before: float, level: float, place: str) -> str:
+    def problem(self, previous: float, level: float, place: str) -> str:
         where = f"no equilibrium at {level * 1e3:.4g} kPa ({place})"
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
     def _from_flat(self, level: float, cuts: int) -> Array:
         """Return the first equilibrium from an inflated guess: a flat membrane has no stiffness."""
-        found = self._from_domes(level)
-        if found is None and cuts == self.most_cuts:
-            found = self._from_above(level)
-        if found is not None:
-            return found
+        displacement = self._from_domes(level)
+        if displacement is None and cuts == self.most_cuts:
+            displacement = self._from_above(level)
+        if displacement is not None:
+            return displacement
         if cuts > 0:
             lower = self._from_flat(0.25 * level, cuts - 1)
-            found = self.reached(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), cuts)
-            if found is not None:
-                return found
+            displacement = self.reached(0.25 * level, lower, level, lower * 4.0 ** (1 / 3), cuts)
+            if displacement is not None:
+                return displacement
         raise SolverFailure(f"no equilibrium at the first increment, {level * 1e3:.4g} kPa")
 
     def _from_domes(self, level: float) -> Array | None:
         """Search from paraboloids of about the height of Hencky's membrane."""
         membrane = self.membrane
         moduli = initial_moduli(membrane.law)
-        held = np.setdiff1d(np.arange(membrane.reference.size), membrane.free)
-        edge = membrane.reference[held[held % 3 == 2] // 3, :2]
+        fixed = np.setdiff1d(np.arange(membrane.reference.size), membrane.free)
+        edge = membrane.reference[fixed[fixed % 3 == 2] // 3, :2]
         if not len(edge):
             return None  # nothing holds the sheet down
         form = rim_form(edge)
@@ -249,18 +249,18 @@ class Inflation(Loading):
         dome[:, 2] = 1.0 - rim_share(form, membrane.reference[:, :2]) ** 2
         for factor in FIRST_HEIGHTS:
             start = factor * height * dome
-            start.reshape(-1)[held] = 0.0
-            found = self.equilibrium(start, level)
-            if found is not None:
-                return found
+            start.reshape(-1)[fixed] = 0.0
+            displacement = self.equilibrium(start, level)
+            if displacement is not None:
+                return displacement
         return None
 
     def _from_above(self, level: float) -> Array | None:
         """Search from a higher pressure down, where a slack sheet is taut."""
         for factor in HIGHER:
-            above = self._from_domes(factor * level)
-            if above is None:
+            higher = self._from_domes(factor * level)
+            if higher is None:
                 continue
-            start = self.onward(above, factor * level, level, None)
-            return self.reached(factor * level, above, level, start, self.most_cuts)
+            start = self.onward(higher, factor * level, level, None)
+            return self.reached(factor * level, higher, level, start, self.most_cuts)
         return None

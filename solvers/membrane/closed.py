@@ -57,11 +57,11 @@ def closed_cavity(points: Array, quads: NDArray[np.intp], fixed: NDArray[np.intp
     sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges, count = np.unique(sides, axis=0, return_counts=True)
     border = edges[count == 1]
-    held = np.zeros(points.shape, dtype=bool)
-    held.reshape(-1)[fixed] = True
+    is_fixed = np.zeros(points.shape, dtype=bool)
+    is_fixed.reshape(-1)[fixed] = True
     size = float(np.ptp(points, axis=0).max())
     level = np.abs(points[border[:, 0]] - points[border[:, 1]]) < 1e-9 * size
-    in_plane = held[border].all(axis=1) & level  # (edges, 3)
+    in_plane = is_fixed[border].all(axis=1) & level  # (edges, 3)
     if not in_plane.any(axis=1).all():
         first, second = border[int(np.argmin(in_plane.any(axis=1)))]
         raise InputError(
@@ -134,19 +134,21 @@ def flexure_of(
     nodes = []
     differences = []
     shares = []
-    for before, node, after, mirror in _lines(points, quads, planes):
-        step = points[after] - points[node]
-        back = points[node] - points[before] if before != after else -mirror * step
+    for previous_node, node, next_node, mirror in _lines(points, quads, planes):
+        step = points[next_node] - points[node]
+        back = (
+            points[node] - points[previous_node] if previous_node != next_node else -mirror * step
+        )
         ahead = float(np.linalg.norm(step))
         behind = float(np.linalg.norm(back))
         if step @ back < STRAIGHT * ahead * behind:
             continue
-        one = np.ones(3)
-        slopes = np.stack([mirror / behind, -one / behind - one / ahead, one / ahead])
-        if before == after:
+        ones = np.ones(3)
+        slopes = np.stack([mirror / behind, -ones / behind - ones / ahead, ones / ahead])
+        if previous_node == next_node:
             # Components normal to the plane are equal on both sides and cancel.
             slopes *= mirror > 0
-        nodes.append((before, node, after))
+        nodes.append((previous_node, node, next_node))
         differences.append(slopes / (0.5 * (ahead + behind)))
         direction = step / ahead + back / behind
         cosine = direction @ along[node] / np.linalg.norm(direction)
@@ -184,25 +186,25 @@ def _lines(
     points: Array, quads: Numbers, planes: NDArray[np.bool_]
 ) -> Iterator[tuple[int, int, int, Array]]:
     """Yield (before, node, after, mirror (3,)): neighbours in line through a node."""
-    beside: list[dict[int, set[int]]] = [{} for _ in points]
+    elements_by_neighbour: list[dict[int, set[int]]] = [{} for _ in points]
     for e, quad in enumerate(quads.tolist()):
         for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
-            beside[a].setdefault(b, set()).add(e)
-            beside[b].setdefault(a, set()).add(e)
+            elements_by_neighbour[a].setdefault(b, set()).add(e)
+            elements_by_neighbour[b].setdefault(a, set()).add(e)
     size = 1e-9 * float(np.ptp(points, axis=0).max())
-    for node, around in enumerate(beside):
+    for node, around in enumerate(elements_by_neighbour):
         normals = np.flatnonzero(planes[node])
-        inside = list(around)
+        unmatched = list(around)
         for normal in normals:
             leaving = [a for a in around if abs(points[a, normal] - points[node, normal]) > size]
             if len(leaving) == 1:
                 mirror = np.ones(3)
                 mirror[normal] = -1.0
                 yield leaving[0], node, leaving[0], mirror
-                inside.remove(leaving[0])
-        if len(around) + len(normals) == 4 and len(inside) > 1:
-            for i, a in enumerate(inside):
-                for b in inside[i + 1 :]:
+                unmatched.remove(leaving[0])
+        if len(around) + len(normals) == 4 and len(unmatched) > 1:
+            for i, a in enumerate(unmatched):
+                for b in unmatched[i + 1 :]:
                     if not around[a] & around[b]:
                         yield a, node, b, np.ones(3)
 
@@ -223,9 +225,9 @@ def gaps(body: RigidCylinder, position: Array) -> tuple[Array, Array, Array]:
     turn = np.einsum("ni,nj->nij", around, around) / r[:, None, None]
     if not body.ring:
         return r - body.radius, radial, turn
-    beyond = np.abs(along) - (0.5 * body.length - body.fillet)
-    in_mouth = beyond > 0
-    s = np.where(in_mouth, beyond, 0.0)
+    into_mouth = np.abs(along) - (0.5 * body.length - body.fillet)
+    in_mouth = into_mouth > 0
+    s = np.where(in_mouth, into_mouth, 0.0)
     q = body.radius + body.fillet - r
     d = np.where(in_mouth, np.hypot(q, s), q)
     d = np.where(np.abs(d) > 1e-9, d, 1e-9)
@@ -243,16 +245,16 @@ def contact_forces(
 
     stiffness (n,) N/mm: penalty times the node's share of the reference surface.
     """
-    near = _within_reach(body, position)
-    gap, out, hessian = gaps(body, position[near])
-    inside = gap < 0
-    touched = near[inside]
+    within_reach = _within_reach(body, position)
+    gap, out, hessian = gaps(body, position[within_reach])
+    penetrates = gap < 0
+    touched = within_reach[penetrates]
     k = stiffness[touched]
-    g = gap[inside]
-    n = out[inside]
+    g = gap[penetrates]
+    n = out[penetrates]
     force = np.zeros_like(position)
     force[touched] = -(k * g)[:, None] * n
-    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[inside]
+    slope = np.einsum("ni,nj->nij", n, n) + g[:, None, None] * hessian[penetrates]
     return force, k[:, None, None] * slope, touched
 
 
@@ -274,14 +276,14 @@ def brought_to_touch(
     axis = np.asarray(body.axis, dtype=float)
     arm = position - centre
     if body.ring:
-        near = np.abs(arm @ axis) < 0.5 * body.length
+        within_reach = np.abs(arm @ axis) < 0.5 * body.length
     else:
-        near = np.abs(arm @ np.cross(axis, direction)) < body.radius
-    if not near.any():
+        within_reach = np.abs(arm @ np.cross(axis, direction)) < body.radius
+    if not within_reach.any():
         problem = f"no node of the mesh lies where {body.name!r} could touch; refine it there"
         raise InputError(None, "mesh", problem)
-    nodes = position[near]
-    heights = arm[near] @ direction
+    nodes = position[within_reach]
+    heights = arm[within_reach] @ direction
     low = float(heights.min()) - 2 * body.radius
     high = float(heights.max()) + 2 * body.radius
     # Search the first touch from outside; a ring starts around the membrane's middle.
@@ -370,8 +372,8 @@ class ClosedMembrane(Membrane):
             values = self.flexure.stiffness(self.law)
             for k in range(3):
                 places = slot[:, :, k, :, k]
-                inside = places >= 0
-                np.add.at(added, places[inside], values[:, k][inside])
+                is_stored = places >= 0
+                np.add.at(added, places[is_stored], values[:, k][is_stored])
             self._stiff = (self.law, self.flexure.matrix(self.law, len(self.reference)), added)
         return self._stiff[1], self._stiff[2]
 
@@ -411,8 +413,8 @@ class ClosedMembrane(Membrane):
 
     def node_weight(self, weight: float) -> Array:
         """Return (n,) N of the nodes; weight : N/mm^2 of the thinnest part of the wall."""
-        each = weight * self.elements.area * (self.section / self.section.min())[:, None]
-        shares = np.einsum("mp,pn->mn", each, self.elements.values)
+        point_weight = weight * self.elements.area * (self.section / self.section.min())[:, None]
+        shares = np.einsum("mp,pn->mn", point_weight, self.elements.values)
         return np.asarray(np.bincount(self.quads.ravel(), shares.ravel()), dtype=float)
 
     def drag(self, viscosity: float, anchor: Array) -> None:
@@ -424,8 +426,10 @@ class ClosedMembrane(Membrane):
         """Return the share of the surface of `sides` (elements,) without tension in a direction."""
         area = self.elements.area[sides]
         s = self.stress_new[sides]
-        least = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(0.5 * (s[..., 0] - s[..., 1]), s[..., 2])
-        folded = (self.wrinkle[sides] != 0.0).any(axis=2) | (least < 0.0)
+        smaller_principal = 0.5 * (s[..., 0] + s[..., 1]) - np.hypot(
+            0.5 * (s[..., 0] - s[..., 1]), s[..., 2]
+        )
+        folded = (self.wrinkle[sides] != 0.0).any(axis=2) | (smaller_principal < 0.0)
         return float(area[folded].sum() / area.sum())
 
     def wrinkle_work(self, wrinkle: Array) -> float:
@@ -448,10 +452,10 @@ class ClosedMembrane(Membrane):
         line = 2.0 * level * self.cavity.measure(self.reference)[0] / area  # p R/t of a tube
         for share in SLACK_SHARES:
             self.slack = share * float(np.cbrt(modulus * line**2))
-            found = self.equilibrium(start, level)
+            displacement = self.equilibrium(start, level)
             self.slack = 0.0
-            if found is not None:
-                return found
+            if displacement is not None:
+                return displacement
         return None
 
 
@@ -477,8 +481,8 @@ def closed_membrane(
     if model.bending is not None and wall.bending_stiffness > 0:
         flexure = flexure_of(points, quads, warp, thickness, cavity.planes)
         flexure = replace(flexure, shares=wall.bending_stiffness * flexure.shares)
-        before, node, after = flexure.nodes.T
-        coupled = np.concatenate([quads, np.stack([before, node, after, node], axis=1)])
+        previous_node, node, next_node = flexure.nodes.T
+        coupled = np.concatenate([quads, np.stack([previous_node, node, next_node, node], axis=1)])
     tangent: Tangent = tangent_for(coupled, points.size, free, points)
     tangent.slot, line_slot = tangent.slot[: len(quads)], tangent.slot[len(quads) :]
     for _ in range(sum(not cord.bonded for cord in model.cords)):

@@ -60,10 +60,10 @@ class Cords:
     def begin(self, position: Array) -> None:
         """Begin to strain cords with an initial force, from the inflated `position` (n, 3) on."""
         length = np.linalg.norm(self._vectors(position), axis=1)
-        given = self.given
-        self.rest[given] = length[given]
+        has_force = self.given
+        self.rest[has_force] = length[has_force]
         strains = [c.table.strain_at(c.initial_force or 0.0) for c in self.cords]
-        self.start[given] = np.array(strains)[self.cord[given]]
+        self.start[has_force] = np.array(strains)[self.cord[has_force]]
         self.bent = True
 
     def forces(self, position: Array) -> tuple[Array, Array]:
@@ -74,20 +74,24 @@ class Cords:
         strain = length / self.rest - 1.0 + self.start
         force, slope, self.sliding = np.empty(len(d)), np.empty(len(d)), []
         for i, cord in enumerate(self.cords):
-            own = self.cord == i
-            rest = float(self.part[own] @ self.rest[own])
-            if not cord.bonded and rest > 0:
-                strain[own] = self.part[own] @ length[own] / rest - 1.0 + self.start[own]
-            force[own], slope[own] = cord.table.pull(strain[own], cord.tension_only)
+            of_cord = self.cord == i
+            rest_length = float(self.part[of_cord] @ self.rest[of_cord])
+            if not cord.bonded and rest_length > 0:
+                strain[of_cord] = (
+                    self.part[of_cord] @ length[of_cord] / rest_length - 1.0 + self.start[of_cord]
+                )
+            force[of_cord], slope[of_cord] = cord.table.pull(strain[of_cord], cord.tension_only)
             if cord.initial_force is not None and not self.bent:
-                force[own] = self.level * cord.initial_force
-                slope[own] = 0.0
-            if not cord.bonded and rest > 0:
+                force[of_cord] = self.level * cord.initial_force
+                slope[of_cord] = 0.0
+            if not cord.bonded and rest_length > 0:
                 opens = np.zeros(position.shape)
-                pulls = (self.part[own, None] * self.shares[own])[..., None] * t[own, None]
-                np.add.at(opens, self.nodes[own], pulls)
-                self.sliding.append((opens.reshape(-1), float(slope[own][0]) / rest))
-                slope[own] = 0.0
+                pulls = (self.part[of_cord, None] * self.shares[of_cord])[..., None] * t[
+                    of_cord, None
+                ]
+                np.add.at(opens, self.nodes[of_cord], pulls)
+                self.sliding.append((opens.reshape(-1), float(slope[of_cord][0]) / rest_length))
+                slope[of_cord] = 0.0
         self.force = force
         pull, self.steep = self.part * force, self.part * slope / self.rest
         tt = np.einsum("mi,mj->mij", t, t)
@@ -104,14 +108,14 @@ class Cords:
         """
         tangent = self.forces(position)[1]
         d = self._vectors(position)
-        moved = surface[self.nodes].reshape(len(d), 12, -1)
+        node_slopes = surface[self.nodes].reshape(len(d), 12, -1)
         longer = np.einsum("mi,mn,mnik->mk", self.rest_way, self.shares, free[self.nodes])
         pull = -(self.steep / self.rest)[:, None] * longer
-        each = tangent @ moved
-        each += np.einsum("mn,mi,mk->mnik", self.shares, d, pull).reshape(each.shape)
-        found = np.zeros(surface.shape)
-        np.add.at(found, self.nodes, each.reshape(len(d), 4, 3, -1))
-        return found.reshape(-1, surface.shape[-1])
+        by_member = tangent @ node_slopes
+        by_member += np.einsum("mn,mi,mk->mnik", self.shares, d, pull).reshape(by_member.shape)
+        forces = np.zeros(surface.shape)
+        np.add.at(forces, self.nodes, by_member.reshape(len(d), 4, 3, -1))
+        return forces.reshape(-1, surface.shape[-1])
 
 
 def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Cords | None:
@@ -122,21 +126,23 @@ def cords_on(mesh: Mesh, cords: Sequence[Cord], planes: NDArray[np.bool_]) -> Co
     """
     half = bool(planes[:, 0].any())
     p = mesh.points
-    found = []
+    members = []
     radius = np.hypot(p[:, 0], p[:, 1])
     tube = (np.abs(radius[mesh.quads] - radius.max()) < NEAR * radius.max()).all(1)
     for i, cord in enumerate(cords):
-        if half and not any(_mirrored(cord, other) for other in cords):
+        if half and not any(_mirrored(cord, cord_beside) for cord_beside in cords):
             problem = f"{cord.angle:g} degrees needs its mirror image at {360 - cord.angle:g}; "
             raise InputError(None, "cord.angle", problem + 'or take symmetry = "full"')
         if half and cord.angle > 180:
             continue
         up = np.array([np.sin(np.radians(cord.angle)), np.cos(np.radians(cord.angle))])
-        near = np.flatnonzero(tube & ((p[:, :2] @ up)[mesh.quads].min(axis=1) > 0))
+        candidates = np.flatnonzero(tube & ((p[:, :2] @ up)[mesh.quads].min(axis=1) > 0))
         aside = p[:, 0] * up[1] - p[:, 1] * up[0]
-        own, b = _crossed(aside[mesh.quads[near]], p[mesh.quads[near], 2], (-np.inf, np.inf))
-        found.append((i, near[own], b, 0.5 if half and cord.angle % 180 == 0 else 1.0))
-    return _members(mesh, cords, found, p)
+        crossed, b = _crossed(
+            aside[mesh.quads[candidates]], p[mesh.quads[candidates], 2], (-np.inf, np.inf)
+        )
+        members.append((i, candidates[crossed], b, 0.5 if half and cord.angle % 180 == 0 else 1.0))
+    return _members(mesh, cords, members, p)
 
 
 def cords_on_sheet(model: BubbleModel) -> Cords | None:
@@ -146,36 +152,36 @@ def cords_on_sheet(model: BubbleModel) -> Cords | None:
     """
     q = model.mesh.quads
     p = model.mesh.points
-    found = []
+    members = []
     for i, cord in enumerate(model.cords):
         x, y = (p[:, :2] - cord.ends[0]).T
         length = float(np.linalg.norm(cord.ends[1] - cord.ends[0]))
         c, s = (cord.ends[1] - cord.ends[0]) / length
-        own, b = _crossed((c * y - s * x)[q], (c * x + s * y)[q], (0.0, length))
-        if not len(own) and not model.halved:
+        crossed, b = _crossed((c * y - s * x)[q], (c * x + s * y)[q], (0.0, length))
+        if not len(crossed) and not model.halved:
             raise InputError(None, f"cord[{i}].ends", "expected a line on the sheet, not beside it")
         in_plane = any(cord.lies_in(axis) for axis in model.halved)
-        found.append((i, own, b, 0.5 if in_plane else 1.0))
-    return _members(model.mesh, model.cords, found, model.stress_free)
+        members.append((i, crossed, b, 0.5 if in_plane else 1.0))
+    return _members(model.mesh, model.cords, members, model.stress_free)
 
 
 def _members(
     mesh: Mesh,
     cords: Sequence[Cord] | Sequence[SheetCord],
-    found: Sequence[tuple[int, Numbers, Array, float]],
+    pieces: Sequence[tuple[int, Numbers, Array, float]],
     points: Array,
 ) -> Cords | None:
     """Return members by number of a cord, quads, b_n and part; points (n, 3) without stress."""
-    if not sum(len(quads) for _, quads, _, _ in found):
+    if not sum(len(quads) for _, quads, _, _ in pieces):
         return None
-    which, shares = (np.concatenate([one[k] for one in found]) for k in (1, 2))
-    counts = [len(quads) for _, quads, _, _ in found]
-    number, part = (np.repeat([one[k] for one in found], counts) for k in (0, 3))
-    return Cords(cords, which, shares, number, part, mesh.quads[which], points)
+    quad_numbers, shares = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
+    counts = [len(quads) for _, quads, _, _ in pieces]
+    number, part = (np.repeat([piece[k] for piece in pieces], counts) for k in (0, 3))
+    return Cords(cords, quad_numbers, shares, number, part, mesh.quads[quad_numbers], points)
 
 
-def _mirrored(cord: Cord, other: Cord) -> bool:
-    return abs((cord.angle + other.angle) % 360) < NEAR and has_same_force(cord, other)
+def _mirrored(cord: Cord, candidate: Cord) -> bool:
+    return abs((cord.angle + candidate.angle) % 360) < NEAR and has_same_force(cord, candidate)
 
 
 def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Numbers, Array]:
@@ -186,8 +192,8 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
     size = NEAR * np.abs(aside).max()
     # A line along an edge crosses the quads on one of its sides, or the only ones there are.
     for side in (1.0, -1.0):
-        beyond = side * aside > -size
-        cut = beyond != np.roll(beyond, -1, axis=1)
+        is_positive = side * aside > -size
+        cut = is_positive != np.roll(is_positive, -1, axis=1)
         crossed = np.flatnonzero(cut.any(axis=1))
         if len(crossed):
             break
@@ -207,7 +213,9 @@ def _crossed(aside: Array, along: Array, ends: tuple[float, float]) -> tuple[Num
         place[rows, second] = to
         places.append(place)
     start, end = np.sort([(place * along).sum(axis=1) for place in places], axis=0)
-    held = np.minimum(end, ends[1]) - np.maximum(start, ends[0])
-    kept = held > size
-    shares = (places[1] - places[0])[kept] * (held / np.where(kept, end - start, 1.0))[kept, None]
-    return crossed[kept], shares
+    length = np.minimum(end, ends[1]) - np.maximum(start, ends[0])
+    has_length = length > size
+    shares = (places[1] - places[0])[has_length] * (
+        length / np.where(has_length, end - start, 1.0)
+    )[has_length, None]
+    return crossed[has_length], shares

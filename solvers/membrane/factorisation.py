@@ -28,11 +28,11 @@ def swept(quads: Numbers, points: Array) -> list[Numbers]:
     """Return orders of the nodes (n,) by rings, swept from either end of the longest axis."""
     axis = int(np.ptp(points, axis=0).argmax())
     along = points[:, axis]
-    near = NEAR * float(np.ptp(along))
+    tolerance = NEAR * float(np.ptp(along))
     rows = np.repeat(quads, 4, axis=1).ravel()
     columns = np.tile(quads, (1, 4)).ravel()
     graph = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(points),) * 2)
-    ends = (np.flatnonzero(np.abs(along - at) <= near) for at in (along.min(), along.max()))
+    ends = (np.flatnonzero(np.abs(along - at) <= tolerance) for at in (along.min(), along.max()))
     return [_from(graph, end) for end in ends]
 
 
@@ -40,19 +40,19 @@ def _from(graph: sp.csr_matrix, end: Numbers) -> Numbers:
     """Return the order, breadth first from the nodes of an end, which follow one another."""
     first = end[reverse_cuthill_mckee(graph[end][:, end].tocsr(), symmetric_mode=True)]
     degree = np.diff(graph.indptr)
-    seen = np.zeros(graph.shape[0], dtype=bool)
-    seen[first] = True
+    is_numbered = np.zeros(graph.shape[0], dtype=bool)
+    is_numbered[first] = True
     order = first.tolist()
     at = 0
     while at < len(order):
-        beside = graph.indices[graph.indptr[order[at]] : graph.indptr[order[at] + 1]]
-        fresh = beside[~seen[beside]]
+        neighbours = graph.indices[graph.indptr[order[at]] : graph.indptr[order[at] + 1]]
+        fresh = neighbours[~is_numbered[neighbours]]
         fresh = fresh[np.argsort(degree[fresh], kind="stable")]
-        seen[fresh] = True
+        is_numbered[fresh] = True
         order += fresh.tolist()
         at += 1
     # Parts connected to no end come last, with a band of their own.
-    return np.concatenate([order, np.flatnonzero(~seen)]).astype(np.intp)
+    return np.concatenate([order, np.flatnonzero(~is_numbered)]).astype(np.intp)
 
 
 class SingularTangent(Exception):
@@ -96,21 +96,21 @@ def tangent_for(
     place[free] = np.arange(len(free))
     rows = place[np.repeat(dofs, 12, axis=1)]
     columns = place[np.tile(dofs, (1, 12))]
-    inside = (rows >= 0) & (columns >= 0)
+    is_free = (rows >= 0) & (columns >= 0)
     pattern = sp.csr_matrix(
-        (np.ones(int(inside.sum())), (rows[inside], columns[inside])), shape=(len(free),) * 2
+        (np.ones(int(is_free.sum())), (rows[is_free], columns[is_free])), shape=(len(free),) * 2
     )
     orders = [reverse_cuthill_mckee(pattern, symmetric_mode=True)]
     for nodes in [] if points is None else swept(quads, points):
         unknowns = place[(3 * nodes[:, None] + np.arange(3)).ravel()]
         orders.append(unknowns[unknowns >= 0])
     ranks = [np.argsort(order) for order in orders]
-    widths = [int(np.abs(rank[rows[inside]] - rank[columns[inside]]).max()) for rank in ranks]
+    widths = [int(np.abs(rank[rows[is_free]] - rank[columns[is_free]]).max()) for rank in ranks]
     width = min(widths)
     rank = ranks[int(np.argmin(widths))]
     if (3 * width + 1) * len(free) <= LARGEST_BAND * (1 if points is None else OF_TUBES):
-        return BandedTangent(rank, rows, columns, inside, width)
-    return SparseTangent(rows, columns, inside, len(free))
+        return BandedTangent(rank, rows, columns, is_free, width)
+    return SparseTangent(rows, columns, is_free, len(free))
 
 
 class BandedTangent(Tangent):
@@ -121,16 +121,16 @@ class BandedTangent(Tangent):
         rank: NDArray[np.int64],
         rows: NDArray[np.int64],
         columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
+        is_free: NDArray[np.bool_],
         width: int,
     ) -> None:
         self.width, self.size = width, len(rank)
         self.depth = 3 * width + 1  # gbtrf wants `width` more rows for its pivoting
         self.data = np.zeros(self.depth * self.size)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
-        i = rank[rows[inside]]
-        j = rank[columns[inside]]
-        self.slot[inside] = j * self.depth + 2 * width + i - j
+        i = rank[rows[is_free]]
+        j = rank[columns[is_free]]
+        self.slot[is_free] = j * self.depth + 2 * width + i - j
         self.rank = rank
         self.order = np.argsort(rank)
 
@@ -164,8 +164,8 @@ class BandedTangent(Tangent):
         place = np.unique(self.slot[self.slot >= 0])
         column, row = np.divmod(place, self.depth)
         starts = np.searchsorted(column, np.arange(self.size + 1))
-        held = np.zeros(len(place)), row - 2 * self.width + column, starts
-        return place, sp.csc_matrix(held, (self.size, self.size))
+        csc_parts = np.zeros(len(place)), row - 2 * self.width + column, starts
+        return place, sp.csc_matrix(csc_parts, (self.size, self.size))
 
 
 class SparseTangent(Tangent):
@@ -180,12 +180,12 @@ class SparseTangent(Tangent):
         self,
         rows: NDArray[np.int64],
         columns: NDArray[np.int64],
-        inside: NDArray[np.bool_],
+        is_free: NDArray[np.bool_],
         size: int,
     ) -> None:
-        keys, position = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
+        keys, position = np.unique(columns[is_free] * size + rows[is_free], return_inverse=True)
         self.slot = np.full(rows.shape, -1, dtype=np.int64)
-        self.slot[inside] = position
+        self.slot[is_free] = position
         pointer = np.searchsorted(keys // size, np.arange(size + 1)).astype(np.int32)
         index = (keys % size).astype(np.int32)
         self.data = np.zeros(len(keys))
@@ -198,11 +198,11 @@ class SparseTangent(Tangent):
 
     def step(self, rhs: Array, new: bool) -> Array:
         self.matrix.data[:] = self.data
-        if (near := self.near) is not None:
-            nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ near.solve(x))
+        if (factor := self.near) is not None:
+            nearly_one = LinearOperator(self.matrix.shape, lambda x: self.matrix @ factor.solve(x))
             x, left = gmres(nearly_one, rhs, rtol=STEP, restart=ROUNDS, maxiter=1)
             if left == 0:
-                return np.asarray(near.solve(x))
+                return np.asarray(factor.solve(x))
         return super().step(rhs, True)
 
     def definite(self) -> bool:

@@ -146,8 +146,8 @@ class Membrane:
     def add(self, slot: NDArray[np.int64], entries: Array) -> None:
         """Add entries to the tangent at their places; those below zero are held."""
         slot, entries = np.broadcast_arrays(slot, entries)
-        inside = slot >= 0
-        np.add.at(self.tangent.data, slot[inside], entries[inside])
+        is_free = slot >= 0
+        np.add.at(self.tangent.data, slot[is_free], entries[is_free])
 
     def accept(self) -> None:
         self.strain_old[:] = self.strain_new
@@ -164,12 +164,12 @@ class Membrane:
         """Return the displacement (n, 3) in equilibrium at `pressure`, from u; or None."""
         u = u.copy()
         flat = u.reshape(-1)
-        step = before = np.empty(0)
+        step = start = np.empty(0)
         last = np.inf
         scale = 1.0
         backtracks = 0
         chord = False
-        least = np.inf
+        smallest = np.inf
         first = np.inf
         idle = 0
         jumps = self.law.jumps
@@ -181,17 +181,17 @@ class Membrane:
                 return None
             if norm < self.tolerance:
                 return u
-            idle = idle + (norm > 0.5 * last) if 0.5 * least < norm < ROUNDING_BELOW else 0
+            idle = idle + (norm > 0.5 * last) if 0.5 * smallest < norm < ROUNDING_BELOW else 0
             if idle >= MOST_IDLE:
                 return u
-            fruitless = fruitless + 1 if jumps and norm > 0.5 * least else 0
-            least = min(least, norm)
+            fruitless = fruitless + 1 if jumps and norm > 0.5 * smallest else 0
+            smallest = min(smallest, norm)
             worse = norm > (20.0 * last + 1e-3 if fruitless < MOST_FRUITLESS else last)
             if len(step) and worse and backtracks < MOST_BACKTRACKS:
                 scale = 0.35 * scale
                 backtracks = backtracks + 1
                 chord = False
-                flat[self.free] = before + scale * step
+                flat[self.free] = start + scale * step
                 continue
             if not np.isfinite(norm):
                 return None
@@ -206,9 +206,9 @@ class Membrane:
             largest = float(np.abs(step).max())
             if not np.isfinite(largest):
                 return None
-            before = flat[self.free].copy()
+            start = flat[self.free].copy()
             scale = min(1.0, self.step_limit / largest) if largest > 0 else 1.0
-            flat[self.free] = before + scale * step
+            flat[self.free] = start + scale * step
             last = norm
             backtracks = 0
             chord = norm < CHORD_BELOW and scale == 1.0
@@ -226,11 +226,13 @@ def initial_moduli(law: HypoelasticLaw) -> tuple[float, float, float]:
     return e1, e2, g12
 
 
-def forgets(law: HypoelasticLaw, what: str) -> None:
-    """Raise SolverFailure for a law with a memory, which `what` does not take."""
+def forgets(law: HypoelasticLaw, description: str) -> None:
+    """Raise SolverFailure for a law with a memory, which `description` does not take."""
     if law.memory is not None:
-        lost = "unloading, permanent set and hysteresis are lost"
-        raise SolverFailure(f"{what} takes no law with a memory ({lost}): use the card without it")
+        losses = "unloading, permanent set and hysteresis are lost"
+        raise SolverFailure(
+            f"{description} takes no law with a memory ({losses}): use the card without it"
+        )
 
 
 def initial_stiffness(law: HypoelasticLaw) -> Array:
@@ -246,7 +248,7 @@ class NoEquilibrium(SolverFailure):
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class RunRequest:
     """Options of an analysis; guess : (increments or fewer, nodes, 3) to start each from."""
 
     parameters: Sequence[str] = ()
@@ -276,9 +278,9 @@ class Loading:
         """Return a start for the next level after the path so far."""
         raise NotImplementedError
 
-    def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
-        """Return a start inside a halved step, straight on from u; before : as far back, if any."""
-        return u if before is None else np.asarray(2.0 * u - before)
+    def onward(self, u: Array, at: float, to: float, previous: Array | None) -> Array:
+        """Return a start inside a halved step, straight on from u; previous : as far back."""
+        return u if previous is None else np.asarray(2.0 * u - previous)
 
     def guessed(self, guess: Array) -> Array:
         return guess
@@ -287,10 +289,10 @@ class Loading:
         self, lower: float, u: Array, level: float, start: Array, cuts: int
     ) -> Array | None:
         """Return the equilibrium at `level` from `start`, else in steps from u, at `lower`."""
-        found = self.equilibrium(start, level)
-        return found if found is not None else halved(self, lower, u, level, cuts)
+        displacement = self.equilibrium(start, level)
+        return displacement if displacement is not None else halved(self, lower, u, level, cuts)
 
-    def problem(self, before: float, level: float, place: str) -> str:
+    def problem(self, previous: float, level: float, place: str) -> str:
         """Return the message where `level` cannot be reached; place : "increment 3 of 7"."""
         raise NotImplementedError
 
@@ -298,47 +300,47 @@ class Loading:
 def march(
     loading: Loading,
     levels: Sequence[float] | Array,
-    asked: Asked,
-    begun: tuple[float, Array] | None = None,
-    done: int = 0,
+    request: RunRequest,
+    origin: tuple[float, Array] | None = None,
+    finished: int = 0,
 ) -> Iterator[Array]:
     """Yield the displacement (nodes, 3) at each level; the caller accepts it before the next one.
 
-    begun : level and displacement to start from, else unloaded. done : earlier increments of the
-    model.
+    origin : level and displacement to start from, else unloaded. finished : earlier increments
+    of the model.
     """
-    known, path = ([begun[0]], [begun[1]]) if begun is not None else ([], [])
+    passed, path = ([origin[0]], [origin[1]]) if origin is not None else ([], [])
     for i, level in enumerate(float(value) for value in levels):
-        found = None
-        if asked.guess is not None and i < len(asked.guess):
-            start = loading.guessed(asked.guess[i])
+        displacement = None
+        if request.guess is not None and i < len(request.guess):
+            start = loading.guessed(request.guess[i])
             if path and i:  # what a guess lacks is much the same at neighbouring levels
-                start = start + path[-1] - loading.guessed(asked.guess[i - 1])
-            found = loading.equilibrium(start, level)
-        if found is None and asked.guess is not None and not path:
-            found = _from_guess(loading, levels, asked.guess)
-        if found is None and path:
-            start = loading.ahead(known, path, level)
-            found = loading.reached(known[-1], path[-1], level, start, loading.most_cuts)
-        elif found is None:
-            found = loading.first(level)
-        if found is None:
+                start = start + path[-1] - loading.guessed(request.guess[i - 1])
+            displacement = loading.equilibrium(start, level)
+        if displacement is None and request.guess is not None and not path:
+            displacement = _from_guess(loading, levels, request.guess)
+        if displacement is None and path:
+            start = loading.ahead(passed, path, level)
+            displacement = loading.reached(passed[-1], path[-1], level, start, loading.most_cuts)
+        elif displacement is None:
+            displacement = loading.first(level)
+        if displacement is None:
             place = f"increment {i + 1} of {len(levels)}"
-            raise NoEquilibrium(loading.problem(known[-1] if known else 0.0, level, place))
-        yield found
-        known.append(level)
-        path.append(found)
-        if asked.tell is not None:
-            asked.tell(Done(done + i + 1))
+            raise NoEquilibrium(loading.problem(passed[-1] if passed else 0.0, level, place))
+        yield displacement
+        passed.append(level)
+        path.append(displacement)
+        if request.tell is not None:
+            request.tell(Done(finished + i + 1))
 
 
 def _from_guess(loading: Loading, levels: Sequence[float] | Array, guess: Array) -> Array | None:
     """Return the first equilibrium, back from the first level whose guess leads to one."""
     for level, start in list(zip(levels, guess, strict=False))[1:]:
-        above = loading.equilibrium(loading.guessed(start), level)
-        if above is not None:
-            begin = loading.onward(above, level, levels[0], None)
-            return loading.reached(level, above, levels[0], begin, loading.most_cuts)
+        higher = loading.equilibrium(loading.guessed(start), level)
+        if higher is not None:
+            begin = loading.onward(higher, level, levels[0], None)
+            return loading.reached(level, higher, levels[0], begin, loading.most_cuts)
     return None
 
 
@@ -355,11 +357,11 @@ def halved(loading: Loading, lower: float, u: Array, level: float, cuts: int) ->
     return Loading.reached(loading, middle, halfway, level, start, cuts - 1)
 
 
-def last_way(levels: Sequence[float], level: float, most: int) -> int:
+def last_way(levels: Sequence[float], level: float, limit: int) -> int:
     """Return how many of the last levels lie one after the other on the way to the next one."""
     steps = np.sign(np.diff([*levels, level]))[::-1]
-    turned = np.flatnonzero(steps != steps[0])
-    return min(most, int(turned[0]) if len(turned) else len(steps))
+    reversals = np.flatnonzero(steps != steps[0])
+    return min(limit, int(reversals[0]) if len(reversals) else len(steps))
 
 
 def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) -> Array:
@@ -370,13 +372,13 @@ def straight_on(levels: Sequence[float], path: Sequence[Array], level: float) ->
     return np.asarray(path[-1] + ahead * (path[-1] - path[-2]))
 
 
-def lagrange(x: Array, known: Array, at: float) -> Array:
-    """Return the polynomial through `known` (k, nodes, 3) at x (k,), at another place."""
+def lagrange(x: Array, values: Array, at: float) -> Array:
+    """Return the polynomial through `values` (k, nodes, 3) at x (k,), at another place."""
     shares = [
         math.prod((at - x[b]) / (x[a] - x[b]) for b in range(len(x)) if b != a)
         for a in range(len(x))
     ]
-    return np.asarray(np.einsum("a,ank->nk", shares, known))
+    return np.asarray(np.einsum("a,ank->nk", shares, values))
 
 
 class Record:
@@ -407,15 +409,15 @@ class Record:
 def searched_equilibrium(membrane: Membrane, u: Array, pressure: float) -> Array | None:
     u = u.copy()
     norm = membrane.unbalance(u, pressure, with_tangent=True)
-    least = np.inf
+    smallest = np.inf
     idle = 0
     for _ in range(MOST_STEPS):
         if norm < membrane.tolerance:
             return u
-        idle = idle + 1 if 0.5 * least < norm < ROUNDING_BELOW else 0
+        idle = idle + 1 if 0.5 * smallest < norm < ROUNDING_BELOW else 0
         if idle >= MOST_IDLE:
             return u
-        least = min(least, norm)
+        smallest = min(smallest, norm)
         if not np.isfinite(norm):
             return None
         try:
@@ -433,7 +435,7 @@ def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: flo
     """Move u along the step as far as is good; return the residual there, with its tangent."""
     flat = u.reshape(-1)
     free = membrane.free
-    before = flat[free].copy()
+    start = flat[free].copy()
     slope = float(step @ membrane.residual[free])
     largest = float(np.abs(step).max())
     part = min(1.0, membrane.step_limit / largest) if largest > 0 else 1.0
@@ -442,26 +444,26 @@ def _along(membrane: Membrane, u: Array, pressure: float, step: Array, norm: flo
     high = math.inf
     slope_high = math.nan
     for trial in range(MOST_TRIALS):
-        flat[free] = before + part * step
+        flat[free] = start + part * step
         # Most steps are taken as they are, so that the first comes with its tangent.
-        found = membrane.unbalance(u, pressure, with_tangent=trial == 0)
-        now = float(step @ membrane.residual[free]) if np.isfinite(found) else math.nan
-        if found < GAIN * norm or norm < SMALL or abs(now) <= LEFT * abs(slope):
+        norm_there = membrane.unbalance(u, pressure, with_tangent=trial == 0)
+        slope_there = float(step @ membrane.residual[free]) if np.isfinite(norm_there) else math.nan
+        if norm_there < GAIN * norm or norm < SMALL or abs(slope_there) <= LEFT * abs(slope):
             break
-        if now * slope > 0 and abs(now) <= abs(slope):
+        if slope_there * slope > 0 and abs(slope_there) <= abs(slope):
             if high == math.inf:
                 break
             low = part
-            slope_low = now
+            slope_low = slope_there
         else:
             high = part
-            slope_high = now if now * slope < 0 else math.nan
+            slope_high = slope_there if slope_there * slope < 0 else math.nan
         share = slope_low / (slope_low - slope_high)
         share = BLIND if math.isnan(share) else min(FARTHEST, max(NEAREST, share))
         part = low + share * (high - low)
     if trial > 0:
-        found = membrane.unbalance(u, pressure, with_tangent=True)
-    return found
+        norm_there = membrane.unbalance(u, pressure, with_tangent=True)
+    return norm_there
 
 
 def named(levels: NDArray[np.float64], unit: str) -> tuple[str, ...]:
@@ -488,21 +490,23 @@ class Derivatives:
         law = membrane.law
         names = list(parameters)
         shape = (len(membrane.quads), 4, 3, len(names))
-        more = law.state - 3
+        remembered = law.state - 3
         self.rows, self.by_coupling = law_slopes(law, names, float(np.mean(membrane.thickness)))
         self.push = names.index("pressure_offset") if "pressure_offset" in names else -1
         self.stress = np.zeros(shape)
         self.fresh = np.empty(shape)
         self.strain = np.zeros((*shape[:2], law.state, len(names)))
-        self.point = np.empty((len(membrane.quads), 4, POINT + more))
+        self.point = np.empty((len(membrane.quads), 4, POINT + remembered))
         self.rate = np.empty((membrane.reference.size, len(names)))
         self.columns: list[int] = []
         if sheet and at is not None:
             self.columns = [names.index(name) for name in sheet]
-            surface, ways, turns, by = (np.stack(own) for own in zip(*sheet.values(), strict=True))
+            surface, ways, turns, by = (
+                np.stack(columns) for columns in zip(*sheet.values(), strict=True)
+            )
             stress_free, yarn, stretch = at
             self.surface, self.ways = (
-                np.ascontiguousarray(np.moveaxis(own, 0, -1)) for own in (surface, ways)
+                np.ascontiguousarray(np.moveaxis(columns, 0, -1)) for columns in (surface, ways)
             )
             self.slopes, self.area = element_slopes(
                 stress_free, membrane.quads, ways, yarn, turns, stretch, by
@@ -576,8 +580,8 @@ class Derivatives:
             strain = to_strain @ self.green
             self.strain[..., :3, self.columns] += strain
             for first in range(3, self.strain.shape[2], 3):
-                own = self.point[..., POINT + first - 3 : POINT + first, None]
-                self.strain[..., first : first + 3, self.columns] += own * strain
+                factor = self.point[..., POINT + first - 3 : POINT + first, None]
+                self.strain[..., first : first + 3, self.columns] += factor * strain
             self.stress[..., self.columns] += to_stress @ strain
 
     def increment(self, u: Array, pressure: float = 0.0) -> Array:

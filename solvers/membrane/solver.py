@@ -21,7 +21,7 @@ from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_
 from ..decks import in_words
 from . import beam, bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
-from .newton import Asked, Membrane
+from .newton import RunRequest, Membrane
 
 
 class Analysis(NamedTuple):
@@ -108,12 +108,12 @@ class MembraneSolver:
         The parameters are every entry of the law's beta (per MPa) unless given; those of the model
         are per unit of theirs. Derivatives of a load are in the history (`load_slope`).
         """
-        known = parameters_of(law, model)
+        available = parameters_of(law, model)
         if parameters is None:
-            parameters = known[: law.form.size]
-        unknown = [name for name in parameters if name not in known]
+            parameters = available[: law.form.size]
+        unknown = [name for name in parameters if name not in available]
         if unknown:
-            raise InputError(None, "parameters", f"{unknown} not among {known}")
+            raise InputError(None, "parameters", f"{unknown} not among {available}")
         return self._analyse(model, law, parameters, guess)
 
     @property
@@ -128,13 +128,13 @@ class MembraneSolver:
         self, model: Any, law: HypoelasticLaw, parameters: Sequence[str], guess: Array | None
     ) -> tuple[History, Array]:
         analyse = analysis_of(ANALYSES, model, self.name).analyse
-        asked = Asked(parameters, guess, self.progress)
-        return analyse(self._membrane(model, law), model, asked)
+        request = RunRequest(parameters, guess, self.progress)
+        return analyse(self._membrane(model, law), model, request)
 
     def _membrane(self, model: Any, law: HypoelasticLaw) -> Membrane | strip.Patch | beam.Beam:
-        known = self._prepared
-        state = law.state if known is None else getattr(known[1], "law", law).state
-        if known is None or known[0] is not model or state != law.state:
+        prepared = self._prepared
+        state = law.state if prepared is None else getattr(prepared[1], "law", law).state
+        if prepared is None or prepared[0] is not model or state != law.state:
             prepare = analysis_of(ANALYSES, model, self.name).prepare
             self._prepared = (model, prepare(model, law, self.tolerance, self.wall))
         assert self._prepared is not None
@@ -155,10 +155,10 @@ EMBEDDED = "embedded"
 def diagnose(named: Path | str | None = None) -> list[Diagnosis]:
     """Return one entry, with the bars in the solver's increments; there is no program to name."""
     stresses = []
-    for one in BARS:
-        pulled = int(one.direction == "fill")
-        ends = np.log1p(one.elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
-        stresses.append(float(bar(bar_law(one.model), pulled, ends)[1][-1, pulled]))
+    for published in BARS:
+        pulled = int(published.direction == "fill")
+        ends = np.log1p(published.elongation * np.arange(1, INCREMENTS + 1) / INCREMENTS)
+        stresses.append(float(bar(bar_law(published.model), pulled, ends)[1][-1, pulled]))
     off = difference(tuple(stresses))
     advice = "the embedded law is broken; install bubblefit and numba again"
     return [

@@ -16,7 +16,7 @@ from .bubble import Wall
 from .factorisation import AroundTangent, SingularTangent, tangent_for
 from .kernel import reference_elements
 from .newton import (
-    Asked,
+    RunRequest,
     Derivatives,
     Done,
     Loading,
@@ -54,18 +54,18 @@ class DrivenTangent(AroundTangent):
         dofs = (3 * quads[:, :, None] + np.arange(3)).reshape(len(quads), 12)
         rows = np.repeat(dofs, 12, axis=1)
         columns = np.tile(dofs, (1, 12))
-        beside = np.isin(rows, driven) | np.isin(columns, driven)
-        inside = self.inner.data.size
-        count = int(beside.sum())
-        self.data = np.zeros(inside + count)
+        is_driven = np.isin(rows, driven) | np.isin(columns, driven)
+        inner_size = self.inner.data.size
+        count = int(is_driven.sum())
+        self.data = np.zeros(inner_size + count)
         self.slot = self.slot.copy()
-        self.slot[beside] = inside + np.arange(count)
-        self.inner.data = self.data[:inside]
+        self.slot[is_driven] = inner_size + np.arange(count)
+        self.inner.data = self.data[:inner_size]
         # By rows; entries of one place are not summed, which a product does not need.
-        self._by_row = np.argsort(rows[beside], kind="stable")
-        starts = np.searchsorted(rows[beside][self._by_row], np.arange(size + 1))
-        at = np.zeros(count), columns[beside][self._by_row], starts
-        self._tail, self._edge = self.data[inside:], sp.csr_matrix(at, shape=(size, size))
+        self._by_row = np.argsort(rows[is_driven], kind="stable")
+        starts = np.searchsorted(rows[is_driven][self._by_row], np.arange(size + 1))
+        at = np.zeros(count), columns[is_driven][self._by_row], starts
+        self._tail, self._edge = self.data[inner_size:], sp.csr_matrix(at, shape=(size, size))
 
     def edge(self) -> sp.csr_matrix:
         """Return (size, size): the driven rows and columns of the tangent as last assembled."""
@@ -76,8 +76,8 @@ class DrivenTangent(AroundTangent):
 def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: Wall) -> Membrane:
     points = np.array(model.mesh.points, dtype=float)
     quads = np.ascontiguousarray(model.mesh.quads, dtype=np.int64)
-    held = np.concatenate([model.fixed, model.driven])
-    free = np.setdiff1d(np.arange(points.size), held)
+    fixed = np.concatenate([model.fixed, model.driven])
+    free = np.setdiff1d(np.arange(points.size), fixed)
     warp = np.broadcast_to(model.warp, (len(quads), 3))
     return Membrane(
         points,
@@ -92,7 +92,7 @@ def prepare(model: UniaxialModel, law: HypoelasticLaw, tolerance: float, wall: W
     )
 
 
-def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[History, Array]:
+def analyse(membrane: Membrane, model: UniaxialModel, request: RunRequest) -> tuple[History, Array]:
     """Return the history of a fresh membrane, and the derivatives in every increment.
 
     Direct differentiation through the gauge: the strip at a fixed pull moves by a, for one mm of
@@ -101,7 +101,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     An increment is stable where the sheet between fixed grips is: a machine prescribes their
     distance, not the load.
     """
-    parameters = asked.parameters
+    parameters = request.parameters
     initial_moduli(membrane.law)
     tangent = membrane.tangent
     assert isinstance(tangent, DrivenTangent)
@@ -117,7 +117,7 @@ def analyse(membrane: Membrane, model: UniaxialModel, asked: Asked) -> tuple[His
     record = Record(membrane, len(levels))
     unstable = []
     membrane.keep_tangent = True
-    for i, u in enumerate(march(pull, levels, asked)):
+    for i, u in enumerate(march(pull, levels, request)):
         if not tangent.definite():
             unstable.append(i)
         if derivatives is not None:
@@ -183,8 +183,8 @@ class Pulling(Loading):
     def equilibrium(self, start: Array, level: float) -> Array | None:
         """Return the equilibrium (n, 3) with this elongation; or None.
         By Newton's iteration on displacement and pull together, else on the one for each pull."""
-        found = self._together(start, level)
-        return self._in_turn(start, level) if found is None else found
+        displacement = self._together(start, level)
+        return self._in_turn(start, level) if displacement is None else displacement
 
     def _together(self, start: Array, level: float) -> Array | None:
         m = self.membrane
@@ -193,8 +193,11 @@ class Pulling(Loading):
         last = np.inf
         for _ in range(MOST_CORRECTIONS):
             norm = m.unbalance(u, 0.0, with_tangent=True)
-            now, slope = self.elongation(u)
-            if norm < m.tolerance and abs(level - now) <= GAUGE_TOLERANCE * self.gauge_length:
+            elongation, slope = self.elongation(u)
+            if (
+                norm < m.tolerance
+                and abs(level - elongation) <= GAUGE_TOLERANCE * self.gauge_length
+            ):
                 return u
             if not norm < max(last, NEARLY):
                 return None
@@ -209,7 +212,7 @@ class Pulling(Loading):
             gained, opens = slope @ moves
             if not opens > 0:
                 return None
-            step = moves @ np.array([1.0, (level - now - gained) / opens])
+            step = moves @ np.array([1.0, (level - elongation - gained) / opens])
             if not np.abs(step).max() <= m.step_limit:
                 return None
             u += step.reshape(u.shape)
@@ -219,20 +222,20 @@ class Pulling(Loading):
         m = self.membrane
         u = start
         for _ in range(MOST_CORRECTIONS):
-            found = m.equilibrium(u, 0.0)
-            if found is None:
+            displacement = m.equilibrium(u, 0.0)
+            if displacement is None:
                 return None
-            now, slope = self.elongation(found)
-            gap = level - now
+            elongation, slope = self.elongation(displacement)
+            gap = level - elongation
             if abs(gap) <= GAUGE_TOLERANCE * self.gauge_length:
-                return found
+                return displacement
             m.factor()
             w = self.response()
             opens = float(slope @ w)
             move = gap / opens if opens > 0 else np.inf
             if abs(move) * np.abs(w).max() > m.step_limit:
                 return None
-            u = found + move * w.reshape(u.shape)
+            u = displacement + move * w.reshape(u.shape)
         return None
 
     def first(self, level: float) -> Array | None:
@@ -243,13 +246,13 @@ class Pulling(Loading):
         """Extrapolate in the elongation, from zero or from the last increments."""
         count = last_way([0.0, *levels], level, LOOK_BACK)
         x = np.array([0.0, *levels][-count:])
-        known = np.array([np.zeros_like(path[0]), *path][-count:])
-        return lagrange(x, known, level)
+        values = np.array([np.zeros_like(path[0]), *path][-count:])
+        return lagrange(x, values, level)
 
-    def onward(self, u: Array, at: float, to: float, before: Array | None) -> Array:
+    def onward(self, u: Array, at: float, to: float, previous: Array | None) -> Array:
         return np.asarray(u * (to / at)) if at > 0 else self._stretched(to)
 
-    def problem(self, before: float, level: float, place: str) -> str:
+    def problem(self, previous: float, level: float, place: str) -> str:
         where = f"no equilibrium at {level:.4g} mm of gauge elongation ({place})"
         return f"{where}; more increments, or moduli nearer to the data, usually help"
 
@@ -258,10 +261,10 @@ class Pulling(Loading):
         flat = np.array(guess, dtype=float).reshape(-1)
         driven = self.direction != 0
         free = self.membrane.free
-        moved = np.zeros_like(flat)
-        moved[free] = flat[free]
-        moved[driven] = float(flat[driven].mean())
-        return moved.reshape(guess.shape)
+        displacement = np.zeros_like(flat)
+        displacement[free] = flat[free]
+        displacement[driven] = float(flat[driven].mean())
+        return displacement.reshape(guess.shape)
 
     def _stretched(self, elongation: float) -> Array:
         reference = self.membrane.reference
@@ -288,34 +291,36 @@ def prepare_patch(model: PatchModel, law: HypoelasticLaw, tolerance: float, wall
     return Patch(law)
 
 
-def analyse_patch(patch: Patch, model: PatchModel, asked: Asked) -> tuple[History, Array]:
-    found = biaxial_response(patch.law, model.loads, model.thickness, asked.parameters)
-    if found.reached < len(model.loads):
-        warp, fill = model.loads[found.reached]
+def analyse_patch(patch: Patch, model: PatchModel, request: RunRequest) -> tuple[History, Array]:
+    response = biaxial_response(patch.law, model.loads, model.thickness, request.parameters)
+    if response.reached < len(model.loads):
+        warp, fill = model.loads[response.reached]
         raise SolverFailure(
             f"no equilibrium at {warp:.4g} and {fill:.4g} N/mm along warp and fill (load "
-            f"{found.reached + 1} of {len(model.loads)}): a modulus is not positive, or the law "
+            f"{response.reached + 1} of {len(model.loads)}): a modulus is not positive, or the law "
             "softens before it",
             "membrane",
         )
-    patch.strain_old[0, 0, :2] = found.strain[-1]
-    patch.stress_old[0, 0, :2] = found.stress[-1]
+    patch.strain_old[0, 0, :2] = response.strain[-1]
+    patch.stress_old[0, 0, :2] = response.stress[-1]
     patch.iterations = len(model.loads)
-    stretch = 1.0 + found.elongation
-    slope = stretch[:, :, None] * found.slope
+    stretch = 1.0 + response.elongation
+    slope = stretch[:, :, None] * response.slope
     none = np.zeros(1)
-    moved = model.displacements(found.elongation)
-    rates = np.zeros((*moved.shape, len(asked.parameters)))
+    displacement = model.displacements(response.elongation)
+    rates = np.zeros((*displacement.shape, len(request.parameters)))
     rates[:, :, :2] = model.mesh.points[None, :, :2, None] * slope[:, None]
-    if asked.tell is not None:
-        asked.tell(Done(float(len(model.loads))))
+    if request.tell is not None:
+        request.tell(Done(float(len(model.loads))))
     history = History(
         model.loads.sum(axis=1),
-        moved,
-        np.concatenate([found.strain.min(axis=0), none]),
-        np.concatenate([found.strain.max(axis=0), none]),
+        displacement,
+        np.concatenate([response.strain.min(axis=0), none]),
+        np.concatenate([response.strain.max(axis=0), none]),
         iterations=patch.iterations,
-        unstable=tuple(f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~found.stable].tolist()),
+        unstable=tuple(
+            f"{w:.4g} and {f:.4g} N/mm" for w, f in model.loads[~response.stable].tolist()
+        ),
     )
     return history, rates
 
@@ -344,7 +349,9 @@ def prepare_tube(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: 
     )
 
 
-def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[History, Array]:
+def analyse_tube(
+    membrane: Membrane, model: TubeModel, request: RunRequest
+) -> tuple[History, Array]:
     """Return the history of a homogeneous tube, and the derivatives by direct differentiation.
 
     Unknown are the stretch along, that around and the shear s of lines along the tube, all linear
@@ -353,7 +360,7 @@ def analyse_tube(membrane: Membrane, model: TubeModel, asked: Asked) -> tuple[Hi
     """
     initial_moduli(membrane.law)
     points = membrane.reference
-    parameters = asked.parameters
+    parameters = request.parameters
     to = np.zeros((12, 3))
     to[0::3, 0] = points[:, 0]
     to[1::3, 1] = points[:, 1]
