@@ -146,7 +146,7 @@ class Objective(Protocol):
         """Return (m, parameters) from the solver's slope of the displacements."""
 
     def shifted(self, external: History, surrogate: History) -> Objective:
-        """Return the objective for a model that shows `surrogate` where another shows `external`."""
+        """Return the objective for a model that shows `surrogate`, not `external`."""
 
 
 #: Relative step of a central difference; probes of what noise makes of a function's values.

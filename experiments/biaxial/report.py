@@ -220,9 +220,10 @@ def constants_table(evaluation: BiaxialEvaluation) -> Table:
     header = ["constant", "unit", "value", "least of all choices", "largest", "of first cycles",
               "of last cycles"]  # fmt: skip
     note = (
-        f"Evaluated: {in_words(evaluation.chosen.options)}, {evaluation.chosen.paths} strain paths; "
-        f"the ends are over {1 + len(evaluation.others)} choices of what is evaluated. "
-        f"E and nu: inverse form, A: direct form. {CONVENTION}. A biaxial test says nothing of the shear stiffness."
+        f"Evaluated: {in_words(evaluation.chosen.options)}, {evaluation.chosen.paths} strain "
+        f"paths; the ends are over {1 + len(evaluation.others)} choices of what is evaluated. "
+        f"E and nu: inverse form, A: direct form. {CONVENTION}. "
+        "A biaxial test says nothing of the shear stiffness."
     )
     return Table("Constants per width", header, rows, note, text=(1,))
 

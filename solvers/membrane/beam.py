@@ -17,7 +17,7 @@ from ...materials.law import HypoelasticLaw
 from ...meshes.beam_model import BeamModel
 from ...meshes.mesh import Array
 from ..base import EARLY, History
-from .newton import RunRequest, Done
+from .newton import Done, RunRequest
 
 #: Newton's iterations in a step; how often it is halved.
 MOST_ITERATIONS, MOST_CUTS = 30, 6

@@ -22,10 +22,10 @@ from . import closed as closed_model
 from .bubble import TENSION_FIELD, Wall
 from .closed import ClosedMembrane, brought_to_touch, closed_membrane, gaps
 from .newton import (
-    RunRequest,
     Loading,
     NoEquilibrium,
     Record,
+    RunRequest,
     halved,
     initial_moduli,
     march,

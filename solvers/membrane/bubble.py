@@ -17,11 +17,11 @@ from .cords import cords_on_sheet
 from .factorisation import tangent_for
 from .kernel import reference_elements
 from .newton import (
-    RunRequest,
     Derivatives,
     Loading,
     Membrane,
     Record,
+    RunRequest,
     initial_moduli,
     lagrange,
     last_way,

@@ -21,7 +21,7 @@ from ..base import BandEnd, Diagnosis, History, Progress, SolverCheck, analysis_
 from ..decks import in_words
 from . import beam, bending, bubble, closed, strip
 from .bubble import BAND, TENSION_FIELD, Walls, chosen_wall
-from .newton import RunRequest, Membrane
+from .newton import Membrane, RunRequest
 
 
 class Analysis(NamedTuple):

@@ -16,12 +16,12 @@ from .bubble import Wall
 from .factorisation import AroundTangent, SingularTangent, tangent_for
 from .kernel import reference_elements
 from .newton import (
-    RunRequest,
     Derivatives,
     Done,
     Loading,
     Membrane,
     Record,
+    RunRequest,
     forgets,
     initial_moduli,
     lagrange,

@@ -35,7 +35,7 @@ from bubblefit.runs.best import limit_of_meshes
 from bubblefit.runs.fit import fit
 from bubblefit.solvers.base import History
 from bubblefit.solvers.membrane.bubble import Wall, analyse, prepare
-from bubblefit.solvers.membrane.newton import Asked
+from bubblefit.solvers.membrane.newton import RunRequest
 from bubblefit.solvers.membrane.solver import MembraneSolver
 from scipy.spatial.transform import Rotation
 
@@ -230,7 +230,7 @@ def test_stresses_are_those_of_the_membrane():
     for quads in (48, 192):
         model = replace(QUARTER, mesh=disk_mesh(100.0, quads))
         membrane = prepare(model, LAW, 1e-9, Wall())
-        found, _ = analyse(membrane, model, Asked())
+        found, _ = analyse(membrane, model, RunRequest())
         last = replace(found, model=model, law=LAW).stress()[-1]
         own = membrane.stress_old.mean(axis=1)
         off.append(np.abs(last - own).max() / np.abs(own).max())
