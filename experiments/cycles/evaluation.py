@@ -240,20 +240,48 @@ def evaluate_history(history: LoadHistory, reference: float | None = None) -> Ev
     return EvaluatedHistory(history, level, zero, tuple(values), holds, stable, tuple(notes))
 
 
-#: Knots of the tangent of a loading curve; its bounds, of the mean stiffness; largest U and R; of
-#: the largest strain, least and most slip, and a step; points along a branch that is predicted.
-KNOTS, BOUNDS, MOST, SLIPS, STEP, FINE = 8, (1e-4, 1e2), 1.99, (-0.1, 0.3), 1e-7, 400
+@dataclass(frozen=True)
+class CycleFitSettings:
+    """Settings of a fit of a loading curve and a memory to a history."""
+
+    knots: int = 8  # of the tangent of the loading curve
+    tangent_bounds: tuple[float, float] = (1e-4, 1e2)  # of the mean stiffness
+    largest_set: float = 0.99
+    largest_unloading: float = 1.99  # U, which R stays below
+    largest_saturation: float = 100.0
+    slip_bounds: tuple[float, float] = (-0.1, 0.3)  # of the largest strain
+    slip_step: float = 1e-7  # of central differences by slip, of the largest strain
+    initial_memory: tuple[float, ...] = (0.3, 1.4, 0.4, 0.1)  # set, U, share of R, saturation
+    tolerance: float = 1e-14
+    max_evaluations: int = 400
+    driven_points: int = 400  # along a branch that is predicted
+
+
+CYCLE_FIT = CycleFitSettings()
 
 
 @dataclass(frozen=True, eq=False)
 class FittedCycles:
     """A loading curve with unloading and reloading, fitted to a history (`materials/memory.py`).
 
-    knots (k,) strains and stiffness (k,) N, the tangent of the loading curve there, above the
-    reference load; memory (4,) : set, unloading, reloading, saturation, in the order of
-    `memory.QUANTITIES`; slip : strain that the extensometer lost before each later cycle; sigma
-    (k + 4 + slips,) one standard deviation each, of independent readings. rows : readings that are
-    followed, at strains of the law; load : modelled, N. rms : N, of those that were fitted.
+    Parameters
+    ----------
+    knots, stiffness : (k,) arrays
+        Strains, and the tangent of the loading curve there, N, above the reference load.
+    memory : (4,) array
+        Set, unloading, reloading, saturation, in the order of `memory.QUANTITIES`.
+    slip : mapping of int to float
+        Strain that the extensometer lost before each later cycle.
+    sigma : (k + 4 + slips,) array
+        One standard deviation each, of independent readings.
+    rows : (n,) array of int
+        Readings that are followed.
+    strain, load : (n,) arrays
+        Strains of the law at them, and modelled loads, N.
+    rms : float
+        Of the readings that were fitted, N.
+    law : HypoelasticLaw
+        The fitted law.
     """
 
     knots: Array
@@ -274,129 +302,256 @@ class FittedCycles:
         return list(zip(QUANTITIES, self.memory.tolist(), sigma, strict=False))
 
     def driven(self, before: int, peak: float, level: float) -> tuple[Array, ...]:
-        """Return strain and load of a loading to a peak (N) and of the unloading after it.
+        """Return a loading to a peak and the unloading after it, by the load as of a machine.
 
-        before : number of the readings that precede it. Only the load is given, as to a machine;
-        level : N, at which strains and loads of the law begin.
+        Parameters
+        ----------
+        before : int
+            Number of the readings that precede the loading.
+        peak : float
+            N.
+        level : float
+            Load at which strains and loads of the law begin, N.
+
+        Returns
+        -------
+        strain_up, load_up, strain_down, load_down : arrays
+            Of loading and unloading, N.
         """
-        path, found = self.strain[:before], list[Array]()
+        path = self.strain[:before]
+        branches: list[Array] = []
         for end in (self.law.strain_range[0], 0.0):
-            way = np.linspace(path[-1], end, FINE)
-            load = _stress(self.law, np.r_[path, way[1:]])[len(path) - 1 :] + level
-            i, turn = passage(load, way, peak if end else -np.inf)
+            strain = np.linspace(path[-1], end, CYCLE_FIT.driven_points)
+            load = _stress(self.law, np.r_[path, strain[1:]])[len(path) - 1 :] + level
+            i, strain_at_peak = passage(load, strain, peak if end else -np.inf)
             if i >= 0:
-                way, load = np.r_[way[: i + 1], turn], np.r_[load[: i + 1], peak]
-            found += [way, load]
-            path = np.r_[path, way[1:]]
-        return tuple(found)
+                strain = np.r_[strain[: i + 1], strain_at_peak]
+                load = np.r_[load[: i + 1], peak]
+            branches += [strain, load]
+            path = np.r_[path, strain[1:]]
+        return tuple(branches)
 
 
 def _stress(law: HypoelasticLaw, strain: Array) -> Array:
+    """Return the stress of a law along a history of strain."""
     return own_stress(law.pieces, law.coupling, 0, strain, *law_slopes(law, [], 1.0))[0]
 
 
 def matched_rows(one: EvaluatedHistory) -> tuple[int, int]:
     """Return first and last row, from the first passage of the reference load to the last."""
-    h, first, last = one.history, one.values[0].cycle.start, one.values[-1].cycle.peak
-    start = first + passage(h.load[first:], h.strain[first:], one.reference)[0] + 1
-    end = last + passage(h.load[last:], h.strain[last:], one.reference)[0]
-    return start, end if end > last else len(h.load) - 1
+    history = one.history
+    first, last = one.values[0].cycle.start, one.values[-1].cycle.peak
+    start = first + passage(history.load[first:], history.strain[first:], one.reference)[0] + 1
+    end = last + passage(history.load[last:], history.strain[last:], one.reference)[0]
+    return start, end if end > last else len(history.load) - 1
 
 
-def fit_cycles(one: EvaluatedHistory, knots: int = KNOTS, leave: int = 0) -> FittedCycles:
-    """Fit a loading curve and a memory to all cycles but `leave`; each branch has one weight.
+class CycleFit:
+    """The least squares problem of a loading curve, a memory and slips of an extensometer.
 
-    The readings count from the first passage of the reference load to the last, in strain and load.
-    What an extensometer has lost by slip before a later cycle is an unknown; a cycle that is left
-    out has that of the next one.
+    The unknowns x are the tangent at the knots over the mean stiffness; set, unloading U, the share
+    of U - 1 that R - 1 is (so that the reloading R stays below U), saturation; slips over the
+    largest strain. Readings count from the first passage of the reference load to the last, in
+    strain and load, each branch with the same weight.
+
+    Parameters
+    ----------
+    evaluated : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+    leave : int
+        Number of a cycle that is not fitted; its slip is that of the next one.
     """
-    h, values, level = one.history, one.values, one.reference
-    last, (start, end) = len(values), matched_rows(one)
-    rows = np.arange(start, end + 1)
-    strain, load = h.strain[rows] - one.zero, h.load[rows] - level
-    number = np.searchsorted([v.cycle.start for v in values], rows, "right")
-    weight, none = np.zeros(len(rows)), [0.0, 1.0]
-    for v in values:
-        for side in (rows < v.cycle.peak, rows >= v.cycle.peak):
-            own = side & (number == v.cycle.number) & (v.cycle.number != leave)
-            weight[own] = 1.0 / (v.peak * math.sqrt(max(int(own.sum()), 1)))
-    slipped = [k for k in range(2, last + 1) if k != (leave if leave == last else leave + 1)]
-    later = (number[:, None] >= slipped).astype(float)
-    top = float(strain[weight > 0].max())
-    form = Spline.at([np.linspace(0.0, top, knots).tolist(), none, none])
-    free = [form.size - knots + k for k in range(knots)]  # E1 comes last
-    names = [*(f"beta_{i}" for i in free), *NAMES[: len(QUANTITIES)]]
-    mean, shared = float(load.max()) / top, knots + len(QUANTITIES)
 
-    def law_at(x: Array) -> HypoelasticLaw:
-        # By the share of U - 1 that R - 1 is, so that R stays below U; strains over the largest.
-        kept, up, share, fade = x[knots:shared]
-        memory = Memory.of([kept, up, 1.0 + share * (up - 1.0), fade / top, *[0, 1, 1, 0] * 2])
-        beta = np.r_[np.full(form.size - knots, mean), mean * x[:knots]]
-        return HypoelasticLaw(beta, 0.0, np.array([top, 1, 1]), form=form, memory=memory)
+    def __init__(self, evaluated: EvaluatedHistory, knots: int, leave: int) -> None:
+        history = evaluated.history
+        start, end = matched_rows(evaluated)
+        self.rows = np.arange(start, end + 1)
+        self.strain = history.strain[self.rows] - evaluated.zero
+        self.load = history.load[self.rows] - evaluated.reference
+        cycle_starts = [v.cycle.start for v in evaluated.values]
+        number = np.searchsorted(cycle_starts, self.rows, "right")
+        self.weight = self._branch_weights(evaluated, number, leave)
+        last = len(evaluated.values)
+        with_next = leave if leave == last else leave + 1
+        self.slipped = [k for k in range(2, last + 1) if k != with_next]
+        self.has_slipped = (number[:, None] >= self.slipped).astype(float)
+        self.top = float(self.strain[self.weight > 0].max())
+        no_knots = [0.0, 1.0]
+        strains = np.linspace(0.0, self.top, knots).tolist()
+        self.form = Spline.at([strains, no_knots, no_knots])
+        self.knots = knots
+        self.shared = knots + len(QUANTITIES)
+        self.mean = float(self.load.max()) / self.top
+        tangents = range(self.form.size - knots, self.form.size)  # E1 comes last
+        self.names = [*(f"beta_{i}" for i in tangents), *NAMES[: len(QUANTITIES)]]
 
-    def strain_at(x: Array) -> Array:
-        return np.maximum(strain + top * later @ x[shared:], 0.0)
+    def _branch_weights(
+        self, evaluated: EvaluatedHistory, number: NDArray[np.intp], leave: int
+    ) -> Array:
+        """Return the weight (n,) of each reading, by its branch; 0 in the cycle that is left."""
+        weight = np.zeros(len(self.rows))
+        for v in evaluated.values:
+            for side in (self.rows < v.cycle.peak, self.rows >= v.cycle.peak):
+                is_branch = side & (number == v.cycle.number) & (v.cycle.number != leave)
+                weight[is_branch] = 1.0 / (v.peak * math.sqrt(max(int(is_branch.sum()), 1)))
+        return weight
 
-    def slopes(x: Array) -> Array:
-        law, moved = law_at(x), strain_at(x)
-        by = own_stress(law.pieces, law.coupling, 0, moved, *law_slopes(law, names, 1.0))[1]
-        up, share = x[knots + 1 : knots + 3]
-        chain = np.diag([*[mean] * knots, 1.0, 1.0, up - 1.0, 1.0 / top])
+    def law_at(self, x: Array) -> HypoelasticLaw:
+        """Return the law of unknowns."""
+        permanent, unloading, share, saturation = x[self.knots : self.shared]
+        reloading = 1.0 + share * (unloading - 1.0)
+        unused = [0, 1, 1, 0] * 2
+        memory = Memory.of([permanent, unloading, reloading, saturation / self.top, *unused])
+        others = np.full(self.form.size - self.knots, self.mean)
+        beta = np.r_[others, self.mean * x[: self.knots]]
+        strain_range = np.array([self.top, 1, 1])
+        return HypoelasticLaw(beta, 0.0, strain_range, form=self.form, memory=memory)
+
+    def strain_at(self, x: Array) -> Array:
+        """Return the strains (n,) of the law, with what the extensometer has lost."""
+        return np.maximum(self.strain + self.top * self.has_slipped @ x[self.shared :], 0.0)
+
+    def residual(self, x: Array) -> Array:
+        """Return the weighted residuals (n,)."""
+        return self.weight * (_stress(self.law_at(x), self.strain_at(x)) - self.load)
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives (n, unknowns) of the residuals; by slip central differences."""
+        knots = self.knots
+        law, strain = self.law_at(x), self.strain_at(x)
+        slopes = law_slopes(law, self.names, 1.0)
+        by_constants = own_stress(law.pieces, law.coupling, 0, strain, *slopes)[1]
+        unloading, share = x[knots + 1 : knots + 3]
+        chain = np.diag([*[self.mean] * knots, 1.0, 1.0, unloading - 1.0, 1.0 / self.top])
         chain[knots + 2, knots + 1] = share
-        ends = [[_stress(law, strain_at(x + s * e)) for s in (STEP, -STEP)]
-                for e in np.eye(len(x))[shared:]]  # fmt: skip
-        of_slip = [(a - b) / (2 * STEP) for a, b in ends]
-        return weight[:, None] * np.column_stack([by @ chain, *of_slip])
+        by_slip = []
+        step = CYCLE_FIT.slip_step
+        for direction in np.eye(len(x))[self.shared :]:
+            above = _stress(law, self.strain_at(x + step * direction))
+            below = _stress(law, self.strain_at(x + -step * direction))
+            by_slip.append((above - below) / (2 * step))
+        return self.weight[:, None] * np.column_stack([by_constants @ chain, *by_slip])
 
-    many = len(slipped)
-    low = [*[BOUNDS[0]] * knots, 0.0, 1.0, 0.0, 0.0, *[SLIPS[0]] * many]
-    high = [*[BOUNDS[1]] * knots, 0.99, MOST, 1.0, 100.0, *[SLIPS[1]] * many]
-    begin = [*[1.0] * knots, 0.3, 1.4, 0.4, 0.1, *[0.0] * many]
-    best = scipy.optimize.least_squares(
-        lambda x: weight * (_stress(law_at(x), strain_at(x)) - load), begin, slopes,
-        bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400,
-    )  # fmt: skip
-    law, moved, fitted = law_at(best.x), strain_at(best.x), weight > 0
-    found = _stress(law, moved)
-    spread = 2 * best.cost / max(int(fitted.sum()) - len(begin), 1)
-    up = best.x[knots + 1]
-    scale = np.r_[np.full(knots, mean), 1.0, 1.0, up - 1.0, 1.0 / top, np.full(many, top)]
-    sigma = scale * np.sqrt(spread * np.diag(np.linalg.pinv(best.jac.T @ best.jac)))
-    rms = float(np.sqrt(np.mean((found - load)[fitted] ** 2)))
-    slip = dict(zip(slipped, (top * best.x[shared:]).tolist(), strict=True))
-    memory = np.array(law.memory.constants[: len(QUANTITIES)]) if law.memory else np.empty(0)
+    def solve(self) -> Any:
+        """Return the result of `scipy.optimize.least_squares`."""
+        settings, count = CYCLE_FIT, len(self.slipped)
+        low_tangent, high_tangent = settings.tangent_bounds
+        low_slip, high_slip = settings.slip_bounds
+        low = [*[low_tangent] * self.knots, 0.0, 1.0, 0.0, 0.0, *[low_slip] * count]
+        largest = settings.largest_set, settings.largest_unloading, 1.0, settings.largest_saturation
+        high = [*[high_tangent] * self.knots, *largest, *[high_slip] * count]
+        begin = [*[1.0] * self.knots, *settings.initial_memory, *[0.0] * count]
+        return scipy.optimize.least_squares(
+            self.residual,
+            begin,
+            self.jacobian,
+            bounds=(low, high),
+            xtol=settings.tolerance,
+            ftol=settings.tolerance,
+            gtol=settings.tolerance,
+            max_nfev=settings.max_evaluations,
+        )
+
+    def sigma(self, best: Any) -> Array:
+        """Return one standard deviation of each constant, of independent readings."""
+        freedom = max(int((self.weight > 0).sum()) - len(best.x), 1)
+        variance = 2 * best.cost / freedom
+        unloading = best.x[self.knots + 1]
+        scale = np.r_[
+            np.full(self.knots, self.mean),
+            1.0,
+            1.0,
+            unloading - 1.0,
+            1.0 / self.top,
+            np.full(len(self.slipped), self.top),
+        ]
+        covariance = np.linalg.pinv(best.jac.T @ best.jac)
+        return scale * np.sqrt(variance * np.diag(covariance))
+
+
+def fit_cycles(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int = 0) -> FittedCycles:
+    """Fit a loading curve and a memory to the cycles of a history.
+
+    Parameters
+    ----------
+    one : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+    leave : int
+        Number of a cycle that is not fitted; 0: all are.
+
+    Returns
+    -------
+    FittedCycles
+        With what an extensometer has lost by slip before each later cycle; a cycle that is left
+        out has that of the next one.
+    """
+    problem = CycleFit(one, knots, leave)
+    best = problem.solve()
+    law, strain = problem.law_at(best.x), problem.strain_at(best.x)
+    load = _stress(law, strain)
+    is_fitted = problem.weight > 0
+    slips = (problem.top * best.x[problem.shared :]).tolist()
+    constants = law.memory.constants[: len(QUANTITIES)] if law.memory else ()
     return FittedCycles(
-        np.array(form.knots[0]), mean * best.x[:knots], memory, slip, sigma, rows, moved,
-        found + level, rms, law,
-    )  # fmt: skip
+        knots=np.array(problem.form.knots[0]),
+        stiffness=problem.mean * best.x[:knots],
+        memory=np.array(constants),
+        slip=dict(zip(problem.slipped, slips, strict=True)),
+        sigma=problem.sigma(best),
+        rows=problem.rows,
+        strain=strain,
+        load=load + one.reference,
+        rms=float(np.sqrt(np.mean((load - problem.load)[is_fitted] ** 2))),
+        law=law,
+    )
 
 
-def left_out(one: EvaluatedHistory, knots: int = KNOTS) -> pd.DataFrame:
-    """Return each cycle beside its prediction by a fit to the others: a row a cycle.
+def left_out(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFrame:
+    """Return each cycle beside its prediction by a fit to the others.
 
     Predicted are strains at the loads, as a machine that follows loads would find them: stiffness
-    and permanent strain, without slip. A cycle that alone reaches its load, and the first, have no
-    others that could predict them.
+    and permanent strain, without slip.
+
+    Parameters
+    ----------
+    one : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+
+    Returns
+    -------
+    DataFrame
+        A row a cycle, but of the first and of one that alone reaches its load: no others could
+        predict them.
     """
-    table = []
+    rows = []
     for v in one.values:
         number = v.cycle.number
-        others = [w.peak for w in one.values if w is not v]
-        if number == 1 or v.peak > (1 + SAME) * max(others) or math.isnan(v.permanent):
+        other_peaks = [w.peak for w in one.values if w is not v]
+        if number == 1 or v.peak > (1 + SAME) * max(other_peaks) or math.isnan(v.permanent):
             continue
         fitted = fit_cycles(one, knots, leave=number)
         before = int(np.searchsorted(fitted.rows, v.cycle.start))
-        up, rising, down, falling = fitted.driven(before, v.peak, one.reference)
+        strain_up, load_up, strain_down, load_down = fitted.driven(before, v.peak, one.reference)
         row: dict[str, Any] = {"file": one.history.path.name, "cycle": number}
-        for name, way, load in (("EA_loading", up, rising), ("EA_unloading", down, falling)):
-            predicted = _slope(load, way, v.peak)
-            row |= {f"{name}_N": getattr(v, name), f"{name}_predicted_N": predicted}
-            row[f"{name}_off_percent"] = 100 * (predicted / getattr(v, name) - 1)
-        kept = passage(falling, down, one.reference)[1]
-        row |= {"permanent_strain": v.permanent, "permanent_strain_predicted": kept}
-        table.append(row | {"permanent_strain_off": kept - v.permanent})
-    return pd.DataFrame(table)
+        branches = {"EA_loading": (load_up, strain_up), "EA_unloading": (load_down, strain_down)}
+        for name, (load, strain) in branches.items():
+            measured, predicted = getattr(v, name), _slope(load, strain, v.peak)
+            row |= {f"{name}_N": measured, f"{name}_predicted_N": predicted}
+            row[f"{name}_off_percent"] = 100 * (predicted / measured - 1)
+        permanent = passage(load_down, strain_down, one.reference)[1]
+        row |= {
+            "permanent_strain": v.permanent,
+            "permanent_strain_predicted": permanent,
+            "permanent_strain_off": permanent - v.permanent,
+        }
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 @dataclass(frozen=True, eq=False)
