@@ -1,5 +1,7 @@
 """Auditor of bubble tests within a fit."""
 
+import re
+
 import numpy as np
 
 from .laws import DIRECTION, MODULI, MPA, Law
@@ -287,6 +289,7 @@ class Bubble:
                     self._mean_abs, digits=3)  # fmt: skip
         heading = self.test if self.fit.several else None
         ledger.fact("mean |dx| + |dy| + |dz|, mm", self.numbers["mean_abs_mm"], heading=heading)
+        self._facts(heading)
         if "moduli_error" in self.numbers:
             self._page_of_errors()
         last = f"{self.pressures[-1]:.4g}"
@@ -308,6 +311,57 @@ class Bubble:
             return [match[1]]
 
         ledger.text(rf"the inflated bubble of {self.test}, {NUM} mm high at the end", height)
+
+    def _facts(self, heading):
+        """Points left out, offsets and the sheet, on the page and on the terminal."""
+        ledger, data, nuisance = self.ledger, self.numbers["data"], self.numbers["nuisance"]
+        dropped = data["doubtful_dropped"], data["outside_dropped"]
+        if any(dropped):
+            pattern = r"(\d+) doubtful, (\d+) beyond the rim"
+            ledger.fact("points left out", (pattern, *dropped), heading=heading)
+        shift, pressure = nuisance["displacement_offset_mm"], nuisance["pressure_offset_kPa"]
+        if shift is not None:
+            told = ", ".join(f"{value:.3f}" for value in shift)
+            ledger.fact("displacement offset, mm", told, heading=heading)
+        if pressure is not None:
+            ledger.fact("pressure offset, kPa", f"{pressure:.3f}", heading=heading)
+        for name, own in self.fit.result.get("unknowns", {}).items():
+            ledger.text(rf"\b{name} {NUM} {own['unit']}(?=,|$)", [f"{own['value']:.3f}"],
+                        source="terminal", needed=False)  # fmt: skip
+        words = self._sheet_words()
+        ledger.fact("sheet", words, heading=heading)
+        ledger.text(rf"sheet: {re.escape(words)}", [], source="terminal", needed=False)
+
+    def _sheet_words(self):
+        """Return what the fit used of the sheet, each with its size."""
+        sheet, words = self.numbers["sheet"], []
+        if sheet["measured_rms_mm"] is not None:
+            words.append(f"measured surface (followed to {sheet['measured_rms_mm']:.2g} mm RMS)")
+        if sheet["modes_mm"]:
+            words.append(f"{len(sheet['modes_mm'])} modes of the surface")
+        if words:
+            low, high = sheet["surface_mm"]["least"], sheet["surface_mm"]["largest"]
+            words.append(f"z0 from {low:.2f} to {high:.2f} mm")
+        if sheet["slack_percent"] is not None:
+            warp, fill = sheet["slack_percent"]
+            words.append(f"slack {warp:.3f} % in warp, {fill:.3f} % in fill")
+        if metric := sheet["metric_percent"]:
+            means = ", ".join(
+                f"{own:.3f} % in {name.split('_')[1]}"
+                for name, own in metric.items()
+                if name.endswith("_1")
+            )
+            words.append(f"metric of {len(metric)} unknowns: {means} at the centre")
+        if sheet["rim_motion_mm"] is not None:
+            words.append(f"rim as measured, up to {sheet['rim_motion_mm']:.2f} mm")
+        if sheet["constant_field_rms_mm"] is not None:
+            taken = ", ".join(
+                f"{name} {size:.2f} mm RMS" for name, size in sheet["constant_field_rms_mm"].items()
+            )
+            words.append(f"constant field taken out: {taken}")
+        if sheet["from_pressure_kPa"] is not None:
+            words.append(f"displacements counted from {sheet['from_pressure_kPa']:.4g} kPa")
+        return "; ".join(words) or "flat and taut, its rim fixed"
 
     def _mean_abs(self, match):
         """The mean error: four digits in the card, three elsewhere."""

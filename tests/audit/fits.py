@@ -921,7 +921,8 @@ class FitAudit:
             ledger.claim_json(place, "consistent")
             low, high = own["bounds"]
             value, sigma, prior = own["value"], own["sigma"], own["prior"]
-            if not low - 1e-9 * abs(low) <= value <= high + 1e-9 * abs(high):
+            room = 1e-6 * (high - low)
+            if not low - room <= value <= high + room:
                 ledger.find(f"result.json: unknowns.{name}", f"{value} lies outside its bounds")
             on = None
             if value - low <= 1e-6 * (high - low):

@@ -89,7 +89,8 @@ def _whole_lines(text):
     lines, before = [], ""
     for line in text.splitlines():
         # What was broken did not fit.
-        word = re.match(r"\S*(?: %\S*)?", line.strip())[0]
+        # A number stays with its unit.
+        word = re.match(r"\S*(?: (?:%|[kMG]?Pa|k?N|mm|kN/m|J/m)\S*)?", line.strip())[0]
         full = len(before) + 1 + len(word) > WIDTH
         if full and re.match(r" {4,6}\S", line) and lines:
             lines[-1] += f" {line.strip()}"

@@ -1,0 +1,45 @@
+"""Small folders that no golden test leaves, for the auditor: unloaded yarns, an unknown beside the
+moduli, frames of a camera that stands askew."""
+
+import numpy as np
+import pytest
+
+from .audit import audit
+from .biaxial_files import biaxial_project, cycle, write_rows
+from .commands import in_process
+from .projects import small
+
+#: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
+COMPLIANCE = np.array([[1 / 800, -0.35 / 640], [-0.42 / 800, 1 / 640]])
+RATIOS = {"1:1": (1, 1), "2:1": (1, 0.5), "1:2": (0.5, 1), "1:0": (1, 0), "0:1": (0, 1)}
+
+
+def findings(folder, base, **options):
+    return [str(finding) for finding in audit(folder, base=base, **options).findings]
+
+
+def test_biaxial_test_whose_yarns_are_unloaded_and_that_has_no_energy(tmp_path):
+    rows = []
+    for ratio, shares in RATIOS.items():
+        for _ in range(2):
+            loads = np.outer(cycle(0.0), shares)
+            strain = 100 * loads @ COMPLIANCE.T
+            rows += [(ratio, *n, *e) for n, e in zip(loads.tolist(), strain.tolist(), strict=True)]
+    write_rows(tmp_path / "test.csv", rows)
+    biaxial_project(tmp_path)
+    done = in_process("biaxial", "project.toml", "--free", "--out", "out", cwd=tmp_path)
+    assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """A fit of a bubble with the pressure's offset as an unknown."""
+    folder = tmp_path_factory.mktemp("beside")
+    small(folder, ("pressure_offset = false", "pressure_offset = true"))
+    run = ("bubble", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1)
+    return folder, in_process(*run, cwd=folder).stdout
+
+
+def test_unknown_beside_moduli_that_depend_on_strain(beside):
+    folder, printed = beside
+    assert findings(folder / "out", folder, terminal=printed) == []
