@@ -107,6 +107,10 @@ def echo(folder, ledger, command, *, tests=True):
     title = project.get("fabric", {}).get("name")
     if "title" in result and title:
         ledger.json("title", title, "echoed")
+    thickness = project.get("fabric", {}).get("thickness")
+    if title and thickness and folder.page is not None:
+        millimetres = {"mm": 1.0, "m": 1e3}[project.get("units", {}).get("length", "mm")]
+        ledger.fact("fabric", (rf"{re.escape(title)}, {N} mm.*", millimetres * thickness), "echoed")
     if tests and "tests" in result:
         known = [test["name"] for kind in ("strips", "bubble", "biaxial")
                  for test in project.get(kind, []) if "name" in test]  # fmt: skip

@@ -276,6 +276,7 @@ def audit_bootstrap(folder, ledger):
             ledger.find(f"bootstrap.csv: {name}", "the median is outside the percentiles")
         spread = float(np.sqrt(np.mean(own["sigma_relative"] ** 2)))
         ledger.json(("sigma_relative", name), spread, abs=1e-12)
+        _sigma_of_fit(folder, ledger, name, fit, card)
         ledger.claim_json(("up_to_strain", DIRECTION[name]), "consistent")
     _bootstrap_unknowns(folder, ledger, card, unknowns)
     page_of_csv(folder, ledger, "bootstrap.csv")
@@ -301,6 +302,20 @@ def audit_bootstrap(folder, ledger):
     ledger.text(r"(\d+) samples: the ends of the bands", [result["samples"]], needed=False)
     _bootstrap_charts(ledger, table, result)
     audit_notes(folder, ledger)
+
+
+def _sigma_of_fit(folder, ledger, name, fit, card):
+    """Compare the fit's 1 sigma with its moduli.csv, or a constant modulus with its coefficient."""
+    if fit is not None and fit.result and _tests(fit) == set(folder.result["tests"]):
+        own = fit.data("moduli.csv")
+        own = own.loc[own["modulus"] == name, "sigma_relative"].to_numpy(float)
+        ledger.json(("sigma_relative_of_fit", name), float(np.sqrt(np.mean(own**2))), "consistent",
+                    rel=0.02)  # fmt: skip
+    elif card.form == "constant":
+        rows = folder.data("coefficients.csv").set_index("unknown")
+        row = rows.loc[f"beta_{4 * BLOCKS.index(name) + 3}"]
+        ledger.json(("sigma_relative_of_fit", name), row["sigma_of_fit"] / row["value"],
+                    "consistent", rel=1e-6)  # fmt: skip
 
 
 def _bootstrap_charts(ledger, table, result):
