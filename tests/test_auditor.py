@@ -7,7 +7,7 @@ import pytest
 from .audit import audit
 from .biaxial_files import biaxial_project, cycle, write_rows
 from .commands import in_process
-from .projects import small
+from .projects import computed_fields, small
 
 #: Of no strain energy: what a fill load does to the warp is not what a warp load does to the fill.
 COMPLIANCE = np.array([[1 / 800, -0.35 / 640], [-0.42 / 800, 1 / 640]])
@@ -43,3 +43,40 @@ def beside(tmp_path_factory):
 def test_unknown_beside_moduli_that_depend_on_strain(beside):
     folder, printed = beside
     assert findings(folder / "out", folder, terminal=printed) == []
+
+
+PROJECT = """
+[fabric]
+name = "made"
+thickness = 0.8
+[law]
+form = "constant"
+[law.bounds]
+E1 = [0.05, 2.0]
+E2 = [0.05, 2.0]
+G12 = [0.001, 0.2]
+[[bubble]]
+radius = 100.0
+pressures = [30, 60, 100]
+elements = 108
+[bubble.data.points]
+files = ["f0.csv", "f1.csv", "f2.csv"]
+columns = { x = "x", y = "y", z = "z", dx = "dx", dy = "dy", dz = "dz" }
+length_unit = "mm"
+[bubble.data.points.registration]
+"""
+
+
+def test_frames_of_a_camera_that_stands_askew(tmp_path):
+    chance = np.random.default_rng(5)
+    c, s = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    for k, field in enumerate(computed_fields(pressures=[0.03, 0.06, 0.1], elements=300)):
+        places = np.column_stack([field.points, np.zeros(len(field.points))]) @ turn.T
+        moved = field.displacement @ turn.T + chance.normal(0.0, 0.02, field.displacement.shape)
+        table = np.column_stack([np.add(places, (5.0, 2.0, 300.0)), moved])
+        lines = [",".join(map(repr, row)) for row in table.tolist()]
+        (tmp_path / f"f{k}.csv").write_text("\n".join(["x,y,z,dx,dy,dz", *lines]) + "\n")
+    (tmp_path / "project.toml").write_text(PROJECT)
+    done = in_process("check", "project.toml", "--out", "out", cwd=tmp_path)
+    assert findings(tmp_path / "out", tmp_path, terminal=done.stdout) == []

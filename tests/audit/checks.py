@@ -47,6 +47,8 @@ def _doubts(ledger, check):
             at = text.text.find(row[-1])
             if len(row[-1]) > 10 and at >= 0:
                 text.claim((at, at + len(row[-1])), "consistent")
+    count = sum(len(own) for own in check["tests"].values())
+    ledger.text(r"(?:carry|with) (\d+) of the doubts", [count], needed=False)
     bad = [d for own in check["tests"].values() for d in own if _is_error(d)]
     if check["sound"] != (not bad):
         ledger.find("check.json: sound", f"is {check['sound']} with {len(bad)} errors")
@@ -103,7 +105,7 @@ class Bubble:
         """Return name, kPa, places, displacements, heights of each file; None if not plain."""
         points = self.section.get("data", {}).get("points", {})
         files, columns = points.get("files"), points.get("columns", {})
-        if not files or points.get("length_unit", "mm") != "mm" or "registration" in points:
+        if not files or points.get("length_unit", "mm") != "mm":
             return None
         unit = self.folder.project.get("units", {}).get("pressure", "kPa")
         frames = []
@@ -119,7 +121,8 @@ class Bubble:
         return frames
 
     def audit(self):
-        if self.frames is None:
+        registered = any(t.title == "Registration" for t in self.folder.page.tables)
+        if self.frames is None or (registered and not self._registered()):
             self._as_printed()
             return
         rows = []
@@ -130,6 +133,47 @@ class Bubble:
         self.ledger.table("Frames", FRAMES_HEADER, rows, "recomputed", slack=1e-6)
         self._apexes()
         self._centre()
+
+    def _registered(self):
+        """Turn the frames by the registration of the page, and check what was found of it.
+
+        Only of a plane that is hardly tilted: origin and warp are enough to turn by.
+        """
+        table = self.folder.page.table("Registration")
+        cells = {row[0]: row[1:] for row in table.rows}
+        tilt = float(re.search(NUM, cells["plane of the rim"][0])[1])
+        origin = [float(own) for own in cells["centre of the rim, mm"][0].split(", ")]
+        warp, how = cells["warp, degrees from the camera's x"]
+        if tilt > 1.0 or any("beyond" in own for own in cells["plane of the rim"]):
+            return False
+        c, s = np.cos(np.radians(float(warp))), np.sin(np.radians(float(warp)))
+        turn = np.array([[c, s], [-s, c]])
+        self.frames = [
+            (name, pressure, (places - origin[:2]) @ turn.T,
+             np.column_stack([moved[:, :2] @ turn.T, moved[:, 2]]), heights - origin[2])
+            for name, pressure, places, moved, heights in self.frames
+        ]  # fmt: skip
+        centre, error = _centre_of(self.frames, self.radius)
+        told = re.search(rf"found where the sheet does not rise, \+- {NUM}", table.rows[1][2])
+        title = "page: Registration"
+        if told:
+            ratio = float(told[1]) / error
+            if np.hypot(*centre) > 3 * error + 0.02 or not 1 / 1.6 < ratio < 1.6:
+                self.ledger.find(title, f"centre {told[0]}; {centre} +- {error:.2g} is left")
+        angle = _axes_of(self.frames[-1])
+        clear = re.search(rf"\((\d+)\s?% clear\), \+- {NUM}; the (stiffer|softer)", how)
+        if clear and int(clear[1]) > 50:
+            off = (angle + 45) % 90 - 45
+            if abs(off) > 3 * float(clear[2]) + 3 or float(clear[2]) > 5:
+                self.ledger.find(title, f"axes are {off:.2f} degrees off the warp, {how}")
+            _, _, strain = _apex(*self.frames[-1][2:], self.radius)
+            if (strain[0] > strain[1]) == (clear[3] == "stiffer"):
+                self.ledger.find(title, f"warp strained by {strain[0]:.3g}, fill {strain[1]:.3g}")
+        rises = [own[3][:, 2].max() for own in self.frames]
+        if rises != sorted(rises):
+            self.ledger.find(title, "the rise does not grow with the pressure")
+        self.ledger.table("Registration", None, table.rows, "recomputed")
+        return True
 
     def _as_printed(self):
         """Of other files: rows by rising pressure, and what a row says of itself."""
