@@ -31,6 +31,27 @@ from .test import CylinderTest
 #: Columns of a curve.
 CURVE_COLUMNS = ("deflection_mm", "load_N", "gauge_pressure_kPa", "volume_mm3", "wrinkled_share")
 
+#: Columns of runs.csv before the loads at places, and after them.
+COLUMNS_BEFORE_LOADS = (
+    "stiffness_N_per_mm",
+    "knee_mm",
+    "knee_N",
+    "limit_mm",
+    "limit_N",
+    "wrinkles_mm",
+    "wrinkles_N",
+)
+COLUMNS_AFTER_LOADS = (
+    "inflation_warp_strain",
+    "inflation_fill_strain",
+    "pressure_rise_kPa",
+    "rms_N",
+    "rms_relative",
+    "mean_error_N",
+    "compared",
+    "reached_mm",
+)
+
 
 def measured_table(tests: Sequence[CylinderTest]) -> pd.DataFrame:
     """Return mean and scatter of the repetitions on a grid; one test at least was measured."""
@@ -228,25 +249,11 @@ class CylinderOutcome:
     def columns(self, number: int) -> Mapping[str, object]:
         """Return the numbers of a run for runs.csv."""
         m = self.measures.get(number)
-        row: dict[str, object] = {"stiffness_N_per_mm": m and m.stiffness}
-        for name in ("knee", "limit", "wrinkles"):
-            point = (getattr(m, name) if m else None) or (None, None)
-            row |= {f"{name}_mm": point[0], f"{name}_N": point[1]}
         places = [p.replace(" ", "_") for p in self.runs[number].test.reading.places]
-        loads = m.loads.values() if m else [None] * len(places)
-        row |= {f"load_at_{p}_N": load for p, load in zip(places, loads, strict=True)}
-        body = m.body_strain if m else (None, None)
-        error = m.error if m else None
-        row |= {
-            "inflation_warp_strain": body[0],
-            "inflation_fill_strain": body[1],
-            "pressure_rise_kPa": m and m.pressure_rise,
-            "rms_N": error and error.rms,
-            "rms_relative": error and error.relative,
-            "mean_error_N": error and error.mean,
-            "compared": error and error.compared,
-            "reached_mm": m and m.reached,
-        }
+        loads = [f"load_at_{place}_N" for place in places]
+        names = [*COLUMNS_BEFORE_LOADS, *loads, *COLUMNS_AFTER_LOADS]
+        values = [None] * len(names) if m is None else _column_values(m)
+        row: dict[str, object] = dict(zip(names, values, strict=True))
         if m is not None and m.against is not None:
             ratios = m.against.ratios.items()
             row |= {f"{n.replace(' ', '_')}_over_measured": ratio for n, ratio in ratios}
@@ -294,6 +301,20 @@ class CylinderOutcome:
             has_spreads=bool(self.spreads),
         )
         return [*table, *self.unsure]
+
+
+def _column_values(m: BendingMeasures) -> list[float | None]:
+    """Return the values of `COLUMNS_BEFORE_LOADS`, of the loads, and of `COLUMNS_AFTER_LOADS`."""
+    values = [m.stiffness]
+    for point in (m.knee, m.limit, m.wrinkles):
+        values += [None, None] if point is None else [*point]
+    values += [*m.loads.values(), *m.body_strain, m.pressure_rise]
+    error = m.error
+    if error is None:
+        values += [None] * 4
+    else:
+        values += [error.rms, error.relative, error.mean, error.compared]
+    return [*values, m.reached]
 
 
 def _comparison_numbers(comparison: MeasuredComparison) -> dict[str, Any]:

@@ -173,12 +173,8 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
         ends = f"{listed[0]:g} to {listed[-1]:g}"
         raise place.error("pressure", f"{pressure:g} lies outside wall.pressure, {ends}")
     is_braid = section.yarn is not None
-    keys, foreign_keys = (BRAID_KEYS, PLAIN_KEYS) if is_braid else (PLAIN_KEYS, BRAID_KEYS)
-    missing = [key for key in keys if getattr(section, key) is None]
-    misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
-    if missing or misplaced:
-        problem = f"expected {', '.join(PLAIN_KEYS)}, or of a braid {', '.join(BRAID_KEYS)}"
-        raise place.error(f"wall.{(missing or misplaced)[0]}", problem)
+    keys = BRAID_KEYS if is_braid else PLAIN_KEYS
+    _check_wall_keys(section, keys, PLAIN_KEYS if is_braid else BRAID_KEYS, place)
     optional = "across" if is_braid else "poisson"
     values = {
         key: _at_pressure(section, key, listed, pressure, place)
@@ -189,6 +185,17 @@ def _wall(section: WallSection, pressure: float, place: Place) -> PlainWall | Br
         if is_braid:
             return BraidedWall(**values)
         return PlainWall(**values, wrinkles=section.wrinkles)
+
+
+def _check_wall_keys(
+    section: WallSection, keys: Sequence[str], foreign_keys: Sequence[str], place: Place
+) -> None:
+    """Raise InputError unless a wall has all keys of its kind, and none of the other kind."""
+    missing = [key for key in keys if getattr(section, key) is None]
+    misplaced = [key for key in foreign_keys if getattr(section, key) is not None]
+    if missing or misplaced:
+        problem = f"expected {', '.join(PLAIN_KEYS)}, or of a braid {', '.join(BRAID_KEYS)}"
+        raise place.error(f"wall.{(missing or misplaced)[0]}", problem)
 
 
 def _at_pressure(

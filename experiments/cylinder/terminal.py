@@ -58,15 +58,21 @@ def describe_runs(
             continue
         m = measures[i]
         loads = [describe_load(m.loads.get(p), sigmas[i].get(p), " N") for p in places]
-        line = f"{names[i]} {'-' if m.stiffness is None else f'{m.stiffness:.2f}':>6}"
+        stiffness = "-" if m.stiffness is None else f"{m.stiffness:.2f}"
+        line = f"{names[i]} {stiffness:>6}"
         line += _right_aligned(points[i], point_widths) + _right_aligned(loads, load_widths)
         if has_errors:
-            line += f"{'-' if m.error is None else f'{100 * m.error.relative:.1f} %':>8}"
+            line += f"{_describe_error(m):>8}"
         remarks = [ends[i]] if run.record.early else []
         if marked := marks(run.notes):
             remarks.append(f"[{', '.join(marked)}]")
         lines.append("  ".join([line, *remarks]))
     return lines
+
+
+def _describe_error(measures: BendingMeasures) -> str:
+    """Return the RMS error over the largest measured load; "-" without measured loads."""
+    return "-" if measures.error is None else f"{100 * measures.error.relative:.1f} %"
 
 
 def _padded_names(runs: Sequence[PredictedRun]) -> list[str]:
