@@ -267,7 +267,9 @@ def _project(section: dict[str, Any], cards: Mapping[str, MaterialCard]) -> Proj
     fabric = Fabric("Inflated cylinder in bending", next(iter(cards.values())).thickness)
     place = Place(HERE, "", fabric, Scales(pressure_unit="kPa"))
     try:
-        test = kind.read(kind.section.model_validate(section), place, section["name"])
+        checked_section: Any = kind.section.model_validate(section)
+        place.check_units(checked_section)
+        test = kind.read(checked_section, place, section["name"])
     except ValidationError as errors:
         error = first_error(HERE, errors, kind.section)
     except InputError as found:

@@ -30,7 +30,7 @@ from ..meshes.cylinder_model import ForceTable
 from ..readers.frames import FrameSource
 from ..readers.machine_tables import Channel
 from ..readers.registry import Content, format_named
-from ..readers.sections import ModulusUnit, Number, Positive, Section, beside
+from ..readers.sections import ModulusUnit, Number, Positive, Section, beside, unit_doubts
 from ..solvers.base import History, instability
 
 if TYPE_CHECKING:
@@ -147,6 +147,12 @@ class Place:
     def error(self, field: str, problem: str) -> InputError:
         """Return an error in the section; `field` is the dotted key below it, "" for itself."""
         return InputError(self.path, f"{self.at}.{field}" if field else self.at, problem)
+
+    def check_units(self, section: Section) -> None:
+        """Refuse a section with a pressure or a size that is in another unit; InputError."""
+        said = section.model_dump(exclude_unset=True, exclude_none=True)
+        for key, problem in unit_doubts(type(section), said, self.scales):
+            raise self.error(key, problem)
 
     @contextmanager
     def naming(
@@ -705,11 +711,19 @@ class Expected:
         (low, high), (least, largest) = self.moduli["E1"], self.moduli["E2"]
         return low * high > 1.5 * least * largest
 
-    def outside(self, modulus: float, names: Sequence[str]) -> str:
-        """Describe a modulus (MPa) far out of the bounds of those named together; "" otherwise."""
+    def limits(self, names: Sequence[str]) -> tuple[float, float]:
+        """Return the least and the largest of the moduli named together, MPa."""
         low = min(self.moduli[name][0] for name in names)
         high = max(self.moduli[name][1] for name in names)
-        if low / ROUGH <= modulus <= high * ROUGH:
+        return low, high
+
+    def outside(self, modulus: float, names: Sequence[str], factor: float = ROUGH) -> str:
+        """Describe a modulus (MPa) out of the bounds of those named together; "" otherwise.
+
+        factor : by which it may lie beyond them.
+        """
+        low, high = self.limits(names)
+        if low / factor <= modulus <= high * factor:
             return ""
         bounds = f"the bounds of {' and '.join(names)} are {low:.3g} to {high:.3g}"
         return f"{modulus:.3g} MPa, and {bounds}"

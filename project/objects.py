@@ -30,13 +30,13 @@ from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError, did_you_mean
 from ..experiments.bubble.section import RegistrationSection, SheetSection
-from ..experiments.kinds import Output
+from ..experiments.kinds import Output, Scales
 from ..experiments.registry import kind_named
 from ..files import is_file, no_file_words, output_errors, write_text
 from ..materials.forms.base import UNLIMITED, form_named, form_names, form_settings
 from ..readers.curves import DIRECTIONS, read_load_curves
 from ..readers.frames import QUANTITIES, frame_files
-from ..readers.sections import first_error, model_of
+from ..readers.sections import first_error, model_of, unit_doubts
 from .schema import LawSection
 
 Array: TypeAlias = NDArray[np.float64]
@@ -50,8 +50,8 @@ Files: TypeAlias = str | Path | Sequence[str | Path]
 PYTHON = Path("python")
 #: Bounds of coated fabrics as `bubblefit init` writes them, MPa.
 BOUNDS = {"E1": [20.0, 2000.0], "E2": [20.0, 1000.0], "G12": [1.0, 200.0]}
-#: MPa: a membrane bursts long before.
-MOST_PRESSURE = 5.0
+#: Units of objects.
+BASE_UNITS = Scales(1.0, 1.0, 1.0, "MPa", "MPa", "mm")
 
 
 def plain(value: Any) -> Any:
@@ -159,10 +159,13 @@ class Definition:
         said = dict(self.section)
         if callable(said.get("objective")):
             object.__setattr__(self, "function", said.pop("objective"))
+        section = kind_named(self.kind).section
         try:
-            said = checked_keys(kind_named(self.kind).section, said)
+            said = checked_keys(section, said)
         except InputError as error:
             raise InputError(None, self.argument(error.field), error.problem) from None
+        for key, problem in unit_doubts(section, said, BASE_UNITS):
+            raise InputError(None, self.argument(key), problem)
         object.__setattr__(self, "section", said)
 
     def __repr__(self) -> str:
@@ -368,7 +371,6 @@ class Cylinder(Definition):
         curves : one a measured repetition, (deflection mm, load N), (n, 2) or a DataFrame. keys :
         of [[cylinder]] and of [cylinder.measured]. InputError names the argument.
         """
-        check_pressure("pressure", float(numbers("pressure", pressure)))
         files = {}
         for k, curve in enumerate(curves):
             found = _values(f"curves[{k}]", curve, ("deflection", "load")).tolist()
@@ -381,7 +383,6 @@ class Cylinder(Definition):
     @classmethod
     def read(cls, files: Files, **keys: Any) -> Self:
         """Return the test with measured repetitions in files; keys : as of `Cylinder`."""
-        check_pressure("pressure", float(numbers("pressure", keys.get("pressure", 0))))
         return cls.of(**_sorted("cylinder", {**keys, "files": _listed(files)}))
 
 
@@ -434,7 +435,6 @@ def _pressures(value: Numbers, frames: int | None) -> list[float]:
         if k and not pressure > found[k - 1]:
             problem = f"expected rising pressures, got {pressure:g} after {found[k - 1]:g}"
             raise InputError(None, f"pressures[{k}]", problem)
-    check_pressure("pressures", float(found.max(initial=0.0)))
     return [float(p) for p in found]
 
 
@@ -445,13 +445,6 @@ def numbers(argument: str, value: Numbers) -> Array:
     except (TypeError, ValueError):
         problem = f"expected numbers, got {repr(value)[:40]}"
         raise InputError(None, argument, problem) from None
-
-
-def check_pressure(argument: str, largest: float) -> None:
-    """Refuse pressures that are kPa by mistake."""
-    if largest > MOST_PRESSURE:
-        problem = f"expected MPa, got up to {largest:g}: far beyond a membrane's; are these kPa? "
-        raise InputError(None, argument, problem + "Divide by 1000")
 
 
 def _curve_rows(curves: Any) -> list[tuple[Any, ...]]:

@@ -458,6 +458,9 @@ def _project(
     fabric = Fabric(said.name, said.thickness * length, said.thickness_change, said.lab)
     scales = Scales(MODULUS_UNITS[units.modulus], PRESSURE_UNITS[units.pressure], length, *names)
     place = Place(path, "", fabric, scales, None, need_data)
+    replace(place, at="fabric").check_units(file.fabric)
+    for number, card in enumerate(file.card):
+        replace(place, at=f"card[{number}]").check_units(card)
     tests, written = _tests(file, place, text, data, made)
     return Project(
         path=path, fabric=fabric, scales=scales, tests=tests, law=file.law, fit=file.fit,
@@ -510,6 +513,7 @@ def _tests(
             here = replace(place, at=f"{name}[{i}]", data_folder=folder)
             if own in tests:
                 raise here.error("name", f"{own!r} is there twice; give one of them another name")
+            here.check_units(section)
             tests[own] = kind.read(section, here, own)
             if isinstance(data, Mapping) and folder is not None and not _reads(tests[own]):
                 raise here.error("data", NO_FILES)

@@ -22,7 +22,6 @@ from ..materials.card import MaterialCard, read_card
 from ..materials.forms.base import UNLIMITED, form_named
 from ..materials.law import HypoelasticLaw
 from ..readers.sections import (
-    Length,
     LengthUnit,
     Modulus,
     ModulusUnit,
@@ -33,6 +32,7 @@ from ..readers.sections import (
     PressureUnit,
     Section,
     StrainTriple,
+    Thickness,
     Unit,
     first_error,
 )
@@ -43,7 +43,7 @@ class FabricSection(Section):
     """[fabric]: the one fabric that all tests are of."""
 
     name: str = ""
-    thickness: Length
+    thickness: Thickness
     thickness_change: Literal["constant", "incompressible"] = "constant"
     lab: str = ""
 
@@ -172,7 +172,7 @@ class CardSection(Section):
     beta: list[Modulus] | None = None
     form: str | None = None
     nu12: Annotated[float, Field(ge=0, lt=1)] | None = None
-    thickness: Length | None = None
+    thickness: Thickness | None = None
     thickness_change: Literal["constant", "incompressible"] | None = None
     strain_range: StrainTriple | None = None
     test: str | None = None

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import InputError, did_you_mean
+from .unit_plausibility import Quantity, unit_doubt
 
 ModulusUnit = Literal["GPa", "MPa", "Pa"]
 PressureUnit = Literal["kPa", "MPa", "bar", "Pa"]
@@ -27,13 +28,20 @@ Positive = Annotated[float, Field(gt=0, le=HUGE)]
 
 @dataclass(frozen=True)
 class Unit:
-    """A mark of keys whose numbers are in a unit of [units]: modulus, pressure or length."""
+    """A mark of keys whose numbers are in a unit of [units]: modulus, pressure or length.
+
+    quantity : by which a number in another unit is recognised.
+    """
 
     name: Literal["modulus", "pressure", "length"]
+    quantity: Quantity | None = None
 
 
 Length = Annotated[Positive, Unit("length")]
-Pressure = Annotated[Positive, Unit("pressure")]
+#: Of a specimen or a machine: a width, a diameter, a gauge length.
+Size = Annotated[Positive, Unit("length", "size")]
+Thickness = Annotated[Positive, Unit("length", "thickness")]
+Pressure = Annotated[Positive, Unit("pressure", "pressure")]
 Modulus = Annotated[Number, Unit("modulus")]
 #: Logarithmic, so 2 is 640 %: who writes 13 means percent.
 Strain = Annotated[float, Field(gt=0, le=2)]
@@ -145,6 +153,31 @@ def in_base_units(section: type[BaseModel], said: Mapping[str, Any], scales: Any
             ]
             whole[key] = tables if isinstance(value, list) else tables[0]
     return whole
+
+
+def unit_doubts(
+    section: type[BaseModel], said: Mapping[str, Any], scales: Any, at: str = ""
+) -> Iterator[tuple[str, str]]:
+    """Yield (dotted key, problem) of numbers of a table that seem to be in another unit.
+
+    scales : MPa, or mm, per unit by the names of `Unit`, and names of units (`pressure_unit`).
+    """
+    for key, value in said.items():
+        if (field := section.model_fields.get(key)) is None:
+            continue
+        dotted_key = f"{at}.{key}" if at else key
+        several = value if isinstance(value, (list, tuple)) else [value]
+        inside = next(_sections(field.annotation), None)
+        marks = [*field.metadata, *_marks(field.annotation)]
+        unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
+        for number, item in enumerate(several):
+            item_key = dotted_key if several is not value else f"{dotted_key}[{number}]"
+            if isinstance(item, Mapping) and inside is not None:
+                yield from unit_doubts(inside, item, scales, item_key)
+            elif isinstance(item, (int, float)) and unit is not None and unit.quantity is not None:
+                name, scale = getattr(scales, f"{unit.name}_unit"), getattr(scales, unit.name)
+                if problem := unit_doubt(unit.quantity, item, name, scale):
+                    yield item_key, problem
 
 
 def whole_in_base_units(section: AnySection, scales: Any) -> AnySection:

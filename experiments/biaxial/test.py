@@ -25,7 +25,7 @@ from ...readers.frames import FrameSource
 from ...readers.histories import LoadHistory, Pace, pace_of, turns
 from ...readers.machine_tables import Channel, TableOptions, read_machine_table
 from ...readers.quantities import PAIRS
-from ...readers.sections import Length, Name, Number, Positive, Section
+from ...readers.sections import Name, Number, Positive, Section, Size
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ..kinds import Array, Place, Reach, Refined, SectionTest, listed_files, named_format
 
@@ -316,7 +316,7 @@ class BiaxialSection(Section):
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
-    width: Length | None = None
+    width: Size | None = None
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     cycle: Literal["last"] | Annotated[int, Field(ge=1)] = "last"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...meshes.disk import Outline
 from ...readers.fields import DisplacementField
+from ...readers.unit_plausibility import pressure_remedy, unit_doubt
 from ..kinds import Array, Doubt, Expected
 from . import registration
 from .column_consistency import (
@@ -65,6 +66,8 @@ LEAST_RISE, MOST_RISE = 0.004, 1.5
 LEAST_REACH, MOST_REACH = 0.1, 20.0
 #: Of a biaxial stress and strain: Poisson's ratio is not known yet, and matters little here.
 RATIO = 0.25
+#: A modulus that equilibrium gives is doubted where it lies beyond the bounds by this factor.
+BEYOND_BOUNDS = 1.1
 #: Below this mean strain the first shape of the sheet decides what looks like strain.
 TELLING = 0.002
 
@@ -614,20 +617,33 @@ def length_unit(view: View, expected: Expected) -> Iterator[Doubt]:
 
 def pressure_unit(view: View, expected: Expected) -> Iterator[Doubt]:
     """Doubt bar taken for kPa, or a wrong thickness, by the force that equilibrium gives."""
-    if not view.apexes or not expected.moduli:
-        return
+    modulus, text = _apex_modulus(view), ""
+    names = ("E1", "E2")
+    if modulus is not None and expected.moduli:
+        beyond = expected.outside(modulus, names, BEYOND_BOUNDS)
+        if beyond:
+            top = view.apexes[-1]
+            mean = 0.5 * sum(top.strain)
+            text = (
+                f"equilibrium of the apex at {view.top} kPa gives {top.force:.3g} N/mm at a strain "
+                f"of {mean:.3g}, a modulus of about {beyond}: is the pressure in the unit that is "
+                "said (bar beside kPa), and are thickness and lengths right?"
+            )
+            text += pressure_remedy(modulus, expected.limits(names))
+            yield Doubt("pressure-unit", bool(expected.outside(modulus, names)), text)
+    problem = unit_doubt("pressure", 1e3 * view.last.pressure, "kPa", 1e-3)
+    if problem and not text:
+        yield Doubt("pressure-unit", True, f"the highest pressure: {problem}")
+
+
+def _apex_modulus(view: View) -> float | None:
+    """Return a rough modulus of the sheet, MPa; None where nothing is strained."""
+    if not view.apexes:
+        return None
     top = view.apexes[-1]
-    mean = 0.5 * sum(top.strain)
-    if not np.isfinite(top.force) or mean < TELLING:
-        return
-    far = expected.outside(top.stiffness * (1 - RATIO) / view.thickness, ("E1", "E2"))
-    if far:
-        text = (
-            f"equilibrium of the apex at {view.top} kPa gives {top.force:.3g} N/mm at a strain of "
-            f"{mean:.3g}, a modulus of about {far}: is the pressure in the unit that is said (bar "
-            "beside kPa), and are thickness and lengths right?"
-        )
-        yield Doubt("pressure-unit", True, text)
+    if not np.isfinite(top.force) or 0.5 * sum(top.strain) < TELLING:
+        return None
+    return top.stiffness * (1 - RATIO) / view.thickness
 
 
 #: Later checks reckon with what earlier ones make sure of: a sure doubt ends the list.

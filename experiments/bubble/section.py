@@ -73,8 +73,8 @@ def facet_of(section: BubbleSection, place: Place) -> Facet | None:
 class EllipseSection(sections.Section):
     """[bubble.ellipse]: the clamped edge is an ellipse, in place of `radius`."""
 
-    major: sections.Length
-    minor: sections.Length
+    major: sections.Size
+    minor: sections.Size
     angle: Annotated[float, Field(ge=-90, le=90)] = 0.0
 
 
@@ -416,7 +416,7 @@ class BubbleSection(sections.Section):
 
     name: Name_of_sections | None = None
     weight: sections.Positive = 1.0
-    radius: sections.Length | Literal["clamp"] | None = None
+    radius: sections.Size | Literal["clamp"] | None = None
     ellipse: EllipseSection | None = None
     pressures: Annotated[list[sections.Pressure], Field(min_length=1)] | None = None
     inflation: Literal["all"] | Annotated[int, Field(ge=1)] = 1

@@ -32,7 +32,7 @@ from ...meshes.strip_models import (
 from ...readers.curves import LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
-from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
+from ...readers.sections import Name, Positive, Section, Size, whole_in_base_units
 from .. import kinds
 from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, SectionTest, Weighting
 from ..measured import MeasuredKind, PreparedParts
@@ -67,9 +67,9 @@ class CyclesSection(Section):
     load_unit: Literal["N", "kN", "lbf"] | None = None
     length_unit: LengthUnit | None = None
     strain_unit: Literal["%", "mm/mm"] | None = None
-    width: Length | None = None
-    gauge_length: Length | None = None
-    grip_distance: Length | None = None
+    width: Size | None = None
+    gauge_length: Size | None = None
+    grip_distance: Size | None = None
     reference_load: Positive | None = None
     increments: Annotated[int, Field(ge=4, le=1000)] = 20
     noise: Positive | None = None

@@ -34,6 +34,7 @@ from ...readers.histories import (
     passage,
     read_history,
 )
+from ...readers.unit_plausibility import unit_doubt
 from ..kinds import READING, Array
 
 SLIP = NoteKind(
@@ -694,6 +695,9 @@ def cycles(
     for name, value in (("reference_load", reference_load), ("width", width)):
         if value is not None and not value > 0:
             raise InputError(None, name, f"expected a number above 0, got {value:g}")
+    for name, value in (("width", width), ("length", reading.get("length"))):
+        if value is not None and (problem := unit_doubt("size", value, "mm", 1.0)):
+            raise InputError(None, name, problem)
     several = [files] if isinstance(files, (Path, str)) else list(files)
     if not several:
         raise InputError(None, "files", "expected the files of load histories, got none")

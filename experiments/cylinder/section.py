@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Unit
+from ...readers.sections import Length, Name, Number, Positive, Pressure, Section, Size, Unit
 from ..kinds import ChannelSection, MemberSection
 
 Frames = Annotated[int, Field(ge=1, le=10000)]
@@ -16,8 +16,8 @@ NotNegative = Annotated[float, Field(ge=0, le=1e18), Unit("length")]
 class SaddleSection(Section):
     """A shell around the cylinder in which it lies, in place of a round support."""
 
-    inner_diameter: Length
-    length: Length
+    inner_diameter: Size
+    length: Size
     fillet: Length | None = None
 
 
@@ -86,14 +86,14 @@ class BentSection(Section):
 
     name: Name | None = None
     cord: list[CordSection] = Field(default_factory=list)
-    diameter: Length
+    diameter: Size
     pressure: Pressure
-    length: Length | None = None
+    length: Size | None = None
     seam_width: NotNegative | None = None
     element_size: Length | None = None
     symmetry: Literal["full", "quarter"] = "quarter"
-    span: Length | None = None
-    support_diameter: Length | None = None
+    span: Size | None = None
+    support_diameter: Size | None = None
     saddle: SaddleSection | None = None
     mass_per_area: NoUnit | None = None
     collar: CollarSection | None = None

@@ -36,7 +36,7 @@ from ...readers.curves import (
     split_at_restarts,
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
-from ...readers.sections import Length, Name, Positive, Section, whole_in_base_units
+from ...readers.sections import Length, Name, Positive, Section, Size, whole_in_base_units
 from ..kinds import Place, Reach, Refined, SectionTest, listed_files, named_format, state_said
 from .data import Strip
 
@@ -50,8 +50,8 @@ Unit = Literal["N", "relative"]
 class GaugeSection(Section):
     """Section [strips.warp], fill or bias: the virtual strain gauge at rest and at the end."""
 
-    gauge_length: Length | None = None
-    final_length: Length | None = None
+    gauge_length: Size | None = None
+    final_length: Size | None = None
 
 
 class ColumnsSection(Section):
@@ -109,8 +109,8 @@ class StripsSection(Section):
     """Section [[strips]]: cut strips pulled along warp, fill and across the yarns."""
 
     name: Name | None = None
-    width: Length | None = None
-    grip_distance: Length | None = None
+    width: Size | None = None
+    grip_distance: Size | None = None
     bias_angle: Annotated[float, Field(gt=0, lt=90)] = 45.0
     increments: Annotated[int, Field(ge=1, le=10000)] = 100
     warp: GaugeSection | None = None

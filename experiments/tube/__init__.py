@@ -20,7 +20,7 @@ from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
-from ...readers.sections import Length, Name, Positive, Section
+from ...readers.sections import Name, Positive, Section, Size
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, MakeSolver, Masks, Place, Planning, Reach, SectionTest, Weighting
@@ -50,7 +50,7 @@ class TubeSection(Section):
 
     name: Name | None = None
     weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
-    diameter: Length
+    diameter: Size
     file: str
     folder: str = ""
     noise: Positive | None = None

@@ -253,6 +253,23 @@ def card(tmp_path):
     return path
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--pressure", 140_000, "is this in Pa? Divide by 1000"),
+        ("--diameter", 0.15, "is this in m? Multiply by 1000"),
+        ("--span", 0.2, "is this in m? Multiply by 1000"),
+    ],
+)
+def test_simulate_bend_doubts_units_before_it_runs(tmp_path, card, option, value, words):
+    options = {"--diameter": 150, "--pressure": 140, option: value}
+    given = [item for pair in options.items() for item in pair]
+    done = bend(*given, "--card", card, cwd=tmp_path, command=("simulate", "bend"), code=2)
+    assert done.stderr.startswith(f"bubblefit: {option}")
+    assert done.stderr.strip().endswith(words)
+    assert not (tmp_path / "out").exists()
+
+
 def test_simulate_bend_on_the_membrane(tmp_path, card, golden):
     short = ("--element-size", 30, "--deflection", 12, "--frames", 3, "--seam-width", 30)
 

@@ -349,3 +349,29 @@ def test_the_card_of_a_fit_is_as_sure_as_the_fit(together, tmp_path):
 
 def test_the_shipped_schema_is_what_the_sections_say():
     assert SHIPPED.read_text() == schema_text(with_plug_ins=False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "thickness = 0.81 ",
+            "thickness = 0.00081 ",
+            ("fabric.thickness: ", "m? Multiply by 1000"),
+        ),
+        ("radius = 100.0", "radius = 0.1", ("bubble[0].radius: ", "m? Multiply by 1000")),
+        ("radius = 100.0", "ellipse = { major = 0.12, minor = 0.08 }", ("ellipse.major: ",)),
+        ("251, 300]", "251, 300_000]", ("pressures[6]: ", "is this in Pa? Divide by 1000")),
+        ("[22, 59,", "[1e-7, 59,", ("pressures[0]: ", "at least 0.0001, got 1e-07")),
+    ],
+)
+def test_a_number_in_another_unit_is_named_with_its_key(edit, old, new, words):
+    text = complaint(edit, old, new)
+    assert all(part in text for part in words), text
+
+
+def test_a_number_in_another_unit_is_seen_in_the_units_of_the_file(tmp_path):
+    units = ('pressure = "kPa"', 'pressure = "bar"')
+    text = complaint(read_project, project_file(tmp_path, KNOWN.read_text(), units))
+    assert "bubble[0].pressures" in text and "expected bar, at most 50, got " in text
+    assert "is this in kPa? Divide by 100" in text

@@ -297,11 +297,19 @@ LIMITS = [
           (2000.0, 30.0, ["20 radii"]), (50.0, 0.4, ["0.004 radii at 200 kPa", "displacements"]),
           (50.0, 0.41, []), (50.0, -0.41, []), (50.0, 149.0, []), (50.0, 150.0, ["1.5 radii"]),
           (50.0, -150.0, ["1.5 radii"]))),
-    # Of bounds 50 to 1500 MPa, four times less and more.
-    *((doubts.pressure_unit, "pressure-unit", count, True,
-       [f"{force(e):.3g} N/mm", "0.04", f"{e:.3g} MPa", "E1 and E2 are 50 to 1.5e+03"],
+    # Of bounds 50 to 1500 MPa, 1.1 times less and more, and four times.
+    *((doubts.pressure_unit, "pressure-unit", int(bool(words)), sure,
+       [f"{force(e):.3g} N/mm", "0.04", f"{e:.3g} MPa", "E1 and E2 are 50 to 1.5e+03", *words]
+       if words else [],
        {"apexes": (apex(9, 9), apex(0.03, 0.05, force=force(e)))})
-      for e, count in ((12.4, 1), (12.6, 0), (5990.0, 0), (6010.0, 1))),
+      for e, sure, words in (
+          (12.4, True, ["multiplied by 10 (MPa given as bar) it would be 124 MPa"]),
+          (12.6, False, ["it would be 126 MPa"]), (45.4, False, ["454"]), (45.6, False, []),
+          (1640.0, False, []), (1660.0, False, ["divided by 10 (bar given as MPa)", "166"]),
+          (5990.0, False, ["599"]), (6010.0, True, ["601"]),
+          (1e5, True, ["divided by 1000 (kPa given as MPa, or Pa as kPa)"]))),
+    (doubts.pressure_unit, "pressure-unit", 1, True, ["expected kPa, at most 5000", "by 1000"],
+     {"fields": (field(140.0, [0, 0, 30.0]),), "apexes": ()}),
     *((doubts.pressure_unit, "pressure-unit", count, True, [], {"apexes": apexes} | other)
       for apexes, count, other in (
           ((apex(0.002, 0.002, force=1e9),), 1, {}), ((), 0, {}),

@@ -1,0 +1,101 @@
+"""Whether a number can be in the unit that it is said to be in, and which unit it seems to be in.
+
+Pressures that no membrane holds, and sizes that no test has, are nearly always in another unit: Pa
+for kPa, m for mm. What is wrong by less than that only data can tell.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import log
+from typing import Literal
+
+Quantity = Literal["pressure", "size", "thickness"]
+
+
+@dataclass(frozen=True)
+class PlausibleRange:
+    """Limits of a quantity in its base unit (MPa or mm), and the middle of its usual values.
+
+    units : sizes of units in the base unit, of those that numbers are mistaken for.
+    """
+
+    least: float
+    most: float
+    usual: float
+    units: Mapping[str, float] = field(repr=False)
+    remark: str = ""
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value in the base unit lies between the limits."""
+        return self.least <= value <= self.most
+
+
+PRESSURES = {"Pa": 1e-6, "mbar": 1e-4, "kPa": 1e-3, "bar": 0.1, "MPa": 1.0}
+LENGTHS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
+RANGES: Mapping[Quantity, PlausibleRange] = {
+    "pressure": PlausibleRange(1e-7, 5.0, 0.05, PRESSURES, ", far beyond what a membrane holds"),
+    "size": PlausibleRange(0.5, 1e5, 150.0, LENGTHS),
+    "thickness": PlausibleRange(5e-3, 50.0, 0.7, LENGTHS),
+}
+
+
+def unit_doubt(quantity: Quantity, number: float, unit: str, scale: float) -> str:
+    """Return what is wrong with a number in a unit, with the factor; "" if it is plausible.
+
+    Parameters
+    ----------
+    quantity : {"pressure", "size", "thickness"}
+    number : float
+        Above 0, as the user wrote it.
+    unit : str
+        Its unit by name, such as "kPa".
+    scale : float
+        MPa, or mm, per unit.
+    """
+    limits = RANGES[quantity]
+    value = number * scale
+    if not value > 0 or limits.holds(value):
+        return ""
+    high = value > limits.most
+    limit = (limits.most if high else limits.least) / scale
+    problem = f"expected {unit}, at {'most' if high else 'least'} {limit:g}, got {number:g}"
+    problem += limits.remark if high else ""
+    candidates = {
+        name: abs(log(number * size / limits.usual))
+        for name, size in limits.units.items()
+        if limits.holds(number * size)
+    }
+    if not candidates:
+        return problem
+    meant = min(candidates, key=lambda name: candidates[name])
+    factor = scale / limits.units[meant]
+    remedy = f"Divide by {factor:g}" if factor > 1 else f"Multiply by {1 / factor:g}"
+    return f"{problem}; is this in {meant}? {remedy}"
+
+
+#: Mistaken units of pressure, by the factor by which pressures are then too high.
+MISTAKES = {
+    1e3: "kPa given as MPa, or Pa as kPa", 1e2: "kPa given as bar", 1e1: "bar given as MPa",
+    1e-1: "MPa given as bar", 1e-2: "bar given as kPa", 1e-3: "MPa given as kPa",
+}  # fmt: skip
+
+
+def pressure_remedy(modulus: float, bounds: tuple[float, float]) -> str:
+    """Return the factor of all pressures with which a modulus lies within its bounds; or "".
+
+    Parameters
+    ----------
+    modulus : float
+        MPa, of equilibrium with the pressures as they are.
+    bounds : tuple of float
+        MPa, of the law.
+    """
+    low, high = bounds
+    inside = [factor for factor in MISTAKES if low <= modulus / factor <= high]
+    if not inside:
+        return ""
+    middle = (low * high) ** 0.5
+    factor = min(inside, key=lambda trial: abs(log(modulus / trial / middle)))
+    how = f"divided by {factor:g}" if factor > 1 else f"multiplied by {1 / factor:g}"
+    corrected = modulus / factor
+    return f" With pressures {how} ({MISTAKES[factor]}) it would be {corrected:.3g} MPa"
