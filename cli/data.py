@@ -375,7 +375,8 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
 
     Prints for each cycle the strain kept at the reference load, the tangent stiffness between 40
     and 90 % of its peak on loading and unloading, and the energy lost. Writes cycles.csv,
-    holds.csv (creep and relaxation) and cycles.png, with --fit memory.csv and left-out.csv. Slip
+    loops.csv (every reading), holds.csv (creep and relaxation) and cycles.png, with --fit
+    memory.csv and left-out.csv. Slip
     and drift of an extensometer are noted.
     """
     out, overwrite, as_json = (options.pop(name) for name in ("out", "overwrite", "as_json"))
@@ -389,7 +390,7 @@ def cycles_command(files: tuple[Path, ...], **options: Any) -> None:
     }  # fmt: skip
     if fitted:
         tables |= {"memory": found.memory, "left-out": found.left_out}
-    for name, table in tables.items():
+    for name, table in {**tables, "loops": found.loops}.items():
         write_table(table, folder / f"{name}.csv")
     drawn = []
     for k, one in enumerate(found.histories):

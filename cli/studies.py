@@ -228,7 +228,7 @@ def compare_command(**options: Any) -> None:
 )
 @click.option(
     "--leave", metavar="SORT",
-    help="Left out in turn: tests, frames, specimens, directions or ratios.  [tests]",
+    help="Left out in turn: tests, frames, specimens, directions, ratios or cycles.  [tests]",
 )  # fmt: skip
 @click.option(
     "--weights", "counted", metavar="KIND",
@@ -238,8 +238,9 @@ def compare_command(**options: Any) -> None:
 def validate_command(leave: str | None, counted: str | None, **options: Any) -> None:
     """Leave each test of PROJECT.toml out of the fit in turn, and judge the fit there.
 
-    With --leave single frames of bubbles, specimens or directions of strips, or ratios of biaxial
-    tests instead; with --card cards at the tests, without a fit. Writes validation.csv and
+    With --leave single frames of bubbles, specimens or directions of strips, ratios of biaxial
+    tests, or cycles that others reach instead; with --card cards at the tests, without a fit.
+    Writes validation.csv and
     result.json, and a folder for each fit, into the output folder. With --weights moduli and errors
     over the weight of a kind of test: weights.csv, weights.png, result.json.
     """

@@ -771,6 +771,11 @@ class DataFile:
     dropped: Mapping[str, int] = field(default_factory=dict)
 
 
+def data_notes(test: object) -> tuple[Note, ...]:
+    """Return what a test with its data, read or prepared, says of these data; most say nothing."""
+    return tuple(getattr(test, "data_notes", ()))
+
+
 def files_of(test: object) -> tuple[DataFile, ...]:
     """Return the measured files of a prepared or predicted test, its `data_files()` if it has any.
     These are in their order; none where data are computed."""

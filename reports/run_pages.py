@@ -136,7 +136,7 @@ def write_check(check: Check, folder: Path) -> Path:
         for label, value in exhibit.facts
     ]
     summary = "The data are fit to be fitted." if check.sound else "A fit would not begin."
-    count = sum(len(judgement.doubts) for judgement in check.judgements) + len(check.unbalanced)
+    count = sum(map(len, check.findings.values())) + len(check.unbalanced)
     if check.sound and count:
         summary = f"A fit would begin, and carry {count} of the doubts below with it."
     shown = _estimate(check, folder, several)
@@ -147,7 +147,7 @@ def write_check(check: Check, folder: Path) -> Path:
         warnings=[
             words for j in check.judgements
             for words in (*(f"{j.test}: {d.text}" for d in j.errors), *(n.line for n in j.notes))
-        ] + [note.line for note in (*check.unbalanced, *check.joined)],
+        ] + [note.line for note in (*check.grave_notes, *check.unbalanced, *check.joined)],
         sections=[
             Section("Doubts", [doubts]),
             Section("What was seen", [

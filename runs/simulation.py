@@ -19,6 +19,7 @@ from ..experiments.kinds import (
     Simulation,
     Studied,
     Test,
+    data_notes,
     notes_of,
     other_thickness,
 )
@@ -155,6 +156,9 @@ def simulate_cards(
              for note in _notes(name, cards[name], parts)]  # fmt: skip
     notes += [note.about(name) for name, card in cards.items()
               for note in other_thickness(card, project.fabric.thickness)]  # fmt: skip
+    for test in tests:
+        remarks = data_notes(test)
+        notes += [note.about(test.name) for note in remarks] if len(tests) > 1 else remarks
     result = {
         "command": command, "project": str(project.path), "solver": analyses.solver.name,
         "notes": rows(notes), "tests": {name: one.numbers for name, one in shown.items()},

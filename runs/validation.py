@@ -23,6 +23,7 @@ from ..experiments.kinds import (
     PredictedRun,
     PreparedTest,
     Weighting,
+    data_notes,
     notes_beyond,
     strains_of,
     unstable_words,
@@ -153,7 +154,13 @@ class Validation(Presented):
 
     @property
     def notes(self) -> list[Note]:
-        return [note.about(one.law) for one in self.judged for note in one.predicted.notes]
+        """Return the notes on predictions, by law, and those on the data of the tests judged."""
+        names = {one.predicted.test for one in self.judged}
+        notes = [note.about(one.law) for one in self.judged for note in one.predicted.notes]
+        for name, test in self.project.tests.items():
+            if any(judged == name or judged.startswith(f"{name}: ") for judged in names):
+                notes += [note.about(name) for note in data_notes(test)]
+        return notes
 
     def table(self) -> pd.DataFrame:
         """Return a row a law and comparison: law, test, compared, unit, errors."""

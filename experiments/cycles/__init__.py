@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...errors import InputError
+from ...errors import InputError, Note
 from ...inference.comparison import Comparison
 from ...materials.card import State
 from ...materials.law import HypoelasticLaw
@@ -38,7 +38,7 @@ from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, Sectio
 from ..measured import MeasuredKind, PreparedParts
 from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
-from .evaluation import EvaluatedHistory, evaluate_history, matched_rows
+from .evaluation import EvaluatedHistory, evaluate_history, matched_rows, scatter_notes
 
 #: mm of a gauge whose length does not matter; edges of the bias strip's quads over the usual ones.
 GAUGE, COARSER = 100.0, 0.4
@@ -158,6 +158,16 @@ class CyclesTest(SectionTest):
         return Reach((ends.get("warp"), ends.get("fill"), ends.get("bias")))
 
     @property
+    def data_notes(self) -> tuple[Note, ...]:
+        """Return the doubts about the histories, and the scatter between specimens."""
+        by_direction: dict[str, list[EvaluatedHistory]] = {}
+        notes: list[Note] = []
+        for specimen in self.matched.values():
+            by_direction.setdefault(specimen.direction, []).append(specimen.evaluated)
+            notes += [note for note in specimen.evaluated.notes if note.kind != kinds.READING]
+        return (*notes, *scatter_notes(by_direction))
+
+    @property
     def pace(self) -> Pace:
         """Return rate of strain and hold by the files' times."""
         return pace_of(one.evaluated.history for one in self.matched.values())
@@ -245,6 +255,17 @@ class PreparedCycles(PreparedParts):
 
     test: CyclesTest
     objective_is = "root of the mean square error of each branch's loads over the largest load"
+
+    @property
+    def data_notes(self) -> tuple[Note, ...]:
+        return self.test.data_notes
+
+    @property
+    def seen(self) -> list[str]:
+        """Return what `check` says of each specimen."""
+        return [
+            f"{name}: {specimen.evaluated.words}" for name, specimen in self.test.matched.items()
+        ]
 
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:

@@ -13,7 +13,7 @@ from ...reports.charts import Chart, Charts, dots, line
 from ...reports.content import Exhibit, Table
 from ...reports.vega import saved
 from ...solvers.base import History
-from ..kinds import Cards, Findings, FittedTest, Output, Runs, Simulation
+from ..kinds import READING, Cards, Findings, FittedTest, Output, Runs, Simulation
 from ..measured import compared
 from . import CyclesTest, PreparedCycles
 
@@ -49,7 +49,9 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
     """Return the RMS errors of the best fit, and the doubts about the histories."""
     of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
     numbers = _numbers(prepared.test, of_fit)
-    notes = [n for one in prepared.test.matched.values() for n in one.evaluated.notes]
+    histories = [one.evaluated for one in prepared.test.matched.values()]
+    reading = [note for one in histories for note in one.notes if note.kind == READING]
+    notes = [*reading, *prepared.data_notes]
     share = max(100 * p.rms / p.data.load.max() for p in prepared.fitted_parts(fitted))
     words = f"RMS error of load {share:.2g} % of the largest"
     return Findings({"rms_N": numbers}, tuple(notes), tuple(_lines(numbers)), words, words)
