@@ -156,8 +156,59 @@ def audit_cycles(folder, ledger):
         if other != file:
             for column in folder.tables[other]:
                 ledger.claim_column(other, column, "consistent")
+    if "loops.csv" in folder.tables:
+        _slip_notes(folder.data("loops.csv"), table, ledger)
     for note in ("cycle",):
         ledger.text(rf"\b{note} (\d+)\b", lambda m: [m[1]], source="notes.csv", needed=False)
+
+
+def _slip_notes(loops, table, ledger):
+    """Recompute the numbers of notes on slip from the readings of the loops.
+
+    A note names no file in its text: of all files the one with that number counts.
+    """
+
+    def loop(name, number):
+        own = loops[(loops["file"] == name) & (loops["cycle"] == number)]
+        return own, own.loc[own["load_N"].idxmax()]
+
+    def at_peaks(match):
+        candidates = []
+        for name in loops["file"].unique():
+            if not {int(match[1]), int(match[3])} <= {*loops[loops["file"] == name]["cycle"]}:
+                continue
+            (_, new), (_, old) = loop(name, int(match[1])), loop(name, int(match[3]))
+            lost = old["strain"] - new["strain"]
+            candidates.append((abs(lost - float(match[2])), lost, new, old))
+        _, lost, new, old = min(candidates, key=lambda row: row[0])
+        moved = new["travel_mm"] - old["travel_mm"]
+        return match[1], lost, match[3], moved
+
+    ledger.text(
+        rf"at the peak of cycle (\d+) {NUM} less strain than in cycle (\d+) at the same load"
+        rf"(?:, the machine's travel {NUM} mm more)?", at_peaks, source="notes.csv", digits=2,
+        needed=False,
+    )  # fmt: skip
+
+    def crossing(match):
+        apart = []
+        for name in loops["file"].unique():
+            own, top = loop(name, int(match[1]))
+            up, down = own[own["branch"] == "loading"], own[own["branch"] == "unloading"]
+            levels = np.linspace(0.2, 0.95, 16) * top["load_N"]
+            reference = table[table["file"] == name]["reference_N"].iloc[0]
+            ends = [
+                [passage(b["load_N"].to_numpy(), b["strain"].to_numpy(), level)[0]
+                 for level in levels if level >= reference]
+                for b in (down, up)
+            ]  # fmt: skip
+            apart.append(-np.nanmin(np.array(ends[0]) - ends[1]))
+        return match[1], min(apart, key=lambda value: abs(value - float(match[2])))
+
+    ledger.text(
+        rf"the branches of cycle (\d+) cross: {NUM} less strain", crossing, source="notes.csv",
+        digits=2, needed=False,
+    )  # fmt: skip
 
 
 def _ratios(ledger, file, own, rows, unit):
