@@ -379,6 +379,8 @@ def test_every_key_of_a_test_is_the_same_through_objects_and_toml(kind, tmp_path
 
 #: Settings that go with each other, or name something that is there.
 VALUES = {
+    "fabric.thickness": 7e-4,
+    "card.thickness": 7e-4,
     "law.form": "spline", "fit.method": "slsqp", "fit.constraints": "margin",
     "fit.trust": ["radius"], "fit.solver": "calculix", "fit.unknowns.nu12.bounds": [0.1, 0.4],
     "fit.unknowns.thickness.bounds": [6e-4, 9e-4], "card.beta": [0.1] * 12, "card.form": "cubic",
