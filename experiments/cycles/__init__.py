@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +40,14 @@ from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
 from .evaluation import EvaluatedHistory, evaluate_history, matched_rows, scatter_notes
 
-#: mm of a gauge whose length does not matter; edges of the bias strip's quads over the usual ones.
-GAUGE, COARSER = 100.0, 0.4
-#: Of the largest load: noise of one load unless the project says it. Least strain of a reading.
-NOISE, LEAST = 0.005, 1e-6
+#: mm of a gauge whose length does not matter.
+GAUGE_LENGTH = 100.0
+#: Edges of the bias strip's quads over the usual ones.
+BIAS_EDGES = 0.4
+#: Noise of one load over the largest, unless the project gives it.
+NOISE_SHARE = 0.005
+#: Strain by which readings differ at least, from each other and from the beginning.
+MIN_STRAIN = 1e-6
 
 
 class HistoryColumns(Section):
@@ -79,8 +83,20 @@ class CyclesSection(Section):
 class Specimen:
     """One history as it is matched: readings averaged over equal parts of each branch.
 
-    strain, load : (n,) from the reference load on, N. branch : (n,) its number from 0, even on
-    loading. cycle : (n,) from 1. leaves : cycles that the others can predict.
+    Parameters
+    ----------
+    direction : str
+        Warp, fill or bias.
+    evaluated : EvaluatedHistory
+        The whole history.
+    strain, load : (n,) arrays
+        From the reference load on, N.
+    branch : (n,) array of int
+        Number of the branch from 0, even on loading.
+    cycle : (n,) array of int
+        Number of the cycle from 1.
+    leaves : tuple of int
+        Cycles that the others can predict.
     """
 
     direction: str
@@ -98,47 +114,91 @@ class Specimen:
 
 
 def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Specimen:
-    """Return a history thinned to so many readings a branch; its turning points stay as read."""
-    history, level = found.history, found.reference
-    strain, load = history.strain - found.zero, history.load - level
+    """Return a history thinned to a number of readings a branch; its turning points stay as read.
+
+    Parameters
+    ----------
+    direction : str
+        Warp, fill or bias.
+    found : EvaluatedHistory
+        The whole history.
+    increments : int
+        Readings of a branch, at most.
+
+    Raises
+    ------
+    InputError
+        If no reading lies above the reference load.
+    """
+    history = found.history
+    strain, load = history.strain - found.zero, history.load - found.reference
     start, end = matched_rows(found)
-    inside = (np.arange(len(load)) >= start) & (np.arange(len(load)) <= end)
-    rows: list[tuple[float, float, int, int]] = []
-    last = 0.0
+    row = np.arange(len(load))
+    is_matched = (row >= start) & (row <= end) & (strain > MIN_STRAIN)
+    readings: list[tuple[float, float, int, int]] = []
+    last_strain = 0.0
     for v in found.values:
-        up = slice(v.cycle.start, v.cycle.peak + 1)
-        for side, part in enumerate((up, slice(v.cycle.peak, v.cycle.end + 1))):
-            if side and not v.cycle.unloaded:
-                continue
-            keep = inside[part] & (strain[part] > LEAST)
-            x, y = strain[part][keep], load[part][keep]
-            if len(x) < 2:
-                continue
-            place = np.clip((x - x[0]) / (x[-1] - x[0] or 1.0), 0.0, 1.0)
-            number = np.minimum((increments - 1) * place, increments - 1.5).astype(int)
-            number[-1] = increments - 1
-            for k in np.unique(number):
-                own = number == k
-                e, f = float(x[own].mean()), float(y[own].mean())
-                if abs(e - last) > LEAST:
-                    rows.append((e, f, 2 * v.cycle.number - 2 + side, v.cycle.number))
-                    last = e
-    if not rows:
-        problem = f"no reading above the reference load of {level:g} N"
+        branches = [slice(v.cycle.start, v.cycle.peak + 1)]
+        if v.cycle.unloaded:
+            branches.append(slice(v.cycle.peak, v.cycle.end + 1))
+        for side, rows in enumerate(branches):
+            matched = is_matched[rows]
+            means = _averages(strain[rows][matched], load[rows][matched], increments)
+            for mean_strain, mean_load in means:
+                if abs(mean_strain - last_strain) > MIN_STRAIN:
+                    branch = 2 * v.cycle.number - 2 + side
+                    readings.append((mean_strain, mean_load, branch, v.cycle.number))
+                    last_strain = mean_strain
+    if not readings:
+        problem = f"no reading above the reference load of {found.reference:g} N"
         raise InputError(history.path, "load", problem)
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    tops = [v.top for v in found.values]
-    leaves = tuple(
-        v.cycle.number for k, v in enumerate(found.values)
-        if k and not math.isnan(v.permanent) and v.top <= max(tops[:k] + tops[k + 1 :])
-    )  # fmt: skip
-    branch, cycle = (column.astype(np.intp) for column in columns[2:])
-    return Specimen(direction, found, columns[0], columns[1], branch, cycle, leaves)
+    strains, loads, branch_numbers, cycle_numbers = zip(*readings, strict=True)
+    return Specimen(
+        direction=direction,
+        evaluated=found,
+        strain=np.array(strains),
+        load=np.array(loads),
+        branch=np.array(branch_numbers).astype(np.intp),
+        cycle=np.array(cycle_numbers).astype(np.intp),
+        leaves=_predictable_cycles(found),
+    )
+
+
+def _averages(strain: Array, load: Array, increments: int) -> list[tuple[float, float]]:
+    """Return mean strain and load of equal parts of a branch; the last reading stands alone."""
+    if len(strain) < 2:
+        return []
+    share = np.clip((strain - strain[0]) / (strain[-1] - strain[0] or 1.0), 0.0, 1.0)
+    part = np.minimum((increments - 1) * share, increments - 1.5).astype(int)
+    part[-1] = increments - 1
+    return [
+        (float(strain[part == k].mean()), float(load[part == k].mean())) for k in np.unique(part)
+    ]
+
+
+def _predictable_cycles(evaluated: EvaluatedHistory) -> tuple[int, ...]:
+    """Return the numbers of cycles to strains that others reach, without the first."""
+    tops = [v.top for v in evaluated.values]
+    numbers = []
+    for k, v in enumerate(evaluated.values):
+        if k and not math.isnan(v.permanent) and v.top <= max(tops[:k] + tops[k + 1 :]):
+            numbers.append(v.cycle.number)
+    return tuple(numbers)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CyclesTest(SectionTest):
-    """Specimens by their names; lengths mm, loads N. gauge : of the bias strips."""
+    """Specimens that are loaded, unloaded and loaded again.
+
+    Parameters
+    ----------
+    width, grip_distance : float
+        mm.
+    gauge : float
+        Length of the gauge of bias strips, mm.
+    matched : mapping of str to Specimen
+        By direction and file.
+    """
 
     width: float
     gauge: float
@@ -176,71 +236,107 @@ class CyclesTest(SectionTest):
         self, thickness: float | None = None, what: kinds.Refined = "elements", factor: float = 1.0
     ) -> Mapping[str, UniaxialModel]:
         """Return a strip a specimen; those along the yarns are homogeneous, one quad."""
-        quads = refined_quads("bias", COARSER * (factor if what == "elements" else 1.0))
+        quads = refined_quads("bias", BIAS_EDGES * (factor if what == "elements" else 1.0))
         lengths = self.gauge, 2 * self.gauge, self.thick(thickness), self.width
         models = {}
-        for name, one in self.matched.items():
-            if one.direction == "bias":
+        for name, specimen in self.matched.items():
+            if specimen.direction == "bias":
                 model = bias_strip(*lengths, self.grip_distance, increments=1, **quads)
             else:
-                yarn: Literal["warp", "fill"] = "warp" if one.direction == "warp" else "fill"
+                yarn: Literal["warp", "fill"] = "warp" if specimen.direction == "warp" else "fill"
                 model = straight_strip(yarn, *lengths, increments=1, across=1, along=1)
-            path = (self.gauge * one.strain).tolist()
-            models[name] = replace(model, elongations=path, unloaded=True)
+            elongations = (self.gauge * specimen.strain).tolist()
+            models[name] = replace(model, elongations=elongations, unloaded=True)
         return models
 
     def settings(self) -> Mapping[str, object]:
+        """Return everything but names and measurements."""
         names = ("weight", "width", "gauge", "grip_distance", "noise")
         return {name: getattr(self, name) for name in names}
 
 
 def read(section: CyclesSection, place: Place, name: str) -> CyclesTest:
-    """Read the section of a test, and its histories."""
-    section, folder = whole_in_base_units(section, place.scales), place.folder(section.folder)
-    width, gauge = section.width or WIDTH, section.gauge_length or GAUGE
+    """Read the section of a test, and its histories.
+
+    Raises
+    ------
+    InputError
+        If there are no files, a bias strip's gauge does not fit, or a history cannot be evaluated.
+    """
+    section = whole_in_base_units(section, place.scales)
+    folder = place.folder(section.folder)
+    gauge = section.gauge_length or GAUGE_LENGTH
     grips = section.grip_distance or GRIP_DISTANCE
     if section.files.bias and (section.gauge_length is None or not gauge < grips):
         problem = f"of bias strips expected a length below the distance of the grips, {grips:g} mm"
         raise place.error("gauge_length", problem)
-    keys = ("load_unit", "length_unit", "strain_unit")
-    said = {key: getattr(section, key) for key in keys} | {"length": section.gauge_length}
-    specimens: dict[str, Specimen] = {}
     listed = section.files.model_dump(exclude_none=True)
     if not listed:
         raise place.error("files", "expected files of one direction at least: { warp = [...] }")
-    columns = section.columns.model_dump(exclude_none=True) or None
+    options: dict[str, Any] = {
+        "columns": section.columns.model_dump(exclude_none=True) or None,
+        "load_unit": section.load_unit,
+        "length_unit": section.length_unit,
+        "strain_unit": section.strain_unit,
+        "length": section.gauge_length,
+    }
+    specimens: dict[str, Specimen] = {}
     for path, key, direction in kinds.listed_files(place, folder, listed, "files"):
         if not place.has(path, key):
             continue
-        found = evaluate_history(
-            read_history(path, columns=columns, **said), section.reference_load
-        )
-        one = specimen_of(direction, found, section.increments)
-        if one.name in specimens:
-            raise place.error(key, f"two files of one direction are called {found.name!r}")
-        specimens[one.name] = one
+        evaluated = evaluate_history(read_history(path, **options), section.reference_load)
+        specimen = specimen_of(direction, evaluated, section.increments)
+        if specimen.name in specimens:
+            raise place.error(key, f"two files of one direction are called {evaluated.name!r}")
+        specimens[specimen.name] = specimen
     return CyclesTest(
-        name=name, place=place, weight=section.weight, width=width, gauge=gauge,
-        grip_distance=grips, matched=specimens, noise=section.noise,
-    )  # fmt: skip
+        name=name,
+        place=place,
+        weight=section.weight,
+        width=section.width or WIDTH,
+        gauge=gauge,
+        grip_distance=grips,
+        matched=specimens,
+        noise=section.noise,
+    )
 
 
 class HistoryObjective(LoadObjective):
-    """Residuals (model - measured) / peak of the loads of a history; each branch weighs alike.
+    """Residuals (model - measured) / peak of the loads of a history; each branch weighs the same.
 
-    kept : (n,) which readings count. The sum of squares is the mean square over the branches.
+    The sum of squares is the mean square over the branches.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        What was measured.
+    is_matched : (n,) array of bool
+        Which readings count.
+    weight : float
+        Of the specimen in the objective.
+    noise : float or None
+        Of one load, N.
     """
 
     def __init__(
-        self, one: Specimen, kept: NDArray[np.bool_], weight: float, noise: float | None
+        self,
+        specimen: Specimen,
+        is_matched: NDArray[np.bool_],
+        weight: float,
+        noise: float | None,
     ) -> None:
-        self.rows, peak = np.flatnonzero(kept), float(one.load.max())
-        self.elongation, self.measured = one.strain[self.rows], one.load[self.rows]
-        _, number, count = np.unique(one.branch[self.rows], return_inverse=True, return_counts=True)
-        self.sizes, self.specimens, self.alike = (len(self.rows),), None, 1.0
-        self.sample = np.eye(len(kept))[self.rows]
+        peak = float(specimen.load.max())
+        self.rows = np.flatnonzero(is_matched)
+        self.elongation = specimen.strain[self.rows]
+        self.measured = specimen.load[self.rows]
+        branch = specimen.branch[self.rows]
+        _, number, count = np.unique(branch, return_inverse=True, return_counts=True)
+        self.sizes = (len(self.rows),)
+        self.specimens = None
+        self.alike = 1.0
+        self.sample = np.eye(len(is_matched))[self.rows]
         self.scale = peak * np.sqrt(count[number] * len(count)) / max(weight, 1e-300)
-        self.least_noise = NOISE * peak if noise is None else noise
+        self.least_noise = NOISE_SHARE * peak if noise is None else noise
         self.noise_is = "assumed" if noise is None else "given"
 
     @property
@@ -270,48 +366,52 @@ class PreparedCycles(PreparedParts):
     @property
     def specimens(self) -> Mapping[str, Sequence[int]]:
         """Return the number of the specimen of each reading, by comparison."""
-        every = enumerate(self.test.matched.items())
-        return {self.part(name): [k] * len(one.load) for k, (name, one) in every}
+        numbered = enumerate(self.test.matched.items())
+        return {self.part(name): [k] * len(specimen.load) for k, (name, specimen) in numbered}
 
     @property
     def parts(self) -> Mapping[str, Mapping[str, Masks]]:
         """Return masks without each cycle that others can predict, and without each specimen."""
         cycles: dict[str, Masks] = {
-            f"cycle {k} of {name}": {**self.whole, self.part(name): one.cycle != k}
-            for name, one in self.test.matched.items() for k in one.leaves
-        }  # fmt: skip
+            f"cycle {k} of {name}": {**self.whole, self.part(name): specimen.cycle != k}
+            for name, specimen in self.test.matched.items()
+            for k in specimen.leaves
+        }
         return ({"cycles": cycles} if cycles else {}) | self.without_each("specimens")
 
     def reach(self, masks: Masks) -> Reach:
         """Return the reach of the readings that are matched."""
-        kept = {
-            name: replace(one, strain=one.strain[masks.get(self.part(name), slice(None))])
-            for name, one in self.kept(masks).items()
-        }
-        return replace(self.test, matched=kept).reach
+        matched = {}
+        for name, specimen in self.kept(masks).items():
+            strain = specimen.strain[masks.get(self.part(name), slice(None))]
+            matched[name] = replace(specimen, strain=strain)
+        return replace(self.test, matched=matched).reach
 
     def comparisons(
         self, make_solver: MakeSolver, weighting: Weighting, masks: Masks | None = None
     ) -> tuple[Comparison, ...]:
         """Return a comparison a specimen that has readings."""
-        test, models, chosen = self.test, self.test.models(), self.kept(masks)
-        known = {**self.whole, **(masks or {})}
-        weight = weighting.weight / max(len(chosen), 1) if weighting.relative else 1.0
-        return tuple(
-            Comparison(
-                self.part(name), models[name], make_solver(),
-                HistoryObjective(one, known[self.part(name)], weight, test.noise), contracts=True,
-                must_be_stable=False,
+        models, specimens = self.test.models(), self.kept(masks)
+        all_masks = {**self.whole, **(masks or {})}
+        weight = weighting.weight / max(len(specimens), 1) if weighting.relative else 1.0
+        comparisons = []
+        for name, specimen in specimens.items():
+            part = self.part(name)
+            objective = HistoryObjective(specimen, all_masks[part], weight, self.test.noise)
+            comparison = Comparison(
+                part, models[name], make_solver(), objective, contracts=True, must_be_stable=False
             )
-            for name, one in chosen.items()
-        )  # fmt: skip
+            comparisons.append(comparison)
+        return tuple(comparisons)
 
     def data_files(self) -> Sequence[kinds.DataFile]:
-        every = [one.evaluated.history for one in self.test.matched.values()]
-        return [
-            kinds.DataFile(h.path, FrameSource("machine table", notes=h.notes), len(h.load))
-            for h in every
-        ]
+        """Return the files of the histories."""
+        files = []
+        for specimen in self.test.matched.values():
+            history = specimen.evaluated.history
+            source = FrameSource("machine table", notes=history.notes)
+            files.append(kinds.DataFile(history.path, source, len(history.load)))
+        return files
 
 
 class CyclesKind(MeasuredKind):

@@ -22,27 +22,34 @@ FIGURE, CAPTION, TABLE = "cycles.png", "Loads over strain, measured and modelled
 
 def residuals(prepared: PreparedCycles, fitted: FittedTest) -> pd.DataFrame:
     """Return a table of every matched load, N from the reference load on."""
-    return pd.concat([
-        compared("load", p.data.load, p.history.load, "N", part=p.data.name, cycle=p.data.cycle,
-                 strain=p.data.strain)
-        for p in prepared.fitted_parts(fitted)
-    ], ignore_index=True)  # fmt: skip
+    tables = []
+    for part in prepared.fitted_parts(fitted):
+        specimen = part.data
+        labels = {"part": specimen.name, "cycle": specimen.cycle, "strain": specimen.strain}
+        tables.append(compared("load", specimen.load, part.history.load, "N", **labels))
+    return pd.concat(tables, ignore_index=True)
 
 
 def _numbers(test: CyclesTest, histories: Mapping[str, History]) -> dict[str, dict[str, float]]:
-    every = [(name, test.matched[name], history.load) for name, history in histories.items()]
-    return {
-        name: {f"cycle {k}": float(np.sqrt(np.mean((load - one.load)[one.cycle == k] ** 2)))
-               for k in np.unique(one.cycle)}
-        for name, one, load in every
-    }  # fmt: skip
+    """Return the RMS error of the load by specimen and cycle, N."""
+    errors = {}
+    for name, history in histories.items():
+        specimen = test.matched[name]
+        difference = history.load - specimen.load
+        errors[name] = {
+            f"cycle {k}": float(np.sqrt(np.mean(difference[specimen.cycle == k] ** 2)))
+            for k in np.unique(specimen.cycle)
+        }
+    return errors
 
 
 def _lines(numbers: Mapping[str, Mapping[str, float]]) -> list[str]:
-    return [
-        f"{name}: RMS error of load in N: {', '.join(f'{k} {v:.3g}' for k, v in own.items())}"
-        for name, own in numbers.items()
-    ]
+    """Return a line a specimen."""
+    lines = []
+    for name, errors in numbers.items():
+        words = ", ".join(f"{cycle} {error:.3g}" for cycle, error in errors.items())
+        lines.append(f"{name}: RMS error of load in N: {words}")
+    return lines
 
 
 def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
@@ -59,12 +66,13 @@ def findings(prepared: PreparedCycles, fitted: FittedTest) -> Findings:
 
 def show(prepared: PreparedCycles, fitted: FittedTest, found: Findings, out: Output) -> Exhibit:
     """Write cycles.csv and the figure."""
-    of_fit = dict(zip(prepared.test.matched, fitted.histories, strict=True))
-    charts = _drawn(prepared.test, {"model": of_fit})
+    histories = dict(zip(prepared.test.matched, fitted.histories, strict=True))
+    charts = _load_charts(prepared.test, {"model": histories})
     rows: list[list[object]] = [
-        [name, cycle, error] for name, own in found.numbers["rms_N"].items()
-        for cycle, error in own.items()
-    ]  # fmt: skip
+        [name, cycle, error]
+        for name, errors in found.numbers["rms_N"].items()
+        for cycle, error in errors.items()
+    ]
     table = Table("Misfit of the load cycles", ["specimen", "", "RMS error, N"], rows, text=(1,))
     loads = out.write(TABLE, residuals(prepared, fitted), "loads, measured and modelled")
     files = [loads, saved(out, FIGURE, charts, CAPTION)]
@@ -77,28 +85,29 @@ def simulate(
     """Draw the loads with every card; return the RMS errors."""
     numbers: dict[str, Any] = {}
     lines: list[str] = []
-    good: dict[str, dict[str, History]] = {}
+    histories: dict[str, dict[str, History]] = {}
     for card in cards:
-        ended = {name: runs[card, name].outcome for name in test.matched}
-        good[card] = {name: one for name, one in ended.items() if isinstance(one, History)}
-        numbers[card] = {"rms_N": _numbers(test, good[card])}
+        outcomes = {name: runs[card, name].outcome for name in test.matched}
+        histories[card] = {n: run for n, run in outcomes.items() if isinstance(run, History)}
+        numbers[card] = {"rms_N": _numbers(test, histories[card])}
         lines += [f"{card}: {words}" for words in _lines(numbers[card]["rms_N"])]
-        for name, one in ended.items():
-            if isinstance(one, SolverFailure):
-                numbers[card].setdefault("failed", {})[name] = one.reason
-                lines.append(f"{card}: {name}: failed: {one.reason}")
-    figure = saved(out, FIGURE, _drawn(test, good), CAPTION)
+        for name, outcome in outcomes.items():
+            if isinstance(outcome, SolverFailure):
+                numbers[card].setdefault("failed", {})[name] = outcome.reason
+                lines.append(f"{card}: {name}: failed: {outcome.reason}")
+    figure = saved(out, FIGURE, _load_charts(test, histories), CAPTION)
     return Simulation({"cards": numbers}, lines, [figure])
 
 
-def _drawn(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:
+def _load_charts(test: CyclesTest, curves: Mapping[str, Mapping[str, History]]) -> Charts:
     """Return load over strain, a chart a specimen."""
     charts = []
-    for name, one in test.matched.items():
-        series = [dots("measured", 100 * one.strain, one.load, colour=7)]
-        for rank, (label, own) in enumerate(curves.items()):
-            if name in own:
-                series.append(line(label, 100 * one.strain, own[name].load, colour=1 + rank))
-        what = "strain from the reference load, %"
-        charts.append(Chart(name, what, "load from the reference load, N", series, name))
+    for name, specimen in test.matched.items():
+        percent = 100 * specimen.strain
+        series = [dots("measured", percent, specimen.load, colour=7)]
+        for rank, (label, histories) in enumerate(curves.items()):
+            if name in histories:
+                series.append(line(label, percent, histories[name].load, colour=1 + rank))
+        x_label, y_label = "strain from the reference load, %", "load from the reference load, N"
+        charts.append(Chart(name, x_label, y_label, series, name))
     return Charts(f"{test.name} cycles", charts, CAPTION, columns=1)
