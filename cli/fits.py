@@ -171,9 +171,15 @@ def lines_of(fit: Fit, folder: Path, every: bool = False) -> list[str]:
         times = f"{m.ratio:.2g} times the noise ({m.noise:.3g} {m.unit}, {m.noise_is})"
         beside = times if m.noise > 0 else "no noise to compare with"
         misfits.append(f"misfit of {comparison}: {m.rms:.3g} {m.unit} RMS, {beside}")
+    predicted = [
+        f"prediction of {comparison}: {rms:.3g} {one.units[comparison]} RMS (weight 0: not fitted)"
+        for one in fit.predicted.values()
+        for comparison, rms in one.rms.items()
+    ]
     return [
         *modulus_lines(fit),
         *misfits,
+        *predicted,
         *(
             f"{name}: {line}" if len(fit.findings) > 1 else line
             for name, findings in fit.findings.items()

@@ -24,6 +24,8 @@ LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 HUGE = 1e18
 Number = Annotated[float, Field(ge=-HUGE, le=HUGE)]
 Positive = Annotated[float, Field(gt=0, le=HUGE)]
+#: Of a test, or a part of it, in a fit; 0 leaves it out.
+Weight = Annotated[float, Field(ge=0, le=1e6)]
 
 
 @dataclass(frozen=True)

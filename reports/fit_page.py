@@ -136,6 +136,18 @@ def misfit_table(fit: Fit) -> Table:
     return Table("Residual beside the noise", header, rows, note, text=(3, 4))
 
 
+def predicted_tables(fit: Fit) -> list[Table]:
+    """Return the errors of the law at the tests of weight 0; nothing where there is none."""
+    rows: list[list[object]] = [
+        [comparison, rms, one.units[comparison]]
+        for one in fit.predicted.values()
+        for comparison, rms in one.rms.items()
+    ]
+    note = "Tests of weight 0: not fitted, but run with the law of the fit."
+    header = ["predicted", "RMS residual", "unit"]
+    return [Table("Predicted, not fitted", header, rows, note, text=(2,))] if rows else []
+
+
 def assumed(fit: Fit) -> list[tuple[str, object]]:
     """Return the quantities that were taken as known."""
     unknowns, project = fit.project.fit.unknowns, fit.project
@@ -333,6 +345,7 @@ def _page(fit: Fit, folder: Path) -> Report:
             Section("The answer", [*answer_tables(fit), Download(CARD, card, SAVE_CARD)]),
             Section("Can it be trusted?", [
                 warnings_of(fit), Words(_checked(fit)), misfit_table(fit),
+                *predicted_tables(fit),
                 *([Table("Errors of the moduli", header, rows, note)] if rows else []),
                 Facts(assumed(fit)), reached_table(fit),
             ]),

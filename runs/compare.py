@@ -26,7 +26,6 @@ from ..errors import lines as note_lines
 from ..experiments.kinds import Masks
 from ..files import known
 from ..files import pandas as pd
-from ..inference.noise import misfits
 from ..inference.problem import FitProblem, folds_of
 from ..inference.search import feasible_start, fit_from
 from ..materials.forms.base import form_names, form_settings, of_load_ratio
@@ -36,6 +35,7 @@ from .best import noise_of
 from .executor import Task
 from .fit import fit_in_series
 from .folder import Presented, check_asked, finished, shown
+from .held_out import errors
 from .in_use import alone_in_folder
 from .progress import Listener, listener
 from .result import Fit
@@ -145,11 +145,6 @@ def best_of(setup: FitSetup, problem: FitProblem, starts: int) -> np.ndarray | N
         if optimum is not None and optimum.value < least:
             best, least = optimum.best.unknowns, optimum.value
     return best
-
-
-def errors(problem: FitProblem, residual: np.ndarray) -> dict[str, float]:
-    """Return the root mean square by comparison, in its unit."""
-    return {name: misfit.rms for name, misfit in misfits(problem, residual).items()}
 
 
 def errors_of_folds(

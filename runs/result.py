@@ -46,6 +46,7 @@ from ..materials.law import HypoelasticLaw
 from ..project.project import Project
 from .best import CORRECTED, TOLD, BestFit, card_certainty
 from .folder import PROVENANCE, Record, Reported, draw, versions, write_table
+from .held_out import HeldOut, held_out
 from .setup import FitSetup, coarse_to_fine
 from .simulation import Histories
 from .verdict import NOT_CONVERGED, FitVerdict, verdict_of
@@ -176,6 +177,15 @@ class Fit(Reported):
     def notes(self) -> list[Note]:
         """Return what a reader must know before using the numbers."""
         return notes_of_fit(self, pinned_numbers(self))
+
+    @cached_property
+    def predicted(self) -> dict[str, HeldOut]:
+        """Return the errors of the law, with its card's strains, at the tests of weight 0."""
+        law = replace(self.law, strain_range=self.best.valid)
+        return {
+            prepared.test.name: held_out(prepared, law, self.setup.make_solver)
+            for prepared in self.setup.predicted
+        }
 
     @cached_property
     def verdict(self) -> FitVerdict:
@@ -474,6 +484,11 @@ def result_of(fit: Fit) -> dict[str, Any]:
             errors[name] = float(own.sum() / weights[name])
         result |= {"mean_relative_error": errors, "weights": weights,
                    "pinned": pinned_numbers(fit)}  # fmt: skip
+    if fit.predicted:
+        result["predicted"] = {
+            name: {"rms": dict(one.rms), "units": dict(one.units), "relative_error": one.error}
+            for name, one in fit.predicted.items()
+        }
     warnings = [note.line for note in fit.notes]
     return result | {"warnings": warnings, "notes": rows(fit.notes)}
 
@@ -529,6 +544,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
     for name, findings in fit.findings.items():
         told = [as_note(note) for note in findings.warnings]
         notes += [note.about(name) for note in told] if len(fit.findings) > 1 else told
+    notes += [note for one in fit.predicted.values() for note in one.notes]
     notes += [
         Note(
             ALONE,

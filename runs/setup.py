@@ -284,7 +284,8 @@ UNCOUNTED = ("starts", "solver", "jobs", "trust", "mesh_error", "cache")
 @dataclass(frozen=True, eq=False)
 class FitSetup:
     """A fit ready to run, without a solver, for worker processes.
-    law : without coefficients. counts : factors of the tests' weights by name."""
+    law : without coefficients. counts : factors of the tests' weights by name. predicted : tests of
+    weight 0, which are not fitted."""
 
     project: Project
     law: HypoelasticLaw
@@ -292,6 +293,7 @@ class FitSetup:
     tests: tuple[PreparedTest, ...]
     counts: Mapping[str, float] = field(default_factory=dict)
     starts: Starts = field(default_factory=RandomStarts)
+    predicted: tuple[PreparedTest, ...] = ()
 
     @property
     def weightings(self) -> tuple[Weighting, ...]:
@@ -382,15 +384,25 @@ Saw = Callable[[str], object]
 
 def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words: None) -> FitSetup:
     """Read or compute the data of the tests, and check all that a fit needs.
-    InputError : in the project or its data. SolverFailure : the solver is not there, or a known
-        solution cannot be run."""
+    A test of weight 0 is left out of the fit, and predicted with its law.
+    InputError : in the project or its data; no test has a weight above 0. SolverFailure : the
+        solver is not there, or a known solution cannot be run."""
+    for test in tests:
+        if not 0 <= test.weight < np.inf:
+            problem = f"expected 0 or more, got {test.weight:g}"
+            raise InputError(project.path, f"{test.name}: weight", problem)
+    fitted = [test for test in tests if test.weight > 0]
+    if not fitted:
+        names = ", ".join(test.name for test in tests)
+        problem = f"is 0 for every test chosen ({names}): nothing would be fitted"
+        raise InputError(project.path, "weight", f"{problem}; give one of them a weight above 0")
     with project.naming_arguments():
         fit = project.fit
         options = project.options_of(fit.solver)
         # Once here, in one line, rather than as the failure of every analysis.
         solver = usable_solver(fit.solver, options, project.path, "fit.solver", project.run_cache)
         shared_unknowns(project)  # says now what is wrong with them
-        law = law_of(project, [test.reach for test in tests])
+        law = law_of(project, [test.reach for test in fitted])
         try:
             check_carries(solver, law)
         except InputError as error:
@@ -404,7 +416,9 @@ def prepare_fit(project: Project, tests: Sequence[Test], saw: Saw = lambda words
             with one_blas_thread(), timed(f"{test.name}, its data read and registered"):
                 ready.append(kind_named(test.kind).prepare(test, law, make))
         starts: Starts = SobolStarts() if fit.starts_from == "sobol" else RandomStarts()
-        return FitSetup(project, law, bounds, tuple(ready), starts=starts)
+        matched = tuple(prepared for prepared in ready if prepared.test.weight > 0)
+        predicted = tuple(prepared for prepared in ready if not prepared.test.weight > 0)
+        return FitSetup(project, law, bounds, matched, starts=starts, predicted=predicted)
 
 
 def make_solver(project: Project, name: str | None = None, **more: Any) -> Solver:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,31 +17,24 @@ from ..errors import InputError, Note, NoteKind, Positive, checked, rows
 from ..errors import lines as note_lines
 from ..experiments.kinds import (
     Divisible,
-    FittedTest,
-    MakeSolver,
     Masks,
     PredictedRun,
-    PreparedTest,
-    Weighting,
     data_notes,
-    notes_beyond,
-    strains_of,
-    unstable_words,
 )
-from ..experiments.registry import kind_named, report_of
+from ..experiments.registry import kind_named
 from ..files import __version__, known
 from ..files import pandas as pd
 from ..inference.problem import Evaluation, FitProblem
-from ..inference.search import evaluate_law, fit_from, problem_at
+from ..inference.search import fit_from
 from ..materials.card import MaterialCard, thickness_difference
 from ..materials.forms.base import COMPONENTS
-from ..materials.law import HypoelasticLaw
 from ..project.project import Project, chosen_cards
 from .best import reached_by
-from .compare import candidates, errors, fit_of, plain
+from .compare import candidates, fit_of, plain
 from .executor import Task
 from .fit import fit_in_series
 from .folder import Presented, check_asked, check_unused, finished, shown
+from .held_out import HeldOut, errors, held_out, not_judged, nuisance_of
 from .in_use import alone_in_folder
 from .predictions import predict
 from .progress import Listener, listener
@@ -53,78 +46,6 @@ STARTS = 3
 #: The sort of parts that is left out by default: whole tests.
 TESTS = "tests"
 NO_FIT = "no fit without it ended well"
-#: Values of nuisance unknowns by comparison and name, in their units.
-NuisanceValues = Mapping[str, Mapping[str, float]]
-
-
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """The errors of a law at one test.
-    error : mean relative RMS error, None where an analysis failed. rms : by comparison, in `units`.
-    words, numbers : the quality in the test's own terms, as of a fit."""
-
-    test: str
-    error: float | None
-    rms: Mapping[str, float]
-    units: Mapping[str, str]
-    notes: tuple[Note, ...] = ()
-    words: str = ""
-    numbers: Mapping[str, Any] = field(default_factory=dict)
-
-
-def held_out(
-    prepared: PreparedTest, law: HypoelasticLaw, make_solver: MakeSolver, part: Masks | None = None,
-    nuisance: NuisanceValues | None = None, name: str = "",
-) -> HeldOut:  # fmt: skip
-    """Run a law, with its known strain range, on a test and fit the test's nuisance unknowns.
-    part : judge it at these points alone, with `nuisance` values of the rest; name : of the part.
-    """
-    name = name or prepared.test.name
-    comparisons = prepared.comparisons(make_solver, Weighting(relative=True), part)
-    problem, y = problem_at(law, comparisons)
-    units = {c.name: c.objective.unit for c in comparisons}
-    if nuisance is None:
-        point = evaluate_law(problem, y)
-    else:
-        for comparison in comparisons:
-            known = nuisance.get(comparison.name, {})
-            places = problem.unknowns.nuisance_places(comparison.name)
-            y[places] = [known.get(n.name, 0.0) for n in comparison.nuisance]
-        point = problem.evaluate(y, False, warm=False)
-    if point is None:
-        return not_judged(name, f"no analysis: {problem.failure}", units)
-    notes = tuple(note.about(name) for note in _notes(problem, point, law))
-    rms = errors(problem, point.residual)
-    if nuisance is not None:
-        norms = np.concatenate(list(problem.norms(point.residual).values()))
-        return HeldOut(name, float(norms.sum()), rms, units, notes)
-    # As after a fit, in the test's own objective.
-    reached, each = reached_by(point), nuisance_of(problem, point.unknowns).values()
-    fitted = FittedTest(
-        prepared.comparisons(make_solver, Weighting()), point.histories,
-        {name: value for of_one in each for name, value in of_one.items()}, law, [law], reached,
-        np.minimum(reached, law.strain_range), None,
-    )  # fmt: skip
-    own = report_of(prepared.test.kind).findings(prepared, fitted)
-    return HeldOut(name, point.value, rms, units, notes, own.quality, own.numbers)
-
-
-def not_judged(name: str, why: str, units: Mapping[str, str]) -> HeldOut:
-    """Return the errors of a test, or a part of it, without any."""
-    return HeldOut(name, None, {}, units, (Note(FAILED, why, name),))
-
-
-UP_TO = "{} strain {} % is beyond {} %, up to which the law is known: modulus held there"
-
-
-def _notes(problem: FitProblem, point: Evaluation, law: HypoelasticLaw) -> list[Note]:
-    notes = []
-    for comparison, history in zip(problem.comparisons, point.histories, strict=True):
-        part = comparison.name if len(problem.comparisons) > 1 else ""
-        held = notes_beyond(strains_of(history), law.strain_range, words=UP_TO)
-        own = [*held, *unstable_words(history.unstable)]
-        notes += [Note(n.kind, str(n), part) for n in own]
-    return notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,11 +162,6 @@ def parts_of(setup: FitSetup, sort: str, option: str = "--leave") -> list[Part]:
     return parts
 
 
-def nuisance_of(problem: FitProblem, y: np.ndarray) -> NuisanceValues:
-    """Return the values of the nuisance unknowns of every comparison."""
-    return {c.name: problem.unknowns.nuisance_values(c.name, y) for c in problem.comparisons}
-
-
 def fit_without(setup: FitSetup, part: Part, starts: int) -> HeldOut:
     """Fit without a part, from some starts, and return the errors of the best at the part."""
     name, test = part.name, setup.tests[part.test]
@@ -325,7 +241,7 @@ def validate(
     check_asked(out, resume, overwrite)
     tell = listener(progress)
     project = project.with_fit(starts=starts, trust=[*project.fit.trust, *trust])
-    chosen = project.chosen(tests, fitted=True)
+    chosen = [test for test in project.chosen(tests, fitted=True) if test.weight > 0]
     if leave == TESTS and len(chosen) < 2:
         raise InputError(project.path, "", "one test is left out of two or more: there is only one")
     projects = candidates(project, forms) if forms else {project.law.form: project}

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, cast
+from typing import cast
 
 import numpy as np
-from pydantic import Field
 
 from ...errors import SolverFailure
 from ...inference.comparison import Comparison, NoiseIs
-from ...readers.sections import Positive
+from ...readers.sections import Positive, Weight
 from ...solvers.base import History
 from .. import kinds
 from ..cylinder.reading import read as read_cylinder
@@ -37,7 +36,7 @@ NOISE = AssumedNoise()
 class BendingSection(BentSection):
     """Section [[bending]]: a [[cylinder]] whose measured loads are fitted; noise of one, in N."""
 
-    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    weight: Weight = 1.0
     noise: Positive | None = None
 
 

@@ -25,7 +25,7 @@ from ...readers.frames import FrameSource
 from ...readers.histories import LoadHistory, Pace, pace_of, turns
 from ...readers.machine_tables import Channel, TableOptions, read_machine_table
 from ...readers.quantities import PAIRS
-from ...readers.sections import Name, Number, Positive, Section, Size
+from ...readers.sections import Name, Number, Positive, Section, Size, Weight
 from ...readers.units import LOAD_UNITS, STRAIN_UNITS, WIDTH_LOAD_UNITS, scale_of
 from ..kinds import Array, Place, Reach, Refined, SectionTest, listed_files, named_format
 
@@ -315,7 +315,7 @@ class BiaxialSection(Section):
     one measured strain, in %."""
 
     name: Name | None = None
-    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    weight: Weight = 1.0
     width: Size | None = None
     ratios: Annotated[list[str], Field(min_length=1)] | None = None
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None

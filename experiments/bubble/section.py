@@ -415,7 +415,7 @@ class BubbleSection(sections.Section):
     """[[bubble]]: a clamped disk, inflated."""
 
     name: Name_of_sections | None = None
-    weight: sections.Positive = 1.0
+    weight: sections.Weight = 1.0
     radius: sections.Size | Literal["clamp"] | None = None
     ellipse: EllipseSection | None = None
     pressures: Annotated[list[sections.Pressure], Field(min_length=1)] | None = None

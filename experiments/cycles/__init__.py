@@ -32,7 +32,7 @@ from ...meshes.strip_models import (
 from ...readers.curves import LengthUnit
 from ...readers.frames import FrameSource
 from ...readers.histories import Pace, pace_of, read_history
-from ...readers.sections import Name, Positive, Section, Size, whole_in_base_units
+from ...readers.sections import Name, Positive, Section, Size, Weight, whole_in_base_units
 from .. import kinds
 from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, SectionTest, Weighting
 from ..measured import MeasuredKind, PreparedParts
@@ -64,7 +64,7 @@ class CyclesSection(Section):
     """Section [[cycles]]: strips, straps or cords through loading, unloading and reloading."""
 
     name: Name | None = None
-    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    weight: Weight = 1.0
     files: FilesSection
     folder: str = ""
     columns: HistoryColumns = HistoryColumns()

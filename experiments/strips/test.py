@@ -36,12 +36,11 @@ from ...readers.curves import (
     split_at_restarts,
 )
 from ...readers.histories import LoadHistory, Pace, pace_of
-from ...readers.sections import Length, Name, Positive, Section, Size, whole_in_base_units
+from ...readers.sections import Length, Name, Positive, Section, Size, Weight, whole_in_base_units
 from ..kinds import Place, Reach, Refined, SectionTest, listed_files, named_format, state_said
 from .data import Strip
 
 Mask = NDArray[np.bool_]
-Weight = Annotated[float, Field(ge=0, le=1e6)]
 FileNames = Annotated[list[str], Field(min_length=1)]
 Match = Literal["polynomial", "points"]
 Unit = Literal["N", "relative"]

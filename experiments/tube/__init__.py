@@ -8,11 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
 
 from ...errors import InputError
 from ...files import pandas as pd
@@ -20,7 +18,7 @@ from ...inference.comparison import Comparison
 from ...materials.law import HypoelasticLaw
 from ...meshes.strip_models import TubeModel
 from ...readers.frames import FrameSource
-from ...readers.sections import Name, Positive, Section, Size
+from ...readers.sections import Name, Positive, Section, Size, Weight
 from ...solvers.base import History
 from .. import kinds
 from ..kinds import Array, MakeSolver, Masks, Place, Planning, Reach, SectionTest, Weighting
@@ -49,7 +47,7 @@ class TubeSection(Section):
     """Section [[tube]]: an inflated tube pulled and twisted; noise of one strain, in %."""
 
     name: Name | None = None
-    weight: Annotated[float, Field(ge=0, le=1e6)] = 1.0
+    weight: Weight = 1.0
     diameter: Size
     file: str
     folder: str = ""
