@@ -18,7 +18,7 @@ from ..experiments.registry import report_of
 from ..files import __version__, json_text, write_notes, write_text
 from ..inference.posterior import LEVEL
 from ..project.project import Project
-from ..runs.check import Check
+from ..runs.check import Check, PredictionCheck
 from ..runs.folder import RESULT, RUN, RUNS, Record, Store, write_table
 from ..runs.predictions import Predictions
 from ..runs.result import answers
@@ -159,6 +159,22 @@ def write_check(check: Check, folder: Path) -> Path:
                *(f for _, e in exhibits for f in e.files)],
         versions={"bubblefit": __version__},
     )  # fmt: skip
+    return write_report(folder, report)
+
+
+def write_prediction_check(check: PredictionCheck, folder: Path) -> Path:
+    """Write check.json and report.html of tests that are only predicted; return the page's path."""
+    write_text(folder / "check.json", json_text(check.result))
+    header = ["test", "", "doubt", "what was seen"]
+    seen = Table("Tests", header, [list(row) for row in check.rows()], text=(1, 2, 3))
+    report = Report(
+        title=f"{check.project.title}: a look at the data",
+        summary="The project only predicts: its tests were read, and there is nothing to fit.",
+        about=about_of(check.project, None),
+        sections=[Section("What was seen", [seen])],
+        files=[("check.json", "the doubts in plain values")],
+        versions={"bubblefit": __version__},
+    )
     return write_report(folder, report)
 
 

@@ -277,6 +277,7 @@ class KeptAnalyses(RunCache):
 PRESENTERS = {
     "Check": ("run_pages", "write_check"), "Fit": ("fit_page", "write_fit"),
     "Predictions": ("run_pages", "write_predictions"),
+    "PredictionCheck": ("run_pages", "write_prediction_check"),
 }  # fmt: skip
 
 

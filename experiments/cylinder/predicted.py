@@ -15,6 +15,7 @@ from ...meshes.beam_model import BeamModel
 from ...readers.bending import scatter
 from ...solvers.base import BandEnd, History
 from ..kinds import STRAINS, Array, PredictedRun, Studied, band_of
+from .braid import angle_sensitivity, is_near_neutral
 from .curve import (
     CurvePoint,
     MeasuredComparison,
@@ -192,12 +193,25 @@ class CylinderOutcome:
             ends += [other_size - half_band, other_size + half_band]
         return size, min(ends), max(ends)
 
-    @property
+    @cached_property
     def unsure(self) -> Sequence[str]:
-        """Return notes on cards of unknown spread."""
-        cards = dict.fromkeys(run.card for run in self.runs if run.material.certainty is None)
-        words = f"no spread of loads with {', '.join(cards)}: the card does not say how sure it is"
-        return [words] if cards else []
+        """Return notes on cards of unknown spread, and on braids whose angle matters much."""
+        # A beam takes nothing from a card: its wall is in the project.
+        cards = dict.fromkeys(
+            run.card
+            for run in self.runs
+            if run.material.certainty is None and not isinstance(run.model, BeamModel)
+        )
+        notes = []
+        if cards:
+            names = ", ".join(cards)
+            notes.append(f"no spread of loads with {names}: the card does not say how sure it is")
+        for i, bent in self.bent.items():
+            run = self.runs[i]
+            if is_near_neutral(run.model):
+                words = angle_sensitivity(run.model, bent.load, run.test.reading.places)
+                notes.append(f"{run.test.name}: {words}")
+        return notes
 
     def ended(self, number: int) -> str:
         """Return how a run ended: "finished", how far it came, or why it failed."""

@@ -334,3 +334,17 @@ def test_a_card_in_a_project_with_a_negative_modulus_is_named(tmp_path):
     )
     done = in_process("bend", "project.toml", cwd=tmp_path, code=2)
     one_line(done, "project.toml: card", "G12 is -0.02 MPa at 10 % of log strain")
+
+
+def test_check_of_a_project_that_only_predicts_says_what_it_looked_at(tmp_path):
+    path = write_project(tmp_path)
+    done = in_process("check", path, cwd=tmp_path)
+    assert "its section and its models" in done.stdout and "predicted, not fitted" in done.stdout
+    assert "cards were read: soft, stiff" in done.stdout
+    folder = next((tmp_path / "out").glob("*check"))
+    content = json.loads((folder / "check.json").read_text())
+    assert content["sound"] and "predicted, not fitted" in content["checked"]["high"]
+    assert "The project only predicts" in (folder / "report.html").read_text()
+    wrong = path.read_text().replace("diameter = ", "diameter = -", 1)
+    path.write_text(wrong)
+    one_line(in_process("check", path, cwd=tmp_path, code=2), "diameter")

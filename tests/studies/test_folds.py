@@ -16,6 +16,7 @@ from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.project.project import read_project
 from bubblefit.runs import compare, validation, verification
+from bubblefit.runs import held_out as held_out_module
 from bubblefit.runs.compare import folds
 from bubblefit.runs.result import Fit
 from bubblefit.runs.simulation import FAILED
@@ -145,7 +146,7 @@ def history(warp, shear, unstable=()):
 def notes(*histories):
     names = ("one: warp", "one: fill")[: len(histories)]
     problem = SimpleNamespace(comparisons=[SimpleNamespace(name=name) for name in names])
-    found = validation._notes(problem, SimpleNamespace(histories=histories), LAW)
+    found = held_out_module._notes(problem, SimpleNamespace(histories=histories), LAW)
     return [note.about("one").line for note in found]
 
 
