@@ -198,7 +198,7 @@ def test_breaks(example):
         (KNOWN, "thickness = 0.81", "thickness = 810.0", ["fabric.thickness", "um"]),
         (KNOWN, "radius = 100.0", "radius = 0.6", ["bubble[0].radius"]),
         (KNOWN, "7.0e-3,     # G12", "7.0e-1,     # G12", ["beta_3"]),
-        (KNOWN, "[[bubble]]", "[[bubble]]\nweight = 0", ["bubble[0].weight"]),
+        (KNOWN, "[[bubble]]", "[[bubble]]\nweight = -1", ["bubble[0].weight"]),
         (KNOWN, "lower = [", "E1 = [0.1, 1.0]\nlower = [", ["law.bounds", "some of both"]),
         (STRIPS, BOUNDS, "", ["law.bounds", "[least, largest] of E1, E2 and G12"]),
         (STRIPS, "G12 = [0.001, 0.2]", "", ["law.bounds.G12", "missing"]),

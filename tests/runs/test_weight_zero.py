@@ -9,7 +9,7 @@ from bubblefit.reports.content import Table
 from bubblefit.reports.fit_page import predicted_tables
 
 from ..commands import in_process, one_line, result_in
-from ..projects import ELONGATION, MODULI, constant_strips
+from ..projects import ELONGATION, MODULI, constant_strips, small
 
 TWO = ("weight = 3.0", "weight = 0")
 BOTH = (TWO, ('name = "one"', 'name = "one"\nweight = 0'))
@@ -62,6 +62,12 @@ def test_all_tests_of_weight_zero_are_bad_input(tmp_path):
         one_line(done, "project.toml: weight: is 0 for every test chosen (one, two)")
     with pytest.raises(InputError, match="nothing would be fitted"):
         bf.fit(bf.read_project(path), "two", jobs=1)
+
+
+def test_a_single_bubble_of_weight_zero_is_bad_input(tmp_path):
+    path = small(tmp_path, ("[[bubble]]", "[[bubble]]\nweight = 0"))
+    done = in_process("bubble", path, cwd=tmp_path, code=2)
+    one_line(done, "weight: is 0 for every test chosen (bubble): nothing would be fitted")
 
 
 def test_weights_of_zero_in_python(tmp_path, fitted):
