@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from math import log
 from typing import Literal
 
+from .units import LENGTH_UNITS, PRESSURE_UNITS
+
 Quantity = Literal["pressure", "size", "thickness"]
 
 
@@ -30,8 +32,8 @@ class PlausibleRange:
         return self.least <= value <= self.most
 
 
-PRESSURES = {"Pa": 1e-6, "mbar": 1e-4, "kPa": 1e-3, "bar": 0.1, "MPa": 1.0}
-LENGTHS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
+PRESSURES = {name: PRESSURE_UNITS[name] for name in ("Pa", "mbar", "kPa", "bar", "MPa")}
+LENGTHS = {name: LENGTH_UNITS[name] for name in ("um", "mm", "cm", "in", "m")}
 RANGES: Mapping[Quantity, PlausibleRange] = {
     "pressure": PlausibleRange(1e-7, 5.0, 0.05, PRESSURES, ", far beyond what a membrane holds"),
     "size": PlausibleRange(0.5, 1e5, 150.0, LENGTHS),

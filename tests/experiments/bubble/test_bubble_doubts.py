@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
+import bubblefit as bf
 import numpy as np
 import pytest
 from bubblefit.experiments.bubble import doubts
@@ -563,3 +564,15 @@ def test_frames_that_lost_parts_of_the_rim_are_compared_by_places(good, after):
     found = names(each(deformed, False)(fields) if after else fields)
     assert ("deformed-coordinates" in found) == after
     assert not after or "100% of dx and dy" in found["deformed-coordinates"].text
+
+
+def test_bar_given_as_mpa_in_python_is_a_doubt_with_its_factor(good):
+    """Within the bounds of coated fabrics by less than four times, and no pressure is absurd."""
+    points = [field.frame.points for field in good]
+    displacements = [field.displacement for field in good]
+    pressures = [10 * field.pressure for field in good]
+    bubble = bf.Bubble(points, displacements, pressures, radius=100.0)
+    project = bf.Project.of([bubble], bf.Law("constant"), fabric=bf.Fabric("made", THICKNESS))
+    (judgement,) = bf.check(project).judgements
+    (doubt,) = [doubt for doubt in judgement.doubts if doubt.name == "pressure-unit"]
+    assert not doubt.sure and "divided by 10 (bar given as MPa)" in doubt.text
