@@ -44,11 +44,11 @@ def disturbed(folder: Path, chance: random.Random) -> str:
 
 
 def _leaf(folder: Path, chance: random.Random) -> str:
-    path = folder / "result.json"
+    path = next(folder / n for n in ("result.json", "check.json") if (folder / n).exists())
     content = json.loads(path.read_text())
     leaves = [
         own for own in _leaves(content, ())
-        if not {"seed", "versions", "wall_s", "seconds"} & {*map(str, own)}
+        if not {"seed", "versions", "wall_s", "seconds", "cpu_s"} & {*map(str, own)}
     ]  # fmt: skip
     place = chance.choice(leaves)
     holder = content
@@ -57,7 +57,7 @@ def _leaf(folder: Path, chance: random.Random) -> str:
     old = holder[place[-1]]
     holder[place[-1]] = old + 1 if isinstance(old, int) or abs(old) < 1e-9 else old * 1.02
     path.write_text(json.dumps(content, indent=1))
-    return f"result.json: {'.'.join(map(str, place))}: {old} is {holder[place[-1]]}"
+    return f"{path.name}: {'.'.join(map(str, place))}: {old} is {holder[place[-1]]}"
 
 
 def _leaves(value: object, path: tuple) -> Iterator[tuple]:
@@ -77,6 +77,8 @@ def _tables(folder: Path) -> list[Path]:
 
 
 def _cell(folder: Path, chance: random.Random) -> str:
+    if not _tables(folder):
+        return _printed(folder, chance)
     path = chance.choice(_tables(folder))
     lines = path.read_text().splitlines()
     while True:
@@ -128,6 +130,8 @@ def _unit(folder: Path, chance: random.Random) -> str:
 
 def _exchanged(folder: Path, chance: random.Random) -> str:
     """Exchange the names of two rows of a table."""
+    if not _tables(folder):
+        return _leaf(folder, chance)
     path = chance.choice(_tables(folder))
     lines = path.read_text().splitlines()
     first = chance.randrange(1, len(lines) - 1)

@@ -6,6 +6,7 @@ import numpy as np
 
 from .laws import DIRECTION, MODULI, MPA, Law
 from .ledger import NUM
+from .measured import table_of
 
 AXES = ("dx", "dy", "dz")
 PRESSURE = {"kPa": 1.0, "MPa": 1000.0, "bar": 100.0, "Pa": 1e-3}
@@ -88,7 +89,36 @@ class Bubble:
             far = float(np.hypot(rows["x_mm"], rows["y_mm"]).max())
             if not 0.3 * radius * length < far < 1.02 * radius * length:
                 ledger.find(f"{file}: {self.test}", f"places reach {far:.4g} mm")
+        for frame, own in self.frames:
+            parts = [own[own["quantity"] == axis][["x_mm", "y_mm"]].to_numpy() for axis in AXES]
+            if not all(np.array_equal(parts[0], part) for part in parts[1:]):
+                ledger.find(f"{file}: {self.test}, frame {frame}", "dx, dy, dz have other places")
         self._symmetric()
+        self._of_files()
+
+    def _of_files(self):
+        """Measured values are the files' own, where these are plain tables of the test's axes."""
+        points = self.section.get("data", {}).get("points", {})
+        files, names = points.get("files"), points.get("columns", {})
+        plain = points.get("length_unit", "mm") == "mm" and not (
+            {"registration", "filter", "pressure"} & set(points) or "sheet" in self.section
+        )
+        if not files or not plain or len(files) != len(self.pressures):
+            return
+        for name, (frame, own) in zip(files, self.frames, strict=True):
+            table = table_of(self.folder.project_path.parent / name)
+            keys = [names.get(key, key) for key in ("x", "y", *AXES)]
+            if table is None or not set(keys) <= set(table.columns):
+                return
+            seen = {tuple(np.round(row[:2], 6)): row[2:] for row in table[keys].to_numpy(float)}
+            for k, axis in enumerate(AXES):
+                part = own[own["quantity"] == axis]
+                for x, y, value in part[["x_mm", "y_mm", "measured"]].to_numpy(float):
+                    row = seen.get((round(x, 6), round(y, 6)))
+                    if row is None or abs(row[k] - value) > 1e-6 * max(1.0, abs(value)):
+                        place = f"residuals.csv: {self.test}, frame {frame}, {axis}"
+                        self.ledger.find(place, f"{name} has no {value} at {x}, {y}")
+                        break
 
     def _symmetric(self):
         """A quarter has no displacement across its planes: dx at x = 0, dy at y = 0."""
