@@ -136,8 +136,7 @@ class Bubble:
         )
         mean = float(sum(by_place[axis] for axis in AXES).mean())
         self.mean = mean
-        floor = 1e-9 * float(self.rows["measured"].abs().max())
-        ledger.json((*path, "mean_abs_mm"), mean, rel=1e-6, abs=floor)
+        ledger.json((*path, "mean_abs_mm"), mean, rel=1e-6)
         places = [len(own) // 3 for _, own in self.frames]
         ledger.json((*path, "data", "places"), places)
         data = numbers["data"]
@@ -311,7 +310,7 @@ class Bubble:
         norms = _norms(rows, relative)
         cells = [[p, *own] for p, own in zip(self.pressures, norms.values(), strict=True)]
         # Of a fit without noise the misfit is rounding, of nine digits of the table.
-        slack = 1e-6 if self.mean > 1e-6 else 0.2
+        slack = 1e-6
         ledger.table("Misfit by pressure", ["pressure, kPa", "x", "y", "z"], cells,
                      "recomputed", number=self._number(), slack=slack)  # fmt: skip
         del of

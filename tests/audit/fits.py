@@ -389,7 +389,7 @@ class FitAudit:
                 continue
             place = ("misfit", name)
             ledger.json((*place, "unit"), units[0])
-            ledger.json((*place, "rms"), rms, rel=1e-6, abs=1e-9 * _size(own))
+            ledger.json((*place, "rms"), rms, rel=1e-6)
             noise = misfit["noise"]
             ratio = misfit["rms"] / noise if noise > 0 else None
             ledger.json((*place, "times_noise"), ratio, rel=1e-9)
@@ -489,15 +489,14 @@ class FitAudit:
                 errors[test] = KINDS[kind].objective(self, test, section)
         if any(error is None for error in errors.values()) or len(errors) < len(result["tests"]):
             return
-        floor = 1e-9 * max(1.0, sum(weights.values()))
         if self.several:
             total = sum(weights[test] * errors[test] for test in errors)
-            ledger.json("objective", total, rel=1e-6, abs=floor)
-            ledger.json("mean_relative_error", errors, rel=1e-6, abs=floor)
+            ledger.json("objective", total, rel=1e-6)
+            ledger.json("mean_relative_error", errors, rel=1e-6)
             ledger.json("weights", weights, "echoed")
         else:
             (error,) = errors.values()
-            ledger.json("objective", error, rel=1e-6, abs=floor * _size(self.matched))
+            ledger.json("objective", error, rel=1e-6)
 
     def _history(self, records):
         """history.csv: a row an analysis; the best objective of each start."""

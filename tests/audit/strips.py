@@ -83,8 +83,7 @@ class Strips:
         ledger, path = self.ledger, (*self.path, "directions", direction)
         rows = self.audit_of.blocks[f"{self.test}: {direction}"]
         rms = float(np.sqrt(np.mean(rows["difference"] ** 2)))
-        floor = 1e-9 * float(rows["measured"].abs().max())
-        ledger.json((*path, "rms_N"), rms, rel=1e-6, abs=floor)
+        ledger.json((*path, "rms_N"), rms, rel=1e-6)
         ledger.json((*path, "matched"), len(rows))
         weights = {**dict.fromkeys(DIRECTIONS, 1.0), **self.section.get("weights", {})}
         ledger.json((*path, "weight"), weights[direction], "echoed")
