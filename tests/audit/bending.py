@@ -342,8 +342,29 @@ def _audit_curves(folder, ledger, curves):
         share = own["wrinkled_share"].dropna()
         if len(share) and not share.between(0, 1).all():
             ledger.find(name, "a wrinkled share is not between 0 and 1")
+    if folder.page_data is not None and any(run["predicted"] for run in folder.result["runs"]):
+        _drawn_curves(folder, ledger, curves)
     for column in table:
         ledger.claim_column("load_deflection.csv", column, "consistent")
+
+
+def _drawn_curves(folder, ledger, curves):
+    """Compare the curves with what page.json draws of them."""
+    drawn = []
+    for section in (folder.page_data or {}).get("sections", ()):
+        for part in section.get("parts", ()):
+            for chart in part.get("charts") or ():
+                drawn += [own for own in chart.get("series", ()) if own.get("y")]
+    for (test, card, wall), own in curves.groupby(["test", "card", "wall"], dropna=False):
+        d, load = own["deflection_mm"].to_numpy(), own["load_N"].to_numpy()
+        named = [s for s in drawn if s.get("name") == str(card) and len(s["x"]) == len(d)]
+        close = [s for s in named if np.allclose(s["x"], d, rtol=1e-4, atol=1e-6)
+                 and np.allclose(np.array(s["y"], float), load, rtol=1e-4, atol=1e-3)]  # fmt: skip
+        predicted = next((run["predicted"] for run in folder.result["runs"]
+                          if (run["test"], run["card"]) == (test, str(card))
+                          and run["wall"] == ("" if pd.isna(wall) else wall)), False)  # fmt: skip
+        if predicted and drawn and not close:
+            ledger.find(f"load_deflection.csv: {test}, {card}", "is not the curve that is drawn")
 
 
 def _cells(point, reached):

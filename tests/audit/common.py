@@ -73,12 +73,38 @@ def audit_notes(folder, ledger):
     elif notes:
         ledger.find("notes.csv", f"is missing; result.json has {len(notes)} notes")
 
+    _shown_notes(ledger, notes)
+
     def times(match):
         after = match.string[match.end() :]
         kinds = {n["kind"] for n in notes if after.startswith(f"{n['of']}: {n['note'][:20]}")}
         return [sum(note["kind"] in kinds for note in notes)] if kinds else [None]
 
     ledger.text(r"note, (\d+) times \(notes\.csv has each\), as ", times, needed=False)
+
+
+def _shown_notes(ledger, notes):
+    """Notes on the page and the terminal are those of result.json, word by word."""
+    lines = [f"{note['of']}: {note['note']}" if note["of"] else note["note"] for note in notes]
+    lines = [" ".join(line.split()) for line in lines]
+    for text in ledger.texts:
+        plain = text.text.replace("\u00a0", " ")
+        shown = [plain] if text.place.startswith(" > li ") and text.claims else []
+        shown += [part for part in re.split(r"\bnotes?(?:, \d+ times \([^)]*\), as|:) ", plain)[1:]]
+        if text.source not in ("page", "terminal"):
+            continue
+        for own in shown:
+            words = " ".join(own.split())
+            if not any(words.startswith(line) or line.startswith(words) for line in lines):
+                ledger.find(f"{text.source}: note", f"result.json has no note {words[:80]!r}")
+
+
+def notes_of_fit(folder, ledger, own, prefix=""):
+    """Claim the notes that a study repeats of one of its fits; `own` is the fit's folder."""
+    theirs = [note["note"] for note in own.result["notes"]]
+    for note in folder.result["notes"]:
+        if note["note"] in theirs and note["of"].startswith(prefix):
+            claim_literal(ledger, note["note"])
 
 
 def beyond_range(ledger, ends, reached=None):

@@ -253,6 +253,9 @@ def _bubble_card(folder, ledger, at, numbers, test, number, count, several):
         own = table.iloc[k * size : (k + 1) * size]
         if not np.allclose(own["pressure_kPa"], pressure, rtol=1e-6):
             ledger.find(f"{file}: pressure_kPa", f"is not {pressure:g}")
+        for axis in ("x_mm", "y_mm"):
+            if not np.array_equal(own[axis], table[axis].iloc[:size]):
+                ledger.find(f"{file}: {axis}", f"differs at {pressure:g} kPa")
         centre = np.hypot(own["x_mm"], own["y_mm"]).idxmin()
         heights.append(own.loc[centre, "dz_mm"])
         rim = own[np.hypot(own["x_mm"], own["y_mm"]) > own["x_mm"].max() * (1 - 1e-6)]

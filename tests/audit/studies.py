@@ -18,6 +18,7 @@ from .common import (
     echo,
     fit_folder,
     line,
+    notes_of_fit,
     page_of_csv,
     percent,
     rows_of_title,
@@ -79,6 +80,7 @@ def audit_profile(folder, ledger):
         columns["MPa"] += values.tolist()
         columns["minus_2_log_L"] += ratios.tolist()
         columns["by_sigma"] += (((values - best) / profile["fit_sigma_MPa"]) ** 2).tolist()
+        _audit_scale(ledger, profile, values, ratios)
         _profile_words(ledger, profile)
     for column, values in columns.items():
         ledger.column("profile.csv", column, values, rel=2e-8, abs=1e-12)
@@ -124,6 +126,19 @@ def _audit_curve(ledger, at, profile, values, ratios):
     if None not in ends.values():
         asymmetry = (ends["upper"] - best) / (best - ends["lower"])
     ledger.json((*at, "asymmetry"), asymmetry)
+
+
+def _audit_scale(ledger, profile, values, ratios):
+    """-2 log L is ((value - best)/sigma)^2 near the best, where no bound cuts the fit's band."""
+    best, sigma = profile["MPa"], profile["fit_sigma_MPa"]
+    band = np.array([best - profile["fit_lower_MPa"], profile["fit_upper_MPa"] - best])
+    near = ((values - best) / sigma) ** 2
+    asked = (near > 0.05) & (near < 1.5)
+    if asked.any() and np.allclose(band, 1.96 * sigma, rtol=0.1):
+        share = float(np.median(ratios[asked] / near[asked]))
+        if not 0.6 < share < 1.67:
+            place = f"profile of {profile['modulus']} at {profile['strain']:g}"
+            ledger.find(place, f"-2 log L is {share:.3g} times what 1 sigma gives near the best")
 
 
 def _profile_words(ledger, profile):
@@ -438,6 +453,8 @@ def _plan_row(ledger, at, row):
     """Check a row by itself: RMS along the strain within its values, what counts as unknown."""
     for name in MODULI:
         sigma, along_it = row["sigma"][name], row["sigma_at"][name]
+        if not 0 < sigma <= 10 * (1 + 1e-9):
+            ledger.find(f"{at}: sigma {name}", f"is {sigma:g}; the prior is 10")
         if np.ptp(along_it) < 1e-9 * max(along_it) and not np.isclose(sigma, along_it[0]):
             ledger.find(f"{at}: sigma {name}", "is not the RMS of equal values")
         ledger.claim_json((*at, "sigma", name), "consistent")
@@ -618,7 +635,7 @@ def audit_mesh(folder, ledger):
             if "failed" in level:
                 rows.append({**start, "quantity": f"failed: {level['failed']}"})
         _mesh_words(ledger, model, part, good)
-        _load_of_strip(folder, ledger, card, model, good)
+        _load_of_strip(folder, ledger, card, model, good, part.get("rms_N"))
     columns = (
         "model refined factor elements increments size seconds iterations quantity value "
         "off_finest off_finest_percent"
@@ -767,12 +784,14 @@ def _mesh_charts(ledger):
     ledger.text(rf"largest {N} %, least {N} %", check, source="page", needed=False)
 
 
-def _load_of_strip(folder, ledger, card, model, good):
+def _load_of_strip(folder, ledger, card, model, good, rms):
     found = strip_of(folder.project, model)
     if found is None:
         return
     direction, gauge, final, width = found
     expected = strip_load(card, direction, np.log(final / gauge), width)
+    if rms is not None and abs(rms["largest_load"] / expected - 1) > 1e-5:
+        ledger.find(f"{model}: largest_load", f"{rms['largest_load']:.7g} N, not {expected:.7g}")
     for level in good:
         value = level["values"].get("load at the end, N")
         if value is not None and abs(value / expected - 1) > 1e-5:
@@ -947,6 +966,8 @@ def audit_weights(folder, ledger):
             if at >= 0:
                 text.claim((at, at + len(column)), "consistent")
     audit_notes(folder, ledger)
+    if fit is not None:
+        notes_of_fit(folder, ledger, fit)
 
 
 def _claim_all(ledger, pattern):
@@ -965,7 +986,8 @@ def _beside(folder, name):
 def audit_compare(folder, ledger):
     result = folder.result
     echo(folder, ledger, "compare")
-    ledger.claim_json("fold_starts", "echoed")
+    run = json.loads((folder.path / "run.json").read_text())["parts"]
+    ledger.json("fold_starts", int(run.get("fold starts", result["fold_starts"])), "echoed")
     ledger.json("as_good_within", 0.05, "echoed")
     units = result["units"]
     columns = {"moduli": [], "coefficients": [], "fitted": [], "cross_validated": []}
@@ -1058,16 +1080,8 @@ def _notes_of_forms(folder, ledger):
     """Notes of the forms are those of the folders of their fits, named by the form."""
     for form in folder.result["forms"]:
         own = _beside(folder, form["form"].replace(":", "-"))
-        if own is None:
-            continue
-        theirs = [note["note"] for note in own.result["notes"]]
-        for note in folder.result["notes"]:
-            of = note["of"]
-            if of == form["form"] or of.startswith(f"{form['form']}, "):
-                if note["note"] in theirs:
-                    claim_literal(ledger, note["note"])
-                elif not of.startswith(f"{form['form']}, fold"):
-                    ledger.find(f"note of {of}", f"is not of its fit: {note['note']}")
+        if own is not None:
+            notes_of_fit(folder, ledger, own, form["form"])
 
 
 COMMANDS = {
