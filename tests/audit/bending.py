@@ -153,7 +153,9 @@ def audit_bend(folder, ledger):
         ends = {DIRECTION[name]: next(iter(laws.values())).ends[name] for name in MODULI}
     beyond_range(ledger, ends)
     _audit_solver_notes(ledger)
-    audit_notes(folder, ledger)
+    titles = [(r, f"{r['test']} with {r['card']}") for r in result["runs"]]
+    titles = [(r, f"{title}, {r['wall']}" if not r["predicted"] else title) for r, title in titles]
+    audit_notes(folder, ledger, [f"{title}: {run['ended']}" for run, title in titles])
 
 
 def _audit_test(folder, ledger, test, curves):

@@ -63,8 +63,11 @@ def claim_literal(ledger, words, how="consistent"):
             at = plain.find(words, at + 1)
 
 
-def audit_notes(folder, ledger):
-    """Compare the notes of result.json, notes.csv and the page, and count them."""
+def audit_notes(folder, ledger, more=()):
+    """Compare the notes of result.json, notes.csv and the page, and count them.
+
+    more : lines that the page shows as notes, of what stands elsewhere in result.json.
+    """
     notes = folder.result.get("notes", [])
     if "notes.csv" in folder.tables:
         for key in ("of", "kind", "note"):
@@ -73,7 +76,7 @@ def audit_notes(folder, ledger):
     elif notes:
         ledger.find("notes.csv", f"is missing; result.json has {len(notes)} notes")
 
-    _shown_notes(ledger, notes)
+    _shown_notes(ledger, notes, more)
 
     def times(match):
         after = match.string[match.end() :]
@@ -83,10 +86,10 @@ def audit_notes(folder, ledger):
     ledger.text(r"note, (\d+) times \(notes\.csv has each\), as ", times, needed=False)
 
 
-def _shown_notes(ledger, notes):
+def _shown_notes(ledger, notes, more):
     """Notes on the page and the terminal are those of result.json, word by word."""
     lines = [f"{note['of']}: {note['note']}" if note["of"] else note["note"] for note in notes]
-    lines = [" ".join(line.split()) for line in lines]
+    lines = [" ".join(line.split()) for line in (*lines, *more)]
     for text in ledger.texts:
         plain = text.text.replace("\u00a0", " ")
         shown = [plain] if text.place.startswith(" > li ") and text.claims else []

@@ -966,6 +966,7 @@ def audit_weights(folder, ledger):
             if at >= 0:
                 text.claim((at, at + len(column)), "consistent")
     audit_notes(folder, ledger)
+    ledger.text(r"at (\d+) strains over the weight", [len(places)], source="page", needed=False)
     if fit is not None:
         notes_of_fit(folder, ledger, fit)
 
