@@ -37,7 +37,15 @@ from ..experiments.registry import report_of
 from ..files import __version__, html_table
 from ..files import pandas as pd
 from ..inference.assessment import Verdict, notes_of_verdicts, uncertainty_from, verdicts
-from ..inference.noise import BELOW_NOISE, Misfit, NoiseTest, misfits, noise_tests, notes_of_noise
+from ..inference.noise import (
+    BELOW_NOISE,
+    Misfit,
+    NoiseTest,
+    misfits,
+    noise_tests,
+    notes_of_misfits,
+    notes_of_noise,
+)
 from ..inference.posterior import LEVEL, Posterior
 from ..inference.problem import ANALYSES_USED_UP, FitProblem
 from ..materials.card import MaterialCard
@@ -540,6 +548,7 @@ def notes_of_fit(fit: Fit, pins: Mapping[str, Mapping[str, Mapping[str, float]]]
                 for c in fit.tests[prepared.test.name].comparisons}  # fmt: skip
     left = [note for note in notes_of_noise(fit.noise_tests) if note.kind != BELOW_NOISE
             or note.of not in computed]  # fmt: skip
+    left += notes_of_misfits(fit.misfits)
     notes += left if several else [Note(note.kind, str(note)) for note in left]
     for name, findings in fit.findings.items():
         told = [as_note(note) for note in findings.warnings]

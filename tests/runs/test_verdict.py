@@ -9,8 +9,8 @@ from bubblefit.experiments.bubble.findings import FLAT_SHEET
 from bubblefit.experiments.cycles.evaluation import SLIP
 from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
-from bubblefit.inference.discrepancy import DISCREPANCY
-from bubblefit.inference.noise import ABOVE_NOISE
+from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe
+from bubblefit.inference.noise import ABOVE_NOISE, Misfit, notes_of_misfits
 from bubblefit.materials.forms.base import COMPONENTS
 from bubblefit.materials.law import HypoelasticLaw
 from bubblefit.runs.best import MESH
@@ -105,3 +105,23 @@ def test_moduli_that_are_known_nowhere_are_not_to_be_used():
 def test_the_next_step_fits_the_project(half_widths, comparisons, fitted, ends, step):
     verdict = judge(half_widths, (), comparisons, fitted, ends)
     assert step in verdict.next_step
+
+
+def test_a_misfit_of_many_times_the_noise_speaks_against_the_moduli():
+    misfits = {
+        "bubble": Misfit(1.4, 0.05, "assumed", "mm"),
+        "near": Misfit(0.2, 0.05, "assumed", "mm"),
+        "tested": Misfit(1.4, 0.05, "given", "mm"),
+        "exact": Misfit(1.4, 0.0, "assumed", "mm"),
+    }
+    (note,) = notes_of_misfits(misfits)
+    assert note.line.startswith("bubble: the fit leaves 1.4 mm RMS, 28 times the noise (0.05 mm, ")
+    assert verdict_of(best_with(GOOD), [note], ["bubble"], ALL).reasons == (
+        "the fit leaves more than the noise of the data",
+    )
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_sheet_is_no_advice_where_its_first_shape_is_known(known):
+    discrepancy = Discrepancy(30.0, 2.0, 0.5, "mm", has_known_sheet=known)
+    assert ("[bubble.sheet]" in describe(discrepancy)) == (not known)
