@@ -14,6 +14,9 @@ What a notebook writes, and all that the command line calls:
 
 from __future__ import annotations
 
+import bubblefit.interrupts  # the first one: it guards the others
+
+# isort: split
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ..files import __version__
+from ..interrupts import begin
 from . import terminal
 
 #: Module of each command, which defines NAME_command, and its line in the help.
@@ -53,6 +54,8 @@ class LazyGroup(terminal.Suggesting):
         if not (args or kwargs) and sys.getfilesystemencoding() == "ascii":  # umlauts in paths
             again = [sys.executable, "-X", "utf8", *sys.orig_argv[1:]]
             os.execv(sys.executable, again)  # noqa: S606
+        terminal.check_stdout()
+        begin()
         return super().main(*args, **kwargs)
 
     def make_context(
@@ -96,6 +99,6 @@ def main(verbose: bool) -> None:
     """Identify the material law of a coated fabric from tests.
 
     Exit codes: 0 success, 1 fit worse than --fail-above, 2 bad input, 3 no feasible start found,
-    4 the solver failed, 130 interrupted.
+    4 the solver failed, 130 interrupted, 141 nobody reads the output.
     """
     terminal.listen(verbose)

@@ -5,6 +5,7 @@ with `show`. `--events` and `--verbose` belong to every command and are added by
 
 from __future__ import annotations
 
+import errno
 import functools
 import json
 import logging
@@ -13,15 +14,16 @@ import re
 import sys
 import textwrap
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
 import click
 
 from ..errors import BubblefitError, OutputError, did_you_mean
-from ..files import __version__, json_text, one_blas_thread, output_errors
+from ..files import __version__, json_text, one_blas_thread, output_errors, unwritable_words
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -52,6 +54,8 @@ class Place(click.Path):
 
 FILE, FOLDER = Place(), Place(folder=True)
 PAGE = "report.html"
+#: Of a run that can be resumed, one of these is in its folder.
+KEPT = ("run.json", "analyses")
 #: Where click keeps the words that were typed, while a command runs.
 COMMAND_LINE = "bubblefit.command_line"
 
@@ -78,8 +82,35 @@ def examples(*lines: str) -> str:
     return f"\b\n{HEAD}\n{typed}"
 
 
-INTERRUPTED = 130
+#: Exit codes: of Ctrl-C, and where the reader of the output has gone, as of other programs.
+INTERRUPTED, UNREAD = 130, 141
 WORSE = 1  # exit code of --fail-above
+
+
+def complain(message: object) -> None:
+    """Print one line on stderr, if there is one and it can be written."""
+    with suppress(OSError):
+        if message:
+            click.echo(f"bubblefit: {message}", err=True)
+
+
+def check_stdout() -> None:
+    """End the command where stdout is closed: files that it opens would take its place."""
+    if sys.stdout is None:
+        complain("standard output is closed; redirect it into a file, or to /dev/null")
+        sys.exit(OutputError.exit_code)
+
+
+def end_of_output(error: OSError) -> tuple[int, str] | None:
+    """Return exit code and message of an error of printing; None of an error of anything else."""
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    if frame.f_code is not click.echo.__code__:
+        return None
+    # Python tries once more at its end.
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")
+    if error.errno == errno.EPIPE:
+        return UNREAD, ""
+    return OutputError.exit_code, f"standard output {unwritable_words(error)} another place"
 
 
 def exits(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -95,12 +126,19 @@ def exits(command: Callable[..., Any]) -> Callable[..., Any]:
             return done
         except BubblefitError as error:
             code, said = error.exit_code, str(error)
-            click.echo(f"bubblefit: {error}", err=True)
+            complain(error)
             sys.exit(error.exit_code)
         except KeyboardInterrupt:
             code, said = INTERRUPTED, "interrupted"
-            click.echo("bubblefit: interrupted", err=True)
+            complain(said)
             sys.exit(INTERRUPTED)
+        except OSError as error:
+            if (end := end_of_output(error)) is None:
+                said = f"{type(error).__name__}: {error}"
+                raise
+            code, said = end
+            complain(said)
+            sys.exit(code)
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
             raise
@@ -119,7 +157,8 @@ def resumable(folder: Path) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
+        if any((folder / name).exists() for name in KEPT):
+            click.echo(f"interrupted; go on with --resume (kept in {folder})", err=True)
         raise
 
 
@@ -168,14 +207,22 @@ class UsageLine(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print one line on stderr."""
-        click.echo(f"bubblefit: {self.message}", err=True)
+        complain(self.message)
 
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Turn usage errors of click within the block into one line."""
+    """Turn usage errors of click within the block into one line, as what ends it otherwise."""
     try:
         yield
+    except KeyboardInterrupt:
+        complain("interrupted")
+        sys.exit(INTERRUPTED)
+    except OSError as error:
+        if (end := end_of_output(error)) is None:
+            raise
+        complain(end[1])
+        sys.exit(end[0])
     except click.UsageError as error:
         if isinstance(error, HELP):
             raise
