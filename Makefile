@@ -1,5 +1,5 @@
-# make demo, make test, make lint, make bench, make docs, make site, make mutants, make faults: each
-# does all the set-up it needs.
+# make demo, make test, make test-rounding, make lint, make bench, make docs, make site, make mutants,
+# make faults: each does all the set-up it needs.
 # make calculix: a ccx that can load material libraries, into bubblefit's own cache folder.
 # Needs Python 3.11 or newer (PYTHON=...) and make; everything else goes into .venv/.
 
@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 # Retries leave room for a busy registry.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 5
 
-.PHONY: demo test lint bench docs site mutants faults calculix clean
+.PHONY: demo test test-rounding lint bench docs site mutants faults calculix clean
 .DELETE_ON_ERROR:
 
 demo: $(READY)
@@ -22,6 +22,11 @@ test: $(READY)
 	@sh .ci/gfortran || [ -z "$$CI" ]
 	@sh .ci/chromium || [ -z "$$CI" ]
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+
+# Golden and published numbers with other roundings than this processor's: kernels for any, numpy
+# and BLAS without its vector units, data disturbed in their last digits.
+test-rounding: $(READY)
+	BIN=$(BIN) sh .ci/rounding
 
 lint: $(READY)
 	$(BIN)/ruff check .

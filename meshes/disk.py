@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BubblefitError, InputError
-from .mesh import Array, Mesh, grid_quads, snapped, with_mirror_image
+from .mesh import Array, Mesh, check_memory, grid_quads, snapped, with_mirror_image
 
 #: Layers of the ring for each division of the core, at least and at most: beyond, elements are
 #: drawn out.
@@ -91,6 +91,11 @@ MIN_ELEMENTS, MAX_ELEMENTS = 8, 4_000_000
 NEAR = 1e-9
 
 
+def check_disk_memory(elements: int, symmetry: str) -> None:
+    """Raise InputError where an analysis of so many quads on the full disk is too large."""
+    check_memory(elements if symmetry == "full" else elements // 4, "elements")
+
+
 def disk_mesh(
     radius: float,
     elements: int,
@@ -108,6 +113,7 @@ def disk_mesh(
             " 800 are usual"
         )
         raise InputError(None, "elements", problem)
+    check_disk_memory(elements, symmetry)
     if generator == "gmsh":
         points, quads = quarter_disk_by_gmsh(elements / 4)
     else:

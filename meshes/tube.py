@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .disk import divided_quarter_disk
-from .mesh import Array, Mesh, Numbers, grid_quads, snapped, with_mirror_image
+from .mesh import Array, Mesh, Numbers, check_memory, grid_quads, snapped, with_mirror_image
 
 NEAR = 1e-9  # in radii
 
@@ -150,9 +150,11 @@ def cylinder_mesh(
     radius = 0.5 * diameter
     z = rows(0.5 * length, size, refinements)
     n = max(FEWEST, math.ceil(math.pi * radius / (4 * LONGEST * around * size)))
-    if 8 * n * (len(z) - 1) + 3 * n * n > MAX_ELEMENTS:
+    half = 8 * n * (len(z) - 1) + 3 * n * n
+    if half > MAX_ELEMENTS:
         problem = f"{size:g} mm gives more than {MAX_ELEMENTS} elements a half; make them larger"
         raise InputError(None, "size", problem)
+    check_memory(half // 2 if symmetry == "quarter" else 2 * half, "size")
     angle = angles(n, 0.5 * seam_width / radius)
     # Nodes are so far out that they enclose the area of the circle.
     out = radius * math.sqrt(math.pi / float(np.sin(np.diff(angle)).sum()))

@@ -207,7 +207,7 @@ class Part:
 
 def studied_tests(project: Project, tests: str | Sequence[str] | None = None) -> list[Test]:
     """Return the tests that a study can run, as `Project.chosen`; InputError: there is none."""
-    able = [t for t in project.chosen(tests or None) if kind_named(t.kind).studied is not None]
+    able = [t for t in project.chosen(tests) if kind_named(t.kind).studied is not None]
     if not able:
         raise InputError(project.path, "", "no study can run the tests of this project")
     return able

@@ -10,7 +10,7 @@ from bubblefit.solvers.run_cache import OFF, VARIABLE
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
-from . import needs
+from . import needs, rounding
 from .bars import BarSolver, known_bars
 from .drawings import check_charts
 from .golden_files import Golden
@@ -32,6 +32,21 @@ settings.load_profile("bubblefit")
 
 def pytest_addoption(parser):
     parser.addoption("--rewrite-golden", action="store_true", help="write tests/golden/ anew")
+    parser.addoption("--only-golden", action="store_true", help="tests with a file there alone")
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--only-golden"):
+        items[:] = [item for item in items if "golden" in getattr(item, "fixturenames", ())]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def disturbed_data():
+    """Disturb all data by the share that the environment names: `make test-rounding`."""
+    with pytest.MonkeyPatch.context() as patch:
+        if share := os.environ.get(rounding.VARIABLE):
+            rounding.disturb_data(patch, float(share))
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...materials.card import State
 from ...meshes.bubble_model import BubbleModel, SheetCord, default_increments
-from ...meshes.disk import Outline, elliptic_disk_mesh
+from ...meshes.disk import Outline, check_disk_memory, elliptic_disk_mesh
 from ...meshes.mesh import Facet
 from ...readers.fields import DisplacementField, read_fields
 from ...readers.histories import LoadHistory, Pace, pace_of
@@ -194,6 +194,8 @@ def read(section: BubbleSection, place: Place, name: str) -> BubbleTest:
         if after == before or (after < before and (i == 1 or not may_fall)):
             problem = f"pressures must increase, got {after:g} after {before:g}"
             raise place.error(f"pressures[{i}]", problem)
+    with place.naming():
+        check_disk_memory(section.elements, section.symmetry)
     section = whole_in_base_units(section, place.scales)
     asked = None if section.pressures is None else tuple(section.pressures)
     measured = measured_files(section, place, asked)

@@ -13,6 +13,7 @@ from ..commands import every_command, in_process
 from ..disturbances import copied, disturbed
 from ..golden_files import FOLDER
 from ..projects import constant_strips
+from ..rounding import disturb_data
 
 CARD = ("--card", "out/material.toml")
 TWO = (*CARD, "--test", "two", "--quiet")
@@ -49,6 +50,17 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_prints_its_golden_file(name, folder, golden):
     golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
+
+
+def test_disturbed_data_print_the_same_golden_files(tmp_path, monkeypatch, golden):
+    """Numbers that rounding can move are not held to more digits than it leaves."""
+    disturb_data(monkeypatch, 1e-12, seed=2)
+    folder = tmp_path / "golden0"
+    folder.mkdir()
+    constant_strips(folder)
+    in_process("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1, cwd=folder)
+    for name in ("profile", "estimate", "plan", "bootstrap", "validate", "simulate-test"):
+        golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
 
 
 def test_doctor_lists_the_embedded_solver(golden, tmp_path):
