@@ -66,7 +66,7 @@ def test_unknown_form_is_named_before_keys_that_depend_on_it(folder):
     form = ('form = "constant"', 'form = "mine"')
     for changes in ([form], [form, ("strain_range = [0.12, 0.14, 0.1]\n", "")]):
         name = project(folder, *changes)
-        for command in ("fit", "check", "compare"):
+        for command in ("fit", "check", "estimate"):
             refused(folder, ("law.form: no form is called 'mine'", "known: "), command, name)
 
 
