@@ -5,12 +5,14 @@ day is replaced. Words are compared exactly, and numbers as far as another proce
 """
 
 import json
+import os
 import re
 from itertools import zip_longest
 from pathlib import Path
 
 from bubblefit.cli.terminal import TABLE, WIDTH, wrapped
 
+from . import rounding
 from .audit import audit, audit_printed, is_known
 from .places import ROOT
 
@@ -134,6 +136,8 @@ class Golden:
         for page in folder.rglob("page.json"):
             about = dict(json.loads(page.read_text())["about"])
             assert re.fullmatch(r"\d{4}-\d\d-\d\d", about["date"]) and about["fabric"], page
+        if rounding.VARIABLE in os.environ:
+            return  # the auditor reads the files of the data, which are not disturbed
         self.audit(folder, printed or text)
         ledger = audit_printed(name, printed or text, folder)
         assert ledger is None or not ledger.findings, "\n".join(map(str, ledger.findings))

@@ -11,7 +11,7 @@ from bubblefit.cli.main import main
 from ..audit import audit
 from ..commands import every_command, in_process
 from ..disturbances import copied, disturbed
-from ..golden_files import FOLDER
+from ..golden_files import FOLDER, differences, normalised
 from ..projects import constant_strips
 from ..rounding import disturb_data
 
@@ -52,7 +52,7 @@ def test_a_command_prints_its_golden_file(name, folder, golden):
     golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
 
 
-def test_disturbed_data_print_the_same_golden_files(tmp_path, monkeypatch, golden):
+def test_disturbed_data_print_the_same_golden_files(tmp_path, monkeypatch):
     """Numbers that rounding can move are not held to more digits than it leaves."""
     disturb_data(monkeypatch, 1e-12, seed=2)
     folder = tmp_path / "golden0"
@@ -60,7 +60,8 @@ def test_disturbed_data_print_the_same_golden_files(tmp_path, monkeypatch, golde
     constant_strips(folder)
     in_process("fit", "project.toml", "--out", "out", "--starts", 1, "--jobs", 1, cwd=folder)
     for name in ("profile", "estimate", "plan", "bootstrap", "validate", "simulate-test"):
-        golden(name, in_process(*COMMANDS[name], cwd=folder).stdout, folder)
+        printed = normalised(in_process(*COMMANDS[name], cwd=folder).stdout, folder)
+        assert differences(printed, (FOLDER / f"{name}.txt").read_text()) == []
 
 
 def test_doctor_lists_the_embedded_solver(golden, tmp_path):
