@@ -26,9 +26,9 @@ from ..experiments.strips import gauge
 from ..files import __version__, replacing
 from ..materials.designers import Options
 from ..project.project import read_project
-from ..readers.fields import Sphere, fit_sphere, points_of
 from ..readers.frames import QUANTITIES, Frame, FrameOptions, frame_files, read_frames
 from ..readers.sections import LENGTH_UNITS
+from ..readers.spheres import Sphere, fit_sphere, points_of
 from ..reports.bubbles import sphere_charts
 from ..reports.run_pages import write_constants
 from ..reports.strips import cycle_charts
@@ -265,7 +265,7 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
         with replacing(out) as path:
             pd.DataFrame(rows).to_csv(path, index=False, lineterminator="\n")
         drawn = [
-            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.kept)
+            (f"{name}: {one.radius:.3f} mm", one.points, one.deviation, one.is_used)
             for name, one in zip(names, found, strict=True)
         ]
         save(out.with_suffix(".png"), sphere_charts(drawn))
@@ -292,7 +292,11 @@ def dic_sphere(frames: tuple[str, ...], out: Path | None, as_json: bool, **optio
 
 def _row(name: str, one: Sphere, radius: float | None) -> dict[str, Any]:
     pairs = list(zip("xyz", one.centre.tolist(), one.centre_error.tolist(), strict=True))
-    row: dict[str, Any] = {"frame": name, "points": int(one.kept.sum()), "left_out": one.left_out}
+    row: dict[str, Any] = {
+        "frame": name,
+        "points": int(one.is_used.sum()),
+        "left_out": one.left_out,
+    }
     row |= {"radius_mm": one.radius, "radius_error_mm": one.radius_error}
     row |= {f"{axis}_mm": value for axis, value, _ in pairs}
     row |= {f"{axis}_error_mm": error for axis, _, error in pairs}

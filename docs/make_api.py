@@ -44,7 +44,13 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
                                 "inference.comparison:Comparison,Objective")),
     "laws": ("Laws", ("materials.law:HypoelasticLaw", "materials.forms.spline:Form",
                       "materials.forms.base")),
-    "readers": ("Readers of data", ("readers.registry",)),
+    "readers": (
+        "Readers of data",
+        ("readers.registry", "readers.frames:Frame,FrameOptions,FrameRows,frame_of,read_frames",
+         "readers.machine_tables:MachineTable,TableOptions,Channel,read_machine_table",
+         "readers.tables:TextTable,read_lines", "readers.text_frames:read_text_rows",
+         "readers.curves:LoadCurve,read_load_curves"),
+    ),
     "solvers": ("Solvers", ("solvers.base", "solvers.registry")),
     "methods": ("Optimisers", ("inference.methods",)),
 }  # fmt: skip

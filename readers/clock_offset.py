@@ -199,10 +199,12 @@ def offset_misfits(
     coarse = _offsets(t, log_times)
     h = h ** _straightest_power(h, [log_at(s, t, log_times, pressures) for s in coarse])
     # A hundredth of the log is below its least pressure, by noise.
-    rest = float(np.quantile(pressures, 0.01))
+    rest_pressure = float(np.quantile(pressures, 0.01))
 
     def misfits_at(offsets: Array) -> Array:
-        return np.array([_misfit(log_at(s, t, log_times, pressures), h, rest) for s in offsets])
+        return np.array(
+            [_misfit(log_at(s, t, log_times, pressures), h, rest_pressure) for s in offsets]
+        )
 
     misfits = misfits_at(coarse)
     step = coarse[1] - coarse[0]
@@ -272,7 +274,7 @@ def _are_enough(in_log: NDArray[np.bool_]) -> bool:
     return bool(in_log.sum() >= max(MIN_FRAMES, MIN_SHARE_IN_LOG * len(in_log) - 1))
 
 
-def _misfit(p: Array, h: Array, rest: float) -> float:
+def _misfit(p: Array, h: Array, rest_pressure: float) -> float:
     """Return the share of variance that rising functions leave, 1 without variance.
 
     Parameters
@@ -281,7 +283,7 @@ def _misfit(p: Array, h: Array, rest: float) -> float:
         NaN beyond the log.
     h : (frames,) array
         Heights, to a power.
-    rest : float, MPa
+    rest_pressure : float, MPa
         Pressure at which the height is zero.
     """
     in_log = np.isfinite(p)
@@ -290,7 +292,7 @@ def _misfit(p: Array, h: Array, rest: float) -> float:
     p = p[in_log]
     h = h[in_log]
     # The state of rest weighs as much as all frames together, in the functions only.
-    return (_unexplained(p, h, rest, 0.0) + _unexplained(h, p, 0.0, rest)) / 2
+    return (_unexplained(p, h, rest_pressure, 0.0) + _unexplained(h, p, 0.0, rest_pressure)) / 2
 
 
 def _unexplained(x: Array, y: Array, x_rest: float, y_rest: float) -> float:

@@ -38,7 +38,7 @@ _NUMBERED = frozenset("id number no nr num index nummer".split())
 _FRAMES = frozenset("frame stage step image picture snapshot bild stufe schritt aufnahme".split())
 _POINTS = frozenset("id index point punkt pointid subset marker node facet facette".split())
 #: Quantities by their whole heading.
-_WHOLE = {
+_FLAGS_AND_SIGMA = {
     "sigma": "sigma",
     **dict.fromkeys(("valid", "isvalid", "is valid", "validity", "gültig"), "valid"),
     **dict.fromkeys(("invalid", "rejected", "doubtful", "ungültig"), "invalid"),
@@ -104,7 +104,7 @@ def _quantity_beside_components(words: list[str]) -> str:
     for quantity, synonyms in (("frame", _FRAMES), ("id", _POINTS)):
         if distinct & synonyms and distinct <= synonyms | _NUMBERED:
             return quantity
-    return _WHOLE.get(" ".join(words), "")
+    return _FLAGS_AND_SIGMA.get(" ".join(words), "")
 
 
 def _component(words: list[str], unit: str) -> tuple[str, str]:

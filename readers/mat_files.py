@@ -25,11 +25,16 @@ h5py: Any = Later("h5py")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 #: Within which a file must be read once.
 SECONDS = 60.0
-#: Bytes of one array at most, a compressed one's always, and by what it has packed (numbers do
-#: not pack a hundredfold).
-LARGEST, SMALL, RATIO = 2**30, 2**26, 100
-#: Cells and structs within each other; parts of a variable of 7.3, which may refer to each other.
-DEEPEST, MOST_PARTS = 16, 10**5
+#: Bytes of one array at most.
+LARGEST = 2**30
+#: Bytes that a compressed array may always have.
+SMALL = 2**26
+#: How much a compressed array may be larger than what is packed; numbers do not pack a hundredfold.
+RATIO = 100
+#: Cells and structs within each other.
+MAX_DEPTH = 16
+#: Parts of a variable of 7.3, which may refer to each other.
+MAX_PARTS = 10**5
 
 
 def is_mat(head: bytes) -> bool:
@@ -47,29 +52,29 @@ def variable_names(path: Path, head: bytes) -> Collection[str] | None:
         return None
 
 
-def read_variables(path: Path, wanted: Collection[str]) -> dict[str, Any]:
-    """Read the variables of these names, those that there are."""
+def read_variables(path: Path, names: Collection[str]) -> dict[str, Any]:
+    """Read the variables of these names that the file has."""
     with reading(path), path.open("rb") as file:
         head = file.read(520)
     if not is_mat(head):
         raise InputError(path, "", "is not a MAT-file of version 5 or 7.3; save it as one")
     read = _variables_73 if head[512:520] == SIGNATURE else _variables_5
-    check_readable(path, partial(read, path, wanted))
-    return read(path, wanted)
+    check_readable(path, partial(read, path, names))
+    return read(path, names)
 
 
-def numbers_of(path: Path, where: Mapping[str, Any], name: str) -> np.ndarray:
+def numbers_of(path: Path, fields: Mapping[str, Any], name: str) -> np.ndarray:
     """Return an array of numbers among variables or fields."""
-    value = where.get(name)
+    value = fields.get(name)
     if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub":
-        problem = f"expected an array of numbers; there are: {', '.join(where)[:200]}"
+        problem = f"expected an array of numbers; there are: {', '.join(fields)[:200]}"
         raise InputError(path, f"variable {name!r}", problem)
     return value.astype(float)
 
 
 @contextmanager
-def library_errors(path: Path, what: str) -> Iterator[None]:
-    """Turn the errors of a library that reads `what`, of any class, into an InputError."""
+def library_errors(path: Path, kind: str) -> Iterator[None]:
+    """Turn the errors, of any class, of a library that reads files of a kind into an InputError."""
     try:
         yield
     except InputError:
@@ -77,8 +82,8 @@ def library_errors(path: Path, what: str) -> Iterator[None]:
     except FileNotFoundError:
         raise InputError(path, "", "no such file") from None
     except Exception as error:
-        why = " ".join(str(error).split())[:150]
-        problem = f"cannot be read as {what}; is it damaged? ({why})"
+        reason = " ".join(str(error).split())[:150]
+        problem = f"cannot be read as {kind}; is it damaged? ({reason})"
         raise InputError(path, "", problem) from None
 
 
@@ -87,30 +92,30 @@ def _names_5(path: Path) -> list[str]:
         return [str(name) for name, _, _ in scipy.io.whosmat(path, appendmat=False)]
 
 
-def _variables_5(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+def _variables_5(path: Path, names: Collection[str]) -> dict[str, Any]:
     with library_errors(path, "a MAT-file"):
-        most = min(LARGEST, max(SMALL, RATIO * path.stat().st_size))
+        max_size = min(LARGEST, max(SMALL, RATIO * path.stat().st_size))
         for name, shape, _ in scipy.io.whosmat(path, appendmat=False):
-            if name in wanted and 8 * math.prod(shape) > most:
+            if name in names and 8 * math.prod(shape) > max_size:
                 problem = f"says {shape} numbers, more than the file holds; is it damaged?"
                 raise InputError(path, f"variable {name!r}", problem)
-        found = scipy.io.loadmat(path, variable_names=[*wanted], appendmat=False)
-        return {name: _plain(found[name], 0) for name in wanted if name in found}
+        variables = scipy.io.loadmat(path, variable_names=[*names], appendmat=False)
+        return {name: _value_5(variables[name], 0) for name in names if name in variables}
 
 
-def _plain(value: Any, depth: int) -> Any:
+def _value_5(value: Any, depth: int) -> Any:
     """Return the value of a variable that scipy.io has read."""
-    own = scipy.io.matlab
-    if not isinstance(value, np.ndarray) or depth > DEEPEST:
+    matlab = scipy.io.matlab
+    if not isinstance(value, np.ndarray) or depth > MAX_DEPTH:
         return None
-    if isinstance(value, (own.MatlabObject, own.MatlabFunction, own.MatlabOpaque)):
+    if isinstance(value, (matlab.MatlabObject, matlab.MatlabFunction, matlab.MatlabOpaque)):
         return None
     flat = value.ravel(order="F")
     names = value.dtype.names
     if names:
-        return [{name: _plain(one[name], depth + 1) for name in names} for one in flat]
+        return [{name: _value_5(element[name], depth + 1) for name in names} for element in flat]
     if value.dtype == object:
-        return [_plain(one, depth + 1) for one in flat]
+        return [_value_5(element, depth + 1) for element in flat]
     return "".join(flat) if value.dtype.kind == "U" else value
 
 
@@ -119,53 +124,69 @@ def _names_73(path: Path) -> list[str]:
         return [str(name) for name in file]
 
 
-def _variables_73(path: Path, wanted: Collection[str]) -> dict[str, Any]:
+def _variables_73(path: Path, names: Collection[str]) -> dict[str, Any]:
     with open_hdf5(path) as file:
-        parts = iter(range(MOST_PARTS))
-        there = {name: member(path, file, name) for name in wanted}
-        found = {name: item for name, item in there.items() if item is not None}
-        return {name: _of_hdf5(path, item, name, 0, parts) for name, item in found.items()}
+        parts = iter(range(MAX_PARTS))
+        items = {name: member(path, file, name) for name in names}
+        return {
+            name: _value_73(path, item, name, 0, parts)
+            for name, item in items.items()
+            if item is not None
+        }
 
 
-def _of_hdf5(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
+def _value_73(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> Any:
     """Return the value of a variable of version 7.3; `parts` runs out when too many are read."""
-    if depth > DEEPEST or next(parts, None) is None:
+    if depth > MAX_DEPTH or next(parts, None) is None:
         raise InputError(path, name, "has too many parts; is the file damaged?")
     if isinstance(item, h5py.Group):
-        fields = {key: member(path, item, key) for key in item}
-        values = {
-            key: _of_hdf5(path, field, f"{name}.{key}"[-200:], depth + 1, parts)
-            for key, field in fields.items()
-        }
-        # The elements of a struct array: each field is a list of references.
-        listed = [
-            isinstance(field, h5py.Dataset)
-            and field.dtype == h5py.ref_dtype
-            and "MATLAB_class" not in field.attrs
-            for field in fields.values()
-        ]
-        if not (values and all(listed)):
-            return [values]
-        count = min(len(value) for value in values.values())
-        return [{key: value[i] for key, value in values.items()} for i in range(count)]
-    kind = item.attrs.get("MATLAB_class", b"")
-    kind = kind.decode("latin-1") if isinstance(kind, bytes) else str(kind)
+        return _struct_73(path, item, name, depth, parts)
     if item.dtype == h5py.ref_dtype:
-        if item.size > MOST_PARTS:
-            raise InputError(path, name, "has too many parts; is the file damaged?")
-        references = np.asarray(item[()]).T.ravel(order="F")
-        return [
-            _of_hdf5(path, item.file[one], name, depth + 1, parts) if one else None
-            for one in references
-        ]
+        return _cells_73(path, item, name, depth, parts)
     if item.dtype.kind not in "fiub" or "MATLAB_object_decode" in item.attrs:
         return None
+    matlab_class = item.attrs.get("MATLAB_class", b"")
+    is_bytes = isinstance(matlab_class, bytes)
+    matlab_class = matlab_class.decode("latin-1") if is_bytes else str(matlab_class)
     if "MATLAB_empty" in item.attrs:
-        return "" if kind == "char" else np.zeros((0, 0))
+        return "" if matlab_class == "char" else np.zeros((0, 0))
     value = array_of(path, item, name).T
-    if kind == "char":
+    if matlab_class == "char":
         return _text(value.ravel(order="F"))
-    return value != 0 if kind == "logical" else value
+    return value != 0 if matlab_class == "logical" else value
+
+
+def _struct_73(
+    path: Path, group: Any, name: str, depth: int, parts: Iterator[int]
+) -> list[dict[str, Any]]:
+    """Return the elements of a struct array, each with its fields."""
+    fields = {key: member(path, group, key) for key in group}
+    values = {
+        key: _value_73(path, field, f"{name}.{key}"[-200:], depth + 1, parts)
+        for key, field in fields.items()
+    }
+    if not values or not all(map(_is_list_of_elements, fields.values())):
+        return [values]
+    count = min(len(value) for value in values.values())
+    return [{key: value[i] for key, value in values.items()} for i in range(count)]
+
+
+def _is_list_of_elements(field: Any) -> bool:
+    """Return whether a field holds a reference for each element of a struct array."""
+    if not isinstance(field, h5py.Dataset) or field.dtype != h5py.ref_dtype:
+        return False
+    return "MATLAB_class" not in field.attrs
+
+
+def _cells_73(path: Path, item: Any, name: str, depth: int, parts: Iterator[int]) -> list[Any]:
+    """Return the values of a cell array."""
+    if item.size > MAX_PARTS:
+        raise InputError(path, name, "has too many parts; is the file damaged?")
+    references = np.asarray(item[()]).T.ravel(order="F")
+    return [
+        _value_73(path, item.file[reference], name, depth + 1, parts) if reference else None
+        for reference in references
+    ]
 
 
 def _text(numbers: np.ndarray) -> str:
@@ -196,14 +217,14 @@ def open_hdf5(path: Path) -> Iterator[Any]:
 
 def member(path: Path, group: Any, name: str) -> Any:
     """Return the object below a group by its path; None where there is none."""
-    here = group
+    item = group
     for part in name.split("/"):
-        if not isinstance(here, h5py.Group) or part not in here:
+        if not isinstance(item, h5py.Group) or part not in item:
             return None
-        if isinstance(here.get(part, getlink=True), h5py.ExternalLink):
+        if isinstance(item.get(part, getlink=True), h5py.ExternalLink):
             raise InputError(path, name, "is a link to another file, which is not followed")
-        here = here[part]
-    return here
+        item = item[part]
+    return item
 
 
 def array_of(path: Path, dataset: Any, name: str) -> NDArray[np.float64]:

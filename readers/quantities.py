@@ -50,11 +50,11 @@ BETWEEN_GRIPS = frozenset("extension displacement disp weg standardweg".split())
 _TRANSDUCER = re.compile(r"\((?:strain|dehnung) ?\d*\)")
 STRAIN_WORDS = frozenset(("strain", "dehnung"))
 #: A column with one of these words is none of them: "Tensile strain (Extension)", "Load rate".
-OTHERS = STRAIN_WORDS | frozenset(
+OTHER_QUANTITIES = STRAIN_WORDS | frozenset(
     "stress rate speed velocity time cell cycle spannung zeit geschwindigkeit".split()
 )
 #: A column with one of these words is no elongation and no strain along the strip.
-NEVER = (OTHERS - STRAIN_WORDS) | frozenset(
+NOT_ALONG_STRIP = (OTHER_QUANTITIES - STRAIN_WORDS) | frozenset(
     "true wahre log logarithmic transverse lateral width quer querdehnung".split()
 )
 #: Whole names of the columns that say which specimen and which direction a row belongs to.
@@ -84,10 +84,10 @@ def means(name: str, quantity: str) -> bool:
     words = _split_words(plain)
     if quantity in PAIRS:
         return _has_pair(words, *PAIRS[quantity])
-    if quantity == "elongation" and (_is_measured_on_strip(plain) or NEVER & {*words}):
-        return NEVER.isdisjoint(words)
+    if quantity == "elongation" and (_is_measured_on_strip(plain) or NOT_ALONG_STRIP & {*words}):
+        return NOT_ALONG_STRIP.isdisjoint(words)
     synonyms = WORDS[quantity]
-    return not synonyms.isdisjoint(words) and (OTHERS - synonyms).isdisjoint(words)
+    return not synonyms.isdisjoint(words) and (OTHER_QUANTITIES - synonyms).isdisjoint(words)
 
 
 def _has_pair(words: list[str], measured: frozenset[str], yarn: frozenset[str]) -> bool:
@@ -95,7 +95,7 @@ def _has_pair(words: list[str], measured: frozenset[str], yarn: frozenset[str]) 
     # One word is not both: F is a force before the yarn, and the fill after another word.
     if not any(a in measured and b in yarn for a, b in permutations(words, 2)):
         return False
-    return (OTHERS - measured).isdisjoint(words)
+    return (OTHER_QUANTITIES - measured).isdisjoint(words)
 
 
 def columns_of(names: list[str], quantity: str, named: Mapping[str, str]) -> list[int]:
@@ -115,7 +115,7 @@ def _strain_indices(names: list[str]) -> list[int]:
     indices = []
     for index, name in enumerate(names):
         words = _words(name)
-        if STRAIN_WORDS & words and NEVER.isdisjoint(words):
+        if STRAIN_WORDS & words and NOT_ALONG_STRIP.isdisjoint(words):
             indices.append(index)
     return indices
 

@@ -28,7 +28,22 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Format:
-    """One format of data files; read : see `Content`; recognises : by path and head; None: all."""
+    """One format of data files.
+
+    Attributes
+    ----------
+    name : str
+        What ``format =`` in a project names.
+    content : str
+        What files of the format hold.
+    title : str
+        What the format is, for lists.
+    read : callable
+        Reads a file; see `Content`.
+    recognises : callable or None
+        Whether a file, by its path and first bytes, has the format; None for any that no other
+        format recognises.
+    """
 
     name: str
     content: Content
@@ -40,61 +55,85 @@ class Format:
 _FORMATS: dict[tuple[Content, str], Format] = {}
 
 
-def register_format(one: Format) -> None:
+def register_format(format: Format) -> None:
     """Add one of our own formats: the last statement of its module in `formats`."""
-    _FORMATS[one.content, one.name] = one
+    _FORMATS[format.content, format.name] = format
 
 
 def formats(content: Content) -> tuple[Format, ...]:
     """Return our own formats of a content, by name."""
     _import_formats()
-    ours = [one for one in _FORMATS.values() if one.content == content]
-    return tuple(sorted(ours, key=lambda one: one.name))
+    of_content = [format for format in _FORMATS.values() if format.content == content]
+    return tuple(sorted(of_content, key=lambda format: format.name))
 
 
 def format_names(content: Content) -> tuple[str, ...]:
     """Return the values of `format =`: our formats of a content, then readers of plug-ins."""
-    return names_with("bubblefit.readers", [one.name for one in formats(content)])
+    return names_with("bubblefit.readers", [format.name for format in formats(content)])
 
 
 def format_named(content: Content, name: str) -> Format:
-    """Return the format of this name, ours or that of a plug-in."""
-    for one in formats(content):
-        if one.name == name:
-            return one
+    """Return the format of this name, ours or that of a plug-in.
+
+    Raises
+    ------
+    InputError
+        There is none, or it is of another content.
+    PlugInFailure
+        The plug-in of this name does not work.
+    """
+    for format in formats(content):
+        if format.name == name:
+            return format
     plug_in = plug_in_named("bubblefit.readers", name)
     if plug_in is None:
-        known = ", ".join(format_names(content))
-        raise InputError(None, "format", f"{name[:40]!r} is not one of: {known}")
-    one = _format_of(plug_in)
-    if one.content != content:
-        raise InputError(None, "format", f"{name!r} is of a {one.content}, not of a {content}")
-    return one
+        names = ", ".join(format_names(content))
+        raise InputError(None, "format", f"{name[:40]!r} is not one of: {names}")
+    format = _format_of_plug_in(plug_in)
+    if format.content != content:
+        raise InputError(None, "format", f"{name!r} is of a {format.content}, not of a {content}")
+    return format
 
 
 def format_of(content: Content, path: Path | str) -> Format:
-    """Return the format of a file by its content: ours first, then those of plug-ins that work."""
+    """Return the format of a file by its content: ours first, then those of plug-ins that work.
+
+    Raises
+    ------
+    InputError
+        Several formats recognise the file.
+    """
     path = Path(path)
     head = b""
-    ours = formats(content)
     with suppress(OSError), path.open("rb") as file:
         head = file.read(HEAD)
-    for group in (ours, _working(content)):
-        able = [one for one in group if one.recognises is not None and one.recognises(path, head)]
-        if len(able) > 1:
-            names = " or ".join(repr(one.name) for one in able)
+    for candidates in (formats(content), _working_plug_ins(content)):
+        matching = [f for f in candidates if f.recognises is not None and f.recognises(path, head)]
+        if len(matching) > 1:
+            names = " or ".join(repr(format.name) for format in matching)
             raise InputError(path, "", f"the format may be {names}; say which with format")
-        if able:
-            return able[0]
-    return next(one for one in ours if one.recognises is None)
+        if matching:
+            return matching[0]
+    return next(format for format in formats(content) if format.recognises is None)
 
 
 def read_file(content: Content, path: Path | str, name: str | None, *options: Any) -> Any:
-    """Read a file by the format named, else by the one that its content shows; see `Content`."""
+    """Read a file by the format named, else by the one that its content shows.
+
+    Parameters
+    ----------
+    content : str
+        What the file must hold.
+    path : path
+    name : str or None
+        Name of the format.
+    *options
+        What the format's `read` is called with beside the path; see `Content`.
+    """
     with suppress(OSError):  # the reader says why
         check_regular(path)
-    chosen = format_of(content, path) if name is None else format_named(content, name)
-    return chosen.read(Path(path), *options)
+    format = format_of(content, path) if name is None else format_named(content, name)
+    return format.read(Path(path), *options)
 
 
 @cache
@@ -106,29 +145,31 @@ def _import_formats() -> None:
         import_module(f"{folder.__name__}.{module.name}")
 
 
-def _working(content: Content) -> Iterator[Format]:
+def _working_plug_ins(content: Content) -> Iterator[Format]:
+    """Yield the formats of plug-ins; a warning of each that does not work."""
     for plug_in in plug_ins("bubblefit.readers"):
         try:
-            one = _format_of(plug_in)
+            format = _format_of_plug_in(plug_in)
         except PlugInFailure as error:
             log.warning("%s", error)
         else:
-            if one.content == content:
-                yield one
+            if format.content == content:
+                yield format
 
 
-def _format_of(plug_in: PlugIn) -> Format:
-    one = plug_in.load("format", ("name", "content", "read", "recognises"))
+def _format_of_plug_in(plug_in: PlugIn) -> Format:
+    """Return the format of a plug-in, whose errors name it."""
+    format = plug_in.load("format", ("name", "content", "read", "recognises"))
 
     def read(path: Path, *options: Any) -> Any:
         with plug_in.calling(f"fails on {path}"):
-            return one.read(path, *options)
+            return format.read(path, *options)
 
     def recognises(path: Path, head: bytes) -> bool:
         try:
-            return one.recognises is not None and bool(one.recognises(path, head))
+            return format.recognises is not None and bool(format.recognises(path, head))
         except Exception as error:
             log.warning("%s", plug_in.failure(f"fails on {path}", error))
             return False
 
-    return replace(one, read=read, recognises=recognises)
+    return replace(format, read=read, recognises=recognises)

@@ -66,9 +66,9 @@ class Section(BaseModel):
 AnySection = TypeVar("AnySection", bound=Section)
 
 
-def beside(folder: Path, given: str) -> Path:
+def beside(folder: Path, name: str) -> Path:
     """Return the path of a file in `folder`, unless it is absolute or below the home (~)."""
-    return folder / os.path.expanduser(given)
+    return folder / os.path.expanduser(name)
 
 
 def dotted(location: Sequence[str | int]) -> str:
@@ -80,53 +80,81 @@ def dotted(location: Sequence[str | int]) -> str:
 
 
 def first_error(
-    path: Path | None, found: ValidationError, file: type[BaseModel], at: str = ""
+    path: Path | None, errors: ValidationError, file: type[BaseModel], at: str = ""
 ) -> InputError:
-    """Return the first finding, unknown keys first; at : dotted key of the table, "" the file."""
-    errors = sorted(found.errors(), key=lambda e: e["type"] != "extra_forbidden")
-    problem = _problem(errors[0], file)
-    if len(errors) > 1:
-        problem += f" ({len(errors) - 1} more)"
-    key = dotted([p for p in errors[0]["loc"] if not ONE_OF.match(str(p))])
+    """Return the first error of a table, unknown keys first.
+
+    Parameters
+    ----------
+    path : Path or None
+        File, for the message.
+    errors : ValidationError
+    file : type
+        Model that was validated.
+    at : str
+        Dotted key of the table; "" for the file itself.
+    """
+    details = sorted(errors.errors(), key=lambda error: error["type"] != "extra_forbidden")
+    problem = _problem(details[0], file)
+    if len(details) > 1:
+        problem += f" ({len(details) - 1} more)"
+    key = dotted([part for part in details[0]["loc"] if not ONE_OF.match(str(part))])
     return InputError(path, f"{at}.{key}" if at and key else at or key, problem)
 
 
 def _problem(error: Mapping[str, Any], file: type[BaseModel]) -> str:
+    """Describe an error of pydantic."""
     kind = error["type"]
     location = error["loc"]
-    given = error.get("input")
-    if kind == "missing":
-        field = file.model_fields.get(str(location[0])) if len(location) == 1 else None
-        table = field is not None and next(_sections(field.annotation), None) is not None
-        return f"this {'section' if table else 'key'} is missing; add it"
-    if kind == "extra_forbidden":
-        holder = file
-        for part in location[:-1]:
-            if isinstance(part, str):  # a number counts the tables of a list
-                holder = next(_sections(holder.model_fields[part].annotation))
-        meant = did_you_mean(location[-1], holder.model_fields) or ";"
-        return f"unknown key{meant} allowed here: {', '.join(holder.model_fields)}"
-    if kind == "finite_number":
-        return f"expected a finite number, got {given!r}"
-    if kind in ("too_short", "too_long"):
-        few = "at least" if kind == "too_short" else "at most"
-        count = error["ctx"]["min_length" if kind == "too_short" else "max_length"]
-        return f"expected {few} {count} items, got {len(given) if given is not None else 0}"
+    value = error.get("input")
     name = ".".join(part for part in location if isinstance(part, str))
-    if kind == "list_type" and isinstance(given, Mapping):
+    if kind == "list_type" and isinstance(value, Mapping):
         return f"there can be several of these tables; write [[{name}]] for [{name}]"
-    if kind in ("model_type", "dict_type") and isinstance(given, list):
+    if kind in ("model_type", "dict_type") and isinstance(value, list):
         return f"there is one of these tables only; write [{name}] for [[{name}]]"
+    if kind == "missing":
+        return f"this {_kind_of_key(location, file)} is missing; add it"
+    if kind == "extra_forbidden":
+        keys = _holder(location, file).model_fields
+        suggestion = did_you_mean(location[-1], keys) or ";"
+        return f"unknown key{suggestion} allowed here: {', '.join(keys)}"
+    if kind == "finite_number":
+        return f"expected a finite number, got {value!r}"
+    if kind == "too_short":
+        return f"expected at least {error['ctx']['min_length']} items, got {len(value or ())}"
+    if kind == "too_long":
+        return f"expected at most {error['ctx']['max_length']} items, got {len(value or ())}"
     expected = error["msg"].removeprefix("Input should be ").rstrip(".")
-    got = repr(given)
-    return f"expected {expected}, got {got if len(got) <= 60 else f'{got[:57]}...'}"
+    return f"expected {expected}, got {_abbreviated(value)}"
+
+
+def _abbreviated(value: Any) -> str:
+    """Return the value as Python writes it, cut to 60 letters."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _kind_of_key(location: Sequence[str | int], file: type[BaseModel]) -> str:
+    """Return whether the key at a location is that of a section."""
+    field = file.model_fields.get(str(location[0])) if len(location) == 1 else None
+    is_section = field is not None and any(_sections(field.annotation))
+    return "section" if is_section else "key"
+
+
+def _holder(location: Sequence[str | int], file: type[BaseModel]) -> type[BaseModel]:
+    """Return the model of the table that holds the key at a location."""
+    names = [part for part in location[:-1] if isinstance(part, str)]  # numbers count tables
+    for name in names:
+        file = next(_sections(file.model_fields[name].annotation))
+    return file
 
 
 def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
-    for inside in getattr(annotation, "__args__", ()):
-        yield from _sections(inside)
+    for part in getattr(annotation, "__args__", ()):
+        yield from _sections(part)
 
 
 def model_of(section: type[BaseModel], dotted: str) -> type[BaseModel]:
@@ -136,25 +164,39 @@ def model_of(section: type[BaseModel], dotted: str) -> type[BaseModel]:
     return section
 
 
-def in_base_units(section: type[BaseModel], said: Mapping[str, Any], scales: Any) -> dict[str, Any]:
-    """Return a table with marked numbers in mm, N and MPa; scales : by the names of `Unit`."""
-    whole = dict(said)
-    for key, value in said.items():
-        if (field := section.model_fields.get(key)) is None:
+def in_base_units(
+    section: type[BaseModel], table: Mapping[str, Any], scales: Any
+) -> dict[str, Any]:
+    """Return a table with marked numbers in mm, N and MPa.
+
+    Parameters
+    ----------
+    section : type
+        Model of the table.
+    table : mapping
+    scales : Scales
+        mm, N or MPa per unit, by the names of `Unit`.
+    """
+    converted = dict(table)
+    for key, value in table.items():
+        field = section.model_fields.get(key)
+        if field is None:
             continue  # of a form of the moduli: a strain or a count
-        inside = next(_sections(field.annotation), None)
         marks = [*field.metadata, *_marks(field.annotation)]
         unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
+        inner = next(_sections(field.annotation), None)
         if unit is not None:
-            whole[key] = _times(value, getattr(scales, unit.name))
-        elif inside is not None:
-            tables = value if isinstance(value, list) else [value]
-            tables = [
-                in_base_units(inside, own, scales) if isinstance(own, Mapping) else own
-                for own in tables
-            ]
-            whole[key] = tables if isinstance(value, list) else tables[0]
-    return whole
+            converted[key] = _scaled(value, getattr(scales, unit.name))
+        elif inner is not None:
+            converted[key] = _tables_in_base_units(inner, value, scales)
+    return converted
+
+
+def _tables_in_base_units(section: type[BaseModel], value: Any, scales: Any) -> Any:
+    """Return a table, or each table of a list, in base units; anything else as it is."""
+    if isinstance(value, list):
+        return [_tables_in_base_units(section, element, scales) for element in value]
+    return in_base_units(section, value, scales) if isinstance(value, Mapping) else value
 
 
 def unit_doubts(
@@ -184,21 +226,21 @@ def unit_doubts(
 
 def whole_in_base_units(section: AnySection, scales: Any) -> AnySection:
     """Return a section that was read with its marked numbers in mm, N and MPa."""
-    said = section.model_dump(exclude_unset=True, exclude_none=True)
-    return section.model_validate(in_base_units(type(section), said, scales))
+    table = section.model_dump(exclude_unset=True, exclude_none=True)
+    return section.model_validate(in_base_units(type(section), table, scales))
 
 
-def _times(value: Any, scale: float) -> Any:
+def _scaled(value: Any, scale: float) -> Any:
     """Return every number of a value times a scale."""
     if isinstance(value, Mapping):
-        return {key: _times(own, scale) for key, own in value.items()}
+        return {key: _scaled(element, scale) for key, element in value.items()}
     if isinstance(value, list):
-        return [_times(own, scale) for own in value]
+        return [_scaled(element, scale) for element in value]
     return value if isinstance(value, str) else value * scale
 
 
 def _marks(annotation: Any) -> Iterator[Any]:
     """Yield what the parts of an annotation are marked with."""
     yield from getattr(annotation, "__metadata__", ())
-    for inside in getattr(annotation, "__args__", ()):
-        yield from _marks(inside)
+    for part in getattr(annotation, "__args__", ()):
+        yield from _marks(part)

@@ -146,27 +146,20 @@ def recorded_frames(
     InputError
         The pressures cannot be found, or there are no such frames.
     """
+    is_listed = section is None
     if section is None:
         recording = _listed_pressures(requested or (), files)
         requested = None
+        section = PressureSection()
     else:
         _check(section, requested, files.place, inflation)
         recording = _recorded_pressures(section, files)
     pressures = recording.pressure
     has_inflations = has_several(pressures)
-    is_timed = has_inflations or inflation != 1 or recording.clock is not None or section is None
-    try:
-        chosen, left_out = choose_frames(
-            pressures,
-            requested,
-            None if section is None else section.frames,
-            None if section is None else section.tolerance,
-            inflation if is_timed else None,
-        )
-    except InputError as error:
-        is_of_test = error.field.startswith(("pressures", "inflation"))
-        field = error.field if is_of_test else f"{SECTION}.{error.field}"
-        raise files.place.error(field.rstrip("."), error.problem) from None
+    is_timed = has_inflations or inflation != 1 or recording.clock is not None or is_listed
+    chosen, left_out = _choose(
+        pressures, requested, section, inflation if is_timed else None, files.place
+    )
     inflations = None
     if has_inflations and all(map(is_file, files.files)):
         inflations = Inflations(pressures, _heights(recording, files), inflation)
@@ -187,6 +180,22 @@ def recorded_frames(
         numbers=tuple(recording.doubts),
         inflations=inflations,
     )
+
+
+def _choose(
+    pressures: Array,
+    requested: Sequence[float] | None,
+    section: PressureSection,
+    inflation: InflationChoice | None,
+    place: Place,
+) -> tuple[tuple[int, ...], dict[str, int]]:
+    """Return the frames of a test, and how many are not used by reason; errors name its keys."""
+    try:
+        return choose_frames(pressures, requested, section.frames, section.tolerance, inflation)
+    except InputError as error:
+        is_of_test = error.field.startswith(("pressures", "inflation"))
+        field = error.field if is_of_test else f"{SECTION}.{error.field}"
+        raise place.error(field.rstrip("."), error.problem) from None
 
 
 def _heights(recording: Recording, files: FrameFiles) -> Array:

@@ -49,10 +49,11 @@ from ..mat_files import LARGEST, RATIO, SMALL, is_mat, numbers_of, read_variable
 from ..registry import Format, register_format
 from ..text_frames import read_text
 
-PLACES, MOVED = [f"{axis} deformed" for axis in "xyz"], [f"d{axis}" for axis in "xyz"]
+POSITIONS = [f"{axis} deformed" for axis in "xyz"]
+DISPLACEMENTS = [f"d{axis}" for axis in "xyz"]
 
 
-def _variables(path: Path, head: bytes) -> Collection[str] | None:
+def _variable_names(path: Path, head: bytes) -> Collection[str] | None:
     """Return the names in a MAT-file; None of a damaged one, none of another file."""
     return mat_files.variable_names(path, head) if is_mat(head) else ()
 
@@ -63,119 +64,141 @@ def _frames(
     format: str,
     names: Mapping[str, str],
     tables: Iterable[Array],
-    **more: Any,
+    **settings: Any,
 ) -> list[Frame]:
-    """Return a frame a table (points, names)."""
-    rows = (FrameRows(dict(zip(names, one.T, strict=True)), names, **more) for one in tables)
-    return [frame_of(one, options, path, format) for one in rows]
+    """Return a frame a table (points, names), with settings of its `FrameRows`."""
+    frames = []
+    for table in tables:
+        rows = FrameRows(dict(zip(names, table.T, strict=True)), names, **settings)
+        frames.append(frame_of(rows, options, path, format))
+    return frames
 
+
+# VIC-3D -----------------------------------------------------------------------------------------
 
 VIC3D = {"x": "X", "y": "Y", "z": "Z", "dx": "U", "dy": "V", "dz": "W", "sigma": "sigma"}
 
 
 def recognises_vic3d(path: Path, head: bytes) -> bool:
     """Return whether X, Y, U, V and W are among the variables of a MAT-file, and no frames."""
-    there = _variables(path, head) or ()
-    return {*"XYUVW"} <= {*there} and "points3D" not in there
+    names = {*(_variable_names(path, head) or ())}
+    return {*"XYUVW"} <= names and "points3D" not in names
 
 
 def read_vic3d(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read the one frame of a file."""
     names = VIC3D | dict(options.columns or {})
-    there = read_variables(path, [*names.values()])
+    variables = read_variables(path, [*names.values()])
     values = {
-        key: numbers_of(path, there, name).ravel(order="F")
+        key: numbers_of(path, variables, name).ravel(order="F")
         for key, name in names.items()
-        if name in there or key in options.quantities
+        if name in variables or key in options.quantities
     }
     if len({value.size for value in values.values()}) != 1:
         raise InputError(path, "", "X, Y, Z, U, V, W and sigma are not of one size")
     sigma = values.pop("sigma", None)
-    names = {key: names[key] for key in values}
-    return [frame_of(FrameRows(values, names, sigma=sigma), options, path, "vic3d-mat")]
+    rows = FrameRows(values, {key: names[key] for key in values}, sigma=sigma)
+    return [frame_of(rows, options, path, "vic3d-mat")]
 
+
+# Ncorr ------------------------------------------------------------------------------------------
 
 SAVED = "data_dic_save"
 
 
 def recognises_ncorr(path: Path, head: bytes) -> bool:
     """Return whether a MAT-file holds what Ncorr saves, or cannot be inspected."""
-    there = _variables(path, head)
-    return there is None or SAVED in there
+    names = _variable_names(path, head)
+    return names is None or SAVED in names
 
 
 def read_ncorr(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read a frame for each picture."""
-    saved = _only(path, read_variables(path, [SAVED]), SAVED)
-    about = _only(path, saved, "dispinfo")
+    saved = _required_struct(path, read_variables(path, [SAVED]), SAVED)
+    info = _required_struct(path, saved, "dispinfo")
     frames = saved.get("displacements")
     if not isinstance(frames, list) or not frames or not isinstance(frames[0], dict):
         raise InputError(path, SAVED, "expected displacements of frames")
-    spacing, scale = (_number(path, about, name) for name in ("spacing", "pixtounits"))
-    unit = about.get("units")
+    spacing = _number(path, info, "spacing")
+    scale = _number(path, info, "pixtounits")
+    unit = info.get("units")
     step = (spacing + 1) * scale
     names = {"x": "column", "y": "row", "dx": "plot_u_ref_formatted", "dy": "plot_v_ref_formatted"}
     units = dict.fromkeys(names, unit if isinstance(unit, str) else "")
-    tables = (_correlated(path, one, step) for one in frames)
+    tables = (_correlated_points(path, frame, step) for frame in frames)
     return _frames(path, options, "ncorr", names, tables, units=units, camera_axes=True)
 
 
-def _correlated(path: Path, one: Mapping[str, Any], step: float) -> Array:
-    """Return x, y, u, v (points, 4) of a frame where it was correlated."""
-    u, v = (numbers_of(path, one, f"plot_{name}_ref_formatted") for name in "uv")
+def _correlated_points(path: Path, frame: Mapping[str, Any], step: float) -> Array:
+    """Return x, y, u, v (points, 4) of a frame where it was correlated; step: between points."""
+    u = numbers_of(path, frame, "plot_u_ref_formatted")
+    v = numbers_of(path, frame, "plot_v_ref_formatted")
     if u.shape != v.shape or u.ndim != 2:
         raise InputError(path, "displacements", f"u and v are {u.shape} and {v.shape}")
-    correlated = (u != 0) | (v != 0)
-    if isinstance(one.get("plot_corrcoef_dic"), np.ndarray):
-        coefficient = numbers_of(path, one, "plot_corrcoef_dic")
-        correlated = coefficient != 0 if coefficient.shape == u.shape else correlated
-    row, column = np.nonzero(correlated)
+    is_correlated = (u != 0) | (v != 0)
+    if isinstance(frame.get("plot_corrcoef_dic"), np.ndarray):
+        coefficient = numbers_of(path, frame, "plot_corrcoef_dic")
+        if coefficient.shape == u.shape:
+            is_correlated = coefficient != 0
+    row, column = np.nonzero(is_correlated)
     return np.column_stack([column * step, row * step, u[row, column], v[row, column]])
 
 
-def _only(path: Path, where: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    if not (found := _struct(where.get(name))):
+def _required_struct(path: Path, fields: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    struct = _struct(fields.get(name))
+    if not struct:
         raise InputError(path, name, "this struct is missing; is it a file that Ncorr saved?")
-    return found
+    return struct
 
 
 def _struct(value: Any) -> Mapping[str, Any]:
-    one = value[0] if isinstance(value, list) and len(value) == 1 else None
-    return one if isinstance(one, dict) else {}
+    """Return the fields of a struct; none of anything else."""
+    element = value[0] if isinstance(value, list) and len(value) == 1 else None
+    return element if isinstance(element, dict) else {}
 
 
-def _number(path: Path, where: Mapping[str, Any], name: str) -> float:
-    value = numbers_of(path, where, name)
+def _number(path: Path, fields: Mapping[str, Any], name: str) -> float:
+    value = numbers_of(path, fields, name)
     if value.size != 1 or not 0 <= value.flat[0] < 1e6:
         raise InputError(path, f"dispinfo.{name}", "expected one number, not below zero")
     return float(value.flat[0])
 
+
+# MultiDIC ---------------------------------------------------------------------------------------
 
 RESULTS = ("DIC3DPPresults", "DIC3DpairResults", "DIC3DAllPairsResults")
 
 
 def recognises_multidic(path: Path, head: bytes) -> bool:
     """Return whether a MAT-file holds one of the results."""
-    return not {*RESULTS}.isdisjoint(_variables(path, head) or ())
+    return not {*RESULTS}.isdisjoint(_variable_names(path, head) or ())
 
 
 def read_multidic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read a frame for each cell."""
-    there = read_variables(path, RESULTS)
-    results = next((_struct(there[name]) for name in RESULTS if name in there), {})
+    variables = read_variables(path, RESULTS)
+    results = next((_struct(variables[name]) for name in RESULTS if name in variables), {})
     points = results.get("Points3D")
-    moved = _struct(results.get("Disp")).get("DispVec")
-    if not isinstance(points, list) or not isinstance(moved, list) or len(points) != len(moved):
+    vectors = _struct(results.get("Disp")).get("DispVec")
+    if not isinstance(points, list) or not isinstance(vectors, list) or len(points) != len(vectors):
         raise InputError(path, "", "expected cells of Points3D and Disp.DispVec, one a frame")
-    for place, move in zip(points, moved, strict=True):
-        if not isinstance(place, np.ndarray) or not isinstance(move, np.ndarray):
-            raise InputError(path, "", "expected arrays in Points3D and DispVec")
-        if place.shape != move.shape or place.ndim != 2 or place.shape[1] != 3:
-            raise InputError(path, "", f"Points3D and DispVec are {place.shape} and {move.shape}")
-    names = dict.fromkeys(PLACES, "Points3D") | dict.fromkeys(MOVED, "DispVec")
-    tables = (np.hstack(pair).astype(float) for pair in zip(points, moved, strict=True))
+    pairs = list(zip(points, vectors, strict=True))
+    for pair in pairs:
+        _check_vectors(path, *pair)
+    names = dict.fromkeys(POSITIONS, "Points3D") | dict.fromkeys(DISPLACEMENTS, "DispVec")
+    tables = (np.hstack(pair).astype(float) for pair in pairs)
     return _frames(path, options, "multidic", names, tables)
 
+
+def _check_vectors(path: Path, points: Any, vectors: Any) -> None:
+    """Refuse what are not as many vectors as points, (n, 3)."""
+    if not isinstance(points, np.ndarray) or not isinstance(vectors, np.ndarray):
+        raise InputError(path, "", "expected arrays in Points3D and DispVec")
+    if points.shape != vectors.shape or points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(path, "", f"Points3D and DispVec are {points.shape} and {vectors.shape}")
+
+
+# Istra4D ----------------------------------------------------------------------------------------
 
 ISTRA = {
     **{f"{axis} deformed": f"coordinates/coordinate_{axis}" for axis in "xyz"},
@@ -192,28 +215,30 @@ def recognises_istra4d(path: Path, head: bytes) -> bool:
 def read_istra4d(path: Path, options: FrameOptions) -> Sequence[Frame]:
     """Read the one frame of a file."""
     mat_files.check_readable(path, partial(_datasets, path))
-    there = _datasets(path)
-    if len({value.size for value in there.values()}) > 1:
+    values = _datasets(path)
+    if len({value.size for value in values.values()}) > 1:
         raise InputError(path, "", "coordinates, displacements and mask are not of one size")
-    mask = there.pop("mask", None)
-    if not {"x deformed", "y deformed", "dx", "dy"} <= {*there}:
+    mask = values.pop("mask", None)
+    if not {"x deformed", "y deformed", "dx", "dy"} <= {*values}:
         problem = "expected coordinates/coordinate_x and so on: export coordinates, displacements"
         raise InputError(path, "", problem)
     valid = None if mask is None else np.asarray(mask != 0)
-    rows = FrameRows(there, {key: ISTRA[key] for key in there}, valid=valid)
+    rows = FrameRows(values, {key: ISTRA[key] for key in values}, valid=valid)
     return [frame_of(rows, options, path, "istra4d")]
 
 
 def _datasets(path: Path) -> dict[str, Array]:
-    """Read the arrays that there are, flat."""
+    """Read the arrays that the file has, flat."""
     with mat_files.open_hdf5(path) as file:
-        found = {key: mat_files.member(path, file, name) for key, name in ISTRA.items()}
+        items = {key: mat_files.member(path, file, name) for key, name in ISTRA.items()}
         return {
             key: mat_files.array_of(path, item, ISTRA[key]).ravel()
-            for key, item in found.items()
+            for key, item in items.items()
             if item is not None
         }
 
+
+# pyALDIC-3D -------------------------------------------------------------------------------------
 
 ARCHIVE = b"PK\x03\x04"
 
@@ -227,38 +252,47 @@ def array_names(path: Path) -> list[str]:
         return []
 
 
-def read_arrays(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
-    """Read the arrays of these names, those that there are; no Python objects."""
+def read_arrays(path: Path, names: Collection[str]) -> dict[str, np.ndarray]:
+    """Read the arrays of these names that the file has; no Python objects."""
     with mat_files.library_errors(path, "an .npz archive"), zipfile.ZipFile(path) as archive:
-        there = {one.filename: one for one in archive.infolist()}
-        members = {name: there[f"{name}.npy"] for name in wanted if f"{name}.npy" in there}
-        return {name: _array(path, archive, one, name) for name, one in members.items()}
+        members = {member.filename: member for member in archive.infolist()}
+        return {
+            name: _read_array(path, archive, members[f"{name}.npy"], name)
+            for name in names
+            if f"{name}.npy" in members
+        }
 
 
-def _array(path: Path, archive: zipfile.ZipFile, one: zipfile.ZipInfo, name: str) -> np.ndarray:
-    with archive.open(one) as stream:
+def _read_array(
+    path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, name: str
+) -> np.ndarray:
+    """Read one array, after checks of what its header says."""
+    with archive.open(member) as stream:
         version = npy.read_magic(stream)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = read(stream)
+        is_version_1 = version == (1, 0)
+        read_header = npy.read_array_header_1_0 if is_version_1 else npy.read_array_header_2_0
+        shape, is_fortran, dtype = read_header(stream)
         if dtype.kind not in "fiubU":
             problem = "holds Python objects or records, which are not read: save plain numbers"
             raise InputError(path, f"array {name!r}", problem)
         size = math.prod(shape) * dtype.itemsize
-        most = min(LARGEST, one.file_size, max(SMALL, RATIO * one.compress_size))
-        if min(shape, default=0) < 0 or size > most:
+        max_size = min(LARGEST, member.file_size, max(SMALL, RATIO * member.compress_size))
+        if min(shape, default=0) < 0 or size > max_size:
             problem = f"says {shape} numbers, more than the file holds; is it damaged?"
             raise InputError(path, f"array {name!r}", problem)
         content = stream.read(size)
     if len(content) < size:
         raise InputError(path, f"array {name!r}", "ends early; is the file damaged?")
-    return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran else "C")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C")
 
 
 def recognises_pyaldic(path: Path, head: bytes) -> bool:
     """Return whether points3D is among the arrays, or x_px and X_mm among the headings."""
     if head.startswith(ARCHIVE):
         return "points3D" in array_names(path)
-    return "points3D" in (_variables(path, head) or ()) or head.startswith(b"x_px,y_px,X_mm")
+    if head.startswith(b"x_px,y_px,X_mm"):
+        return True
+    return "points3D" in (_variable_names(path, head) or ())
 
 
 def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
@@ -268,34 +302,42 @@ def read_pyaldic(path: Path, options: FrameOptions) -> Sequence[Frame]:
     if not head.startswith(ARCHIVE) and not is_mat(head):
         deformed = options if options.coordinates else replace(options, coordinates="deformed")
         return read_text(path, deformed, "pyaldic", camera_axes=True)
-    there = (read_variables if is_mat(head) else read_arrays)(path, ("points3D", *"UVW"))
-    points = there.get("points3D")
-    if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:
-        raise InputError(path, "points3D", "expected places (frames, points, 3)")
-    if points.dtype.kind not in "fiu" or not points.size:
-        raise InputError(path, "points3D", "expected numbers, found none")
-    points = points.astype(float)
-    moved = points - points[0]
-    for i, name in enumerate("UVW"):
-        given = there.get(name)
-        if given is not None and given.shape != points.shape[:2]:
-            problem = f"is {given.shape}, points3D {points.shape}: expected one a point and frame"
+    read = read_variables if is_mat(head) else read_arrays
+    arrays = read(path, ("points3D", *"UVW"))
+    points = _points_of_frames(path, arrays)
+    displacements = points - points[0]
+    for component, name in enumerate("UVW"):
+        values = arrays.get(name)
+        if values is None:
+            continue
+        if values.shape != points.shape[:2]:
+            problem = f"is {values.shape}, points3D {points.shape}: expected one a point and frame"
             raise InputError(path, name, problem)
-        if given is not None:
-            moved[:, :, i] = given.astype(float)
-    names = dict.fromkeys(PLACES, "points3D") | dict(zip(MOVED, "UVW", strict=True))
-    tables = np.concatenate([points, moved], axis=2)
+        displacements[:, :, component] = values.astype(float)
+    names = dict.fromkeys(POSITIONS, "points3D") | dict(zip(DISPLACEMENTS, "UVW", strict=True))
+    tables = np.concatenate([points, displacements], axis=2)
     units = dict.fromkeys(names, "mm")
     return _frames(path, options, "pyaldic", names, tables, units=units, camera_axes=True)
 
 
-for one in (
-    Format("vic3d-mat", "frame", "MAT-files of VIC-3D", read_vic3d, recognises_vic3d),
-    Format("ncorr", "frame", "MAT-files of Ncorr (planar)", read_ncorr, recognises_ncorr),
-    Format(
-        "multidic", "frame", "MAT-files of MultiDIC, DuoDIC", read_multidic, recognises_multidic
-    ),
-    Format("istra4d", "frame", "HDF5 of Istra4D", read_istra4d, recognises_istra4d),
-    Format("pyaldic", "frame", "npz, mat or CSV of pyALDIC-3D", read_pyaldic, recognises_pyaldic),
-):
-    register_format(one)
+def _points_of_frames(path: Path, arrays: Mapping[str, Any]) -> Array:
+    """Return the positions (frames, points, 3) in each frame."""
+    points = arrays.get("points3D")
+    if not isinstance(points, np.ndarray) or points.ndim != 3 or points.shape[2] != 3:
+        raise InputError(path, "points3D", "expected places (frames, points, 3)")
+    if points.dtype.kind not in "fiu" or not points.size:
+        raise InputError(path, "points3D", "expected numbers, found none")
+    return points.astype(float)
+
+
+register_format(Format("vic3d-mat", "frame", "MAT-files of VIC-3D", read_vic3d, recognises_vic3d))
+register_format(
+    Format("ncorr", "frame", "MAT-files of Ncorr (planar)", read_ncorr, recognises_ncorr)
+)
+register_format(
+    Format("multidic", "frame", "MAT-files of MultiDIC, DuoDIC", read_multidic, recognises_multidic)
+)
+register_format(Format("istra4d", "frame", "HDF5 of Istra4D", read_istra4d, recognises_istra4d))
+register_format(
+    Format("pyaldic", "frame", "npz, mat or CSV of pyALDIC-3D", read_pyaldic, recognises_pyaldic)
+)

@@ -96,11 +96,16 @@ def read_dice(path: Path, options: FrameOptions, format: str) -> Sequence[Frame]
     if NAMES["x"] not in top and not options.columns:
         problem = f"has no {NAMES['x']}: planar and in pixels; run DICe with a stereo calibration"
         raise InputError(path, "", problem)
-    good = "STATUS_FLAG", SUCCESSFUL
-    # Without a stereo model, of columns that the user names, the model's are not asked for.
-    names = {key: name for key, name in NAMES.items() if name in top}
-    settings = {"comment": "***", "names": names, "status": good, "camera_axes": True}
-    return read_text(path, options, format, **settings)
+    return read_text(
+        path,
+        options,
+        format,
+        comment="***",
+        # Without a stereo model, of columns that the user names, the model's are not required.
+        names={key: name for key, name in NAMES.items() if name in top},
+        status=("STATUS_FLAG", SUCCESSFUL),
+        camera_axes=True,
+    )
 
 
 for name, title, read in (
@@ -110,5 +115,5 @@ for name, title, read in (
     ("vic3d", "CSV of VIC-3D", partial(read_text, upper=True)),
     ("dice", "solution files of DICe", read_dice),
 ):
-    known = partial(is_headed, name)
-    register_format(Format(name, "frame", title, partial(read, format=name), known))
+    recognises = partial(is_headed, name)
+    register_format(Format(name, "frame", title, partial(read, format=name), recognises))

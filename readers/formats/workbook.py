@@ -17,27 +17,32 @@ from ..machine_tables import MachineTable, TableOptions
 from ..quantities import MAX_COLUMNS
 from ..registry import Format, register_format
 
-#: Bytes of a workbook, and of all its parts unpacked; cells of a sheet.
-LARGEST, UNPACKED, MOST_CELLS = 50 * 2**20, 500 * 2**20, 5_000_000
+#: Bytes of a workbook at most.
+LARGEST = 50 * 2**20
+#: Bytes of all its parts at most, unpacked.
+UNPACKED = 500 * 2**20
+#: Cells of a sheet at most.
+MOST_CELLS = 5_000_000
 
 
 def read(path: Path, options: TableOptions) -> MachineTable:
     """Read the table of the sheet that is named, else of the one sheet that has such a table."""
-    sheets = _sheets(path, options.sheet)
-    heads = {name: find_header(rows, options) for name, rows in sheets.items()}
-    able = [name for name, index in heads.items() if index is not None]
-    if len(able) != 1:
-        required = quantity_words(options)
+    sheets = _read_sheets(path, options.sheet)
+    headers = {name: find_header(rows, options) for name, rows in sheets.items()}
+    headers_found = {name: index for name, index in headers.items() if index is not None}
+    if len(headers_found) != 1:
         listed = ", ".join(map(repr, sheets))
-        problem = f"no sheet has a row of names with {required}; it has: {listed}"
-        if able:
-            problem = f"several sheets have such a table, {', '.join(map(repr, able))}; say sheet"
+        problem = f"no sheet has a row of names with {quantity_words(options)}; it has: {listed}"
+        if headers_found:
+            listed = ", ".join(map(repr, headers_found))
+            problem = f"several sheets have such a table, {listed}; say sheet"
         raise InputError(path, "", problem)
-    return table_from_rows(path, sheets[able[0]], heads[able[0]] or 0, options)
+    ((name, header_index),) = headers_found.items()
+    return table_from_rows(path, sheets[name], header_index, options)
 
 
-def _sheets(path: Path, wanted: str | None) -> dict[str, Rows]:
-    """Return the rows of each sheet, or of the one that is wanted; cells as text."""
+def _read_sheets(path: Path, sheet: str | None) -> dict[str, Rows]:
+    """Return the rows of each sheet, or of the one of this name; cells as text."""
     from openpyxl import load_workbook
 
     content = BytesIO(content_of(path, LARGEST))
@@ -49,11 +54,12 @@ def _sheets(path: Path, wanted: str | None) -> dict[str, Rows]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and links, which are not read
             book = load_workbook(content, read_only=True, data_only=True, keep_links=False)
-            names = [sheet.title for sheet in book.worksheets]
-            if wanted is not None and wanted not in names:
-                problem = f"there is no sheet {wanted!r}; there are: {', '.join(map(repr, names))}"
+            names = [sheet_of_book.title for sheet_of_book in book.worksheets]
+            if sheet is not None and sheet not in names:
+                listed = ", ".join(map(repr, names))
+                problem = f"there is no sheet {sheet!r}; there are: {listed}"
                 raise InputError(path, "sheet", problem)
-            return {name: _rows(path, book[name]) for name in names if wanted in (None, name)}
+            return {name: _read_rows(path, book[name]) for name in names if sheet in (None, name)}
     except InputError:
         raise
     except Exception as error:  # whatever openpyxl and the parser make of a broken archive
@@ -61,25 +67,25 @@ def _sheets(path: Path, wanted: str | None) -> dict[str, Rows]:
         raise InputError(path, "", problem) from None
 
 
-def _rows(path: Path, sheet: Any) -> Rows:
+def _read_rows(path: Path, sheet: Any) -> Rows:
     """Return number and cells of each row that is not empty."""
     sheet.reset_dimensions()  # what a file says of its size may be wrong
-    found: Rows = []
-    cells = 0
+    rows: Rows = []
+    count = 0
     for number, row in enumerate(sheet.iter_rows(max_col=MAX_COLUMNS, values_only=True), start=1):
-        cells += len(row) + 1
-        if cells > MOST_CELLS:
+        count += len(row) + 1
+        if count > MOST_CELLS:
             raise InputError(path, "", f"a sheet has more than {MOST_CELLS} cells; save it as CSV")
-        text = ["" if cell is None else str(cell).strip() for cell in row]
-        if any(text):
-            found.append(Row(number, text))
-    return found
+        cells = ["" if cell is None else str(cell).strip() for cell in row]
+        if any(cells):
+            rows.append(Row(number, cells))
+    return rows
 
 
 def recognises(path: Path, head: bytes) -> bool:
     """Return whether a file is an archive, and a workbook by its name or its parts."""
-    named = path.suffix.lower() in (".xlsx", ".xlsm")
-    return head.startswith(b"PK\x03\x04") and (named or b"xl/" in head)
+    is_named = path.suffix.lower() in (".xlsx", ".xlsm")
+    return head.startswith(b"PK\x03\x04") and (is_named or b"xl/" in head)
 
 
 register_format(Format("xlsx", "machine table", "a sheet of a workbook (Excel)", read, recognises))

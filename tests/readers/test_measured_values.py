@@ -12,7 +12,7 @@ from bubblefit.readers.formats import text_exports
 from bubblefit.readers.frame_choice import REPEATED, choose_frames
 from bubblefit.readers.frames import Frame, FrameOptions, read_frames
 from bubblefit.readers.machine_tables import Channel, in_unit
-from bubblefit.readers.numbers_in_names import check_pattern, number_in_name
+from bubblefit.readers.numbers_in_names import check_pattern, number_in_name, picture_numbers
 from bubblefit.readers.pressure_log import apex_height, read_pressure_log
 from bubblefit.readers.quantities import means, nearest_to_strip
 from bubblefit.readers.units import (
@@ -200,6 +200,16 @@ def test_surfaces_that_cannot_be():
         (field, -1, "degree: expected 0 to 12, got -1"), (field, 13, "degree: expected 0 to 12"),
     ):  # fmt: skip
         assert complaint(fit_surface, bad, degree).startswith(words)
+
+
+def test_numbers_of_frames_that_are_none(tmp_path):
+    path = tmp_path / "all.csv"
+    path.write_text("x;frame;p [bar]\n1;1;0.2\n2;two;0.3\n")
+    words = "line 3, column 'frame': expected a number, found 'two'"
+    complaint_with([words], values_in_file, path, Channel("p"), PRESSURE_UNITS)
+    # Of one frame, or of frames that are all called alike, no picture is missing.
+    assert picture_numbers([path], [5.0]) == (np.zeros(1), [])
+    assert len(picture_numbers([path], [5.0, 5.0])[1]) == 1
 
 
 def test_the_height_of_the_apex():

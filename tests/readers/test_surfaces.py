@@ -12,14 +12,12 @@ from bubblefit.readers.fields import (
     PLAIN,
     DisplacementField,
     DisplacementSurface,
-    _linear,
-    fit_sphere,
     fit_surface,
-    points_of,
     read_fields,
     surface_table,
 )
 from bubblefit.readers.frames import Frame
+from bubblefit.readers.spheres import _fit_algebraic, fit_sphere, points_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -135,7 +133,7 @@ def test_a_perfect_ball_is_found_exactly(radius, half, seed):
     np.testing.assert_allclose(found.centre, CENTRE, atol=rounding + 1e-9 * radius)
     assert found.left_out == 0 and found.rms < rounding + 1e-9 * radius
     # The first guess is exact without noise.
-    centre, linear = _linear(cap(count=12)[0])
+    centre, linear = _fit_algebraic(cap(count=12)[0])
     np.testing.assert_allclose([*centre, linear], [*CENTRE, 40.0], rtol=1e-9)
 
 
@@ -158,7 +156,7 @@ def test_the_linear_fit_is_too_small_by_noise():
     for seed in range(60):
         points, ways, draw = cap(seed=seed)
         noisy = points + 0.5 * draw.normal(size=(len(ways), 1)) * ways
-        linear.append(_linear(noisy)[1])
+        linear.append(_fit_algebraic(noisy)[1])
         least.append(fit_sphere(noisy).radius)
     assert np.mean(linear) == pytest.approx(40 * (1 - 0.015), abs=0.15)
     assert np.mean(least) == pytest.approx(40.0, abs=0.15)
@@ -170,7 +168,7 @@ def test_outliers_are_left_out():
     points[:30] += 3.0 * ways[:30]
     points[30] = [0.0, 0.0, 0.0]
     found = fit_sphere(points)
-    assert not found.kept[:31].any() and found.left_out < 36
+    assert not found.is_used[:31].any() and found.left_out < 36
     assert found.radius == pytest.approx(40.0, abs=4 * found.radius_error)
     assert found.deviation[5] == pytest.approx(3.0, abs=0.1)
     assert "10 points or more, got 9" in complaint(fit_sphere, cap(count=9)[0])
@@ -197,11 +195,11 @@ def test_points_that_are_kept_are_those_near_the_sphere_through_them():
         found = fit_sphere(points)
         off, arms = np.abs(found.deviation), points - found.centre
         lengths = np.linalg.norm(arms, axis=1)
-        np.testing.assert_array_equal(found.kept, off <= 4 * np.median(off) / 0.6744897501960817)
+        np.testing.assert_array_equal(found.is_used, off <= 4 * np.median(off) / 0.6744897501960817)
         assert 3 < found.left_out < 20
         np.testing.assert_allclose(found.deviation, lengths - found.radius)
         # Least squares: the deviations of what is kept have no mean, and no way to lean.
-        left, kept = found.deviation[found.kept], (arms / lengths[:, None])[found.kept]
+        left, kept = found.deviation[found.is_used], (arms / lengths[:, None])[found.is_used]
         assert left.sum() == pytest.approx(0.0, abs=1e-8)
         np.testing.assert_allclose(kept.T @ left, 0.0, atol=1e-8)
         assert found.rms == pytest.approx(np.sqrt(np.mean(left**2)))

@@ -1,0 +1,185 @@
+"""Spheres through measured points (Eq. A.6): the check of a camera on a ball of known radius."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .frames import Array, Frame
+
+#: A sphere has four unknowns; points fewer than so many say nothing of how well it fits.
+MIN_POINTS = 10
+#: Median of |normal deviate|.
+MEDIAN_DEVIATE = 0.6744897501960817
+
+
+@dataclass(frozen=True)
+class SphereSearch:
+    """Settings of a robust fit of a sphere.
+
+    Attributes
+    ----------
+    flatness : float
+        Of the extent of points in their plane: thinner ones are flat for any noise.
+    max_radius : float
+        Of the points' extent: a larger radius is noise of points in a plane.
+    max_deviation : float
+        Robust standard deviations beyond which a point is left out.
+    max_rounds : int
+        How often points are left out anew.
+    trials, trial_points : int
+        So many spheres, through so many points each, are tried for a start.
+    judging_points : int
+        The trials are judged by so many points.
+    """
+
+    flatness: float = 1e-9
+    max_radius: float = 100.0
+    max_deviation: float = 4.0
+    max_rounds: int = 20
+    trials: int = 200
+    trial_points: int = 8
+    judging_points: int = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """The sphere through some points.
+
+    Attributes
+    ----------
+    centre : (3,) array, mm
+    radius : float, mm
+    centre_error : (3,) array, mm
+        One standard deviation.
+    radius_error : float, mm
+    deviation : (n,) array, mm
+        Distances of the points beyond the sphere.
+    is_used : (n,) array of bool
+        Points that are not too far off.
+    points : (n, 3) array, mm
+    path : Path or None
+    """
+
+    centre: Array
+    radius: float
+    centre_error: Array
+    radius_error: float
+    deviation: Array
+    is_used: NDArray[np.bool_]
+    points: Array
+    path: Path | None = None
+
+    @property
+    def rms(self) -> float:
+        """Return the RMS deviation of the points used, mm."""
+        return float(np.sqrt(np.mean(self.deviation[self.is_used] ** 2)))
+
+    @property
+    def left_out(self) -> int:
+        """Return the number of points too far off to be used."""
+        return int((~self.is_used).sum())
+
+
+def points_of(frame: Frame) -> Array:
+    """Return the surface (n, 3) mm in a frame: reference positions, displaced where known."""
+    is_displaced = np.isfinite(frame.displacement).any()
+    positions = frame.points + frame.displacement if is_displaced else frame.points
+    return np.asarray(positions[np.isfinite(positions).all(axis=1)])
+
+
+def fit_sphere(
+    points: Array, path: Path | None = None, search: SphereSearch = SphereSearch()
+) -> Sphere:
+    """Fit a sphere to points by least squares of distance, without those that are far off.
+
+    Parameters
+    ----------
+    points : (n, 3) array, mm
+    path : Path, optional
+        File, for messages.
+    search : SphereSearch
+
+    Raises
+    ------
+    InputError
+        The points are too few, or lie in a plane.
+    """
+    if len(points) < MIN_POINTS:
+        raise InputError(path, "", f"expected {MIN_POINTS} points or more, got {len(points)}")
+    spans = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if spans[2] <= search.flatness * spans[0]:
+        raise InputError(path, "", "the points lie in a plane, or on a line: no sphere is told")
+    is_used = _is_near(points, *_start(points, search), search)
+    for _ in range(search.max_rounds):
+        centre, radius = _fit_distances(points[is_used], search, path)
+        is_near = _is_near(points, centre, radius, search)
+        if (is_near == is_used).all():
+            break
+        is_used = is_near
+    deviation = np.linalg.norm(points - centre, axis=1) - radius
+    jacobian = _jacobian(points[is_used], centre)
+    variance = float(np.sum(deviation[is_used] ** 2)) / (int(is_used.sum()) - 4)
+    errors = np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    return Sphere(centre, radius, errors[:3], float(errors[3]), deviation, is_used, points, path)
+
+
+def _start(points: Array, search: SphereSearch) -> tuple[Array, float]:
+    """Return the best of spheres through a few points each: stray points spoil that of all."""
+    draw = np.random.default_rng(0)
+    judges = points[draw.permutation(len(points))[: search.judging_points]]
+    spheres = []
+    for _ in range(search.trials):
+        chosen = draw.choice(len(points), search.trial_points, replace=False)
+        spheres.append(_fit_algebraic(points[chosen]))
+    spheres.append(_fit_algebraic(points))
+    medians = [
+        np.median(np.abs(np.linalg.norm(judges - centre, axis=1) - radius))
+        for centre, radius in spheres
+    ]
+    return spheres[int(np.argmin(medians))]
+
+
+def _is_near(
+    points: Array, centre: Array, radius: float, search: SphereSearch
+) -> NDArray[np.bool_]:
+    """Return the mask (n,) of points that are not too far off."""
+    distance = np.abs(np.linalg.norm(points - centre, axis=1) - radius)
+    deviation = search.max_deviation * float(np.median(distance)) / MEDIAN_DEVIATE
+    # Points without noise are off by rounding: none of them is astray.
+    return np.asarray(distance <= max(deviation, 1e-9 * radius))
+
+
+def _fit_algebraic(points: Array) -> tuple[Array, float]:
+    """Solve Eq. A.6, about the mean of the points so that it is well conditioned."""
+    mean = points.mean(axis=0)
+    x = points - mean
+    matrix = np.column_stack([2 * x, np.ones(len(x))])
+    solution = np.linalg.lstsq(matrix, np.sum(x**2, axis=1), rcond=None)[0]
+    centre = solution[:3]
+    return mean + centre, float(np.sqrt(max(solution[3] + centre @ centre, 0.0)))
+
+
+def _jacobian(points: Array, centre: Array) -> Array:
+    """Return (n, 4) d distance / d (centre, radius)."""
+    arms = points - centre
+    lengths = np.linalg.norm(arms, axis=1)
+    return np.column_stack([-arms / lengths[:, None], -np.ones(len(points))])
+
+
+def _fit_distances(points: Array, search: SphereSearch, path: Path | None) -> tuple[Array, float]:
+    """Return centre and radius of least squares of distance, by Gauss-Newton steps."""
+    centre, radius = _fit_algebraic(points)
+    for _ in range(100):
+        distance = np.linalg.norm(points - centre, axis=1) - radius
+        step = np.linalg.lstsq(_jacobian(points, centre), -distance, rcond=None)[0]
+        centre = centre + step[:3]
+        radius = radius + float(step[3])
+        if np.linalg.norm(step) <= 1e-12 * max(abs(radius), 1.0):
+            break
+    if not 0 < radius < search.max_radius * float(np.ptp(points, axis=0).max()):
+        problem = "the points are so nearly in a plane that no sphere is told by them"
+        raise InputError(path, "", problem)
+    return centre, radius
