@@ -51,7 +51,7 @@ def test_every_content_has_one_format_that_takes_what_no_other_recognises(tmp_pa
     for read in (lambda p: read_frames([p]), read_load_curves, read_published_polynomials):
         assert "no such file" in complaint(read, tmp_path / "a.csv")
     for read in (read_load_curves, read_published_polynomials):
-        assert "cannot be read" in complaint(read, tmp_path)
+        assert "is a folder" in complaint(read, tmp_path)
 
 
 def test_a_file_is_read_by_what_recognises_it(tmp_path, own):
