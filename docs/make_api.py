@@ -26,7 +26,8 @@ PAGES: dict[str, tuple[str, tuple[str, ...]]] = {
          "project.project:read_project,Project", "runs.fit:fit", "runs.check:check",
          "runs.result:Fit",
          "runs.simulation", "runs.predictions:predict,Predictions",
-         "experiments.cycles.evaluation:cycles,Cycles,EvaluatedHistory,CycleValues",
+         "experiments.cycles.evaluation:cycles,Cycles",
+         "experiments.cycles.values:EvaluatedHistory,CycleValues",
          "materials.card:MaterialCard,read_card,write_card,thickness_difference"),
     ),
     "studies": (

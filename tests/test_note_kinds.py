@@ -15,7 +15,7 @@ import pytest
 from bubblefit.cli.fits import lines_of
 from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
-from bubblefit.experiments.cycles.evaluation import CHANGING, DRIFT, GRIPS, SLIP
+from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SLIP
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import (
     BEYOND_CARD,

@@ -38,7 +38,9 @@ from ..kinds import Array, MakeSolver, Masks, Place, PreparedTest, Reach, Sectio
 from ..measured import MeasuredKind, PreparedParts
 from ..strips.prepared import LoadObjective
 from ..strips.test import FilesSection
-from .evaluation import EvaluatedHistory, evaluate_history, matched_rows, scatter_notes
+from .doubts import scatter_notes
+from .evaluation import evaluate_history
+from .values import EvaluatedHistory, matched_rows
 
 #: mm of a gauge whose length does not matter.
 GAUGE_LENGTH = 100.0

@@ -12,7 +12,7 @@ import pytest
 from bubblefit.cli.fits import warning_lines
 from bubblefit.errors import GRAVE, SOLVER, Note, gravest
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, SURFACES
-from bubblefit.experiments.cycles.evaluation import SLIP
+from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.kinds import DOUBTFUL, READING, UNSTABLE
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY

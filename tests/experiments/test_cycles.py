@@ -16,14 +16,9 @@ import pytest
 from bubblefit import cycles
 from bubblefit.experiments import kinds
 from bubblefit.experiments.cycles import specimen_of
-from bubblefit.experiments.cycles.evaluation import (
-    DRIFT,
-    SLIP,
-    evaluate_history,
-    fit_cycles,
-    left_out,
-    scatter_notes,
-)
+from bubblefit.experiments.cycles.doubts import DRIFT, SLIP, scatter_notes
+from bubblefit.experiments.cycles.evaluation import evaluate_history
+from bubblefit.experiments.cycles.memory_fit import fit_cycles, left_out
 from bubblefit.materials.card import MaterialCard, write_card
 from bubblefit.materials.forms.spline import Spline
 from bubblefit.materials.law import HypoelasticLaw, law_slopes

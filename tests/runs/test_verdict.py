@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bubblefit.errors import Note
 from bubblefit.experiments.bubble.findings import FLAT_SHEET
-from bubblefit.experiments.cycles.evaluation import SLIP
+from bubblefit.experiments.cycles.doubts import SLIP
 from bubblefit.experiments.kinds import DOUBTFUL, UNSTABLE
 from bubblefit.inference.assessment import BOUND, MARGIN, UNCERTAIN
 from bubblefit.inference.discrepancy import DISCREPANCY, Discrepancy, describe

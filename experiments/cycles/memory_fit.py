@@ -1,0 +1,329 @@
+"""A loading curve with a memory, fitted to a load history; cycles predicted by the others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ...files import pandas as pd
+from ...materials.forms.spline import Spline
+from ...materials.law import HypoelasticLaw, law_slopes
+from ...materials.memory import NAMES, QUANTITIES, Memory, own_stress
+from ...readers.histories import passage
+from ..kinds import Array
+from .values import CRITERIA, EvaluatedHistory, matched_rows, tangent_stiffness
+
+
+@dataclass(frozen=True)
+class CycleFitSettings:
+    """Settings of a fit of a loading curve and a memory to a history."""
+
+    knots: int = 8  # of the tangent of the loading curve
+    tangent_bounds: tuple[float, float] = (1e-4, 1e2)  # of the mean stiffness
+    largest_set: float = 0.99
+    largest_unloading: float = 1.99  # U, which R stays below
+    largest_saturation: float = 100.0
+    slip_bounds: tuple[float, float] = (-0.1, 0.3)  # of the largest strain
+    slip_step: float = 1e-7  # of central differences by slip, of the largest strain
+    initial_memory: tuple[float, ...] = (0.3, 1.4, 0.4, 0.1)  # set, U, share of R, saturation
+    tolerance: float = 1e-14
+    max_evaluations: int = 400
+    driven_points: int = 400  # along a branch that is predicted
+
+
+CYCLE_FIT = CycleFitSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCycles:
+    """A loading curve with unloading and reloading, fitted to a history (`materials/memory.py`).
+
+    Parameters
+    ----------
+    knots, stiffness : (k,) arrays
+        Strains, and the tangent of the loading curve there, N, above the reference load.
+    memory : (4,) array
+        Set, unloading, reloading, saturation, in the order of `memory.QUANTITIES`.
+    slip : mapping of int to float
+        Strain that the extensometer lost before each later cycle.
+    sigma : (k + 4 + slips,) array
+        One standard deviation each, of independent readings.
+    rows : (n,) array of int
+        Readings that are followed.
+    strain, load : (n,) arrays
+        Strains of the law at them, and modelled loads, N.
+    rms : float
+        Of the readings that were fitted, N.
+    law : HypoelasticLaw
+        The fitted law.
+    """
+
+    knots: Array
+    stiffness: Array
+    memory: Array
+    slip: Mapping[int, float]
+    sigma: Array
+    rows: NDArray[np.intp]
+    strain: Array
+    load: Array
+    rms: float
+    law: HypoelasticLaw
+
+    @property
+    def remembered(self) -> list[tuple[str, float, float]]:
+        """Return name, value and one sigma of each constant of the memory."""
+        sigma = self.sigma[len(self.knots) :].tolist()
+        return list(zip(QUANTITIES, self.memory.tolist(), sigma, strict=False))
+
+    def driven(self, before: int, peak: float, level: float) -> tuple[Array, ...]:
+        """Return a loading to a peak and the unloading after it, by the load as of a machine.
+
+        Parameters
+        ----------
+        before : int
+            Number of the readings that precede the loading.
+        peak : float
+            N.
+        level : float
+            Load at which strains and loads of the law begin, N.
+
+        Returns
+        -------
+        strain_up, load_up, strain_down, load_down : arrays
+            Of loading and unloading, N.
+        """
+        path = self.strain[:before]
+        branches: list[Array] = []
+        for end in (self.law.strain_range[0], 0.0):
+            strain = np.linspace(path[-1], end, CYCLE_FIT.driven_points)
+            load = _stress(self.law, np.r_[path, strain[1:]])[len(path) - 1 :] + level
+            i, strain_at_peak = passage(load, strain, peak if end else -np.inf)
+            if i >= 0:
+                strain = np.r_[strain[: i + 1], strain_at_peak]
+                load = np.r_[load[: i + 1], peak]
+            branches += [strain, load]
+            path = np.r_[path, strain[1:]]
+        return tuple(branches)
+
+
+def _stress(law: HypoelasticLaw, strain: Array) -> Array:
+    """Return the stress of a law along a history of strain."""
+    return own_stress(law.pieces, law.coupling, 0, strain, *law_slopes(law, [], 1.0))[0]
+
+
+class CycleFit:
+    """The least squares problem of a loading curve, a memory and slips of an extensometer.
+
+    The unknowns x are the tangent at the knots over the mean stiffness; set, unloading U, the share
+    of U - 1 that R - 1 is (so that the reloading R stays below U), saturation; slips over the
+    largest strain. Readings count from the first passage of the reference load to the last, in
+    strain and load, each branch with the same weight.
+
+    Parameters
+    ----------
+    evaluated : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+    leave : int
+        Number of a cycle that is not fitted; its slip is that of the next one.
+    """
+
+    def __init__(self, evaluated: EvaluatedHistory, knots: int, leave: int) -> None:
+        history = evaluated.history
+        start, end = matched_rows(evaluated)
+        self.rows = np.arange(start, end + 1)
+        self.strain = history.strain[self.rows] - evaluated.zero
+        self.load = history.load[self.rows] - evaluated.reference
+        cycle_starts = [v.cycle.start for v in evaluated.values]
+        number = np.searchsorted(cycle_starts, self.rows, "right")
+        self.weight = self._branch_weights(evaluated, number, leave)
+        last = len(evaluated.values)
+        with_next = leave if leave == last else leave + 1
+        self.slipped = [k for k in range(2, last + 1) if k != with_next]
+        self.has_slipped = (number[:, None] >= self.slipped).astype(float)
+        self.top = float(self.strain[self.weight > 0].max())
+        no_knots = [0.0, 1.0]
+        strains = np.linspace(0.0, self.top, knots).tolist()
+        self.form = Spline.at([strains, no_knots, no_knots])
+        self.knots = knots
+        self.shared = knots + len(QUANTITIES)
+        self.mean = float(self.load.max()) / self.top
+        tangents = range(self.form.size - knots, self.form.size)  # E1 comes last
+        self.names = [*(f"beta_{i}" for i in tangents), *NAMES[: len(QUANTITIES)]]
+
+    def _branch_weights(
+        self, evaluated: EvaluatedHistory, number: NDArray[np.intp], leave: int
+    ) -> Array:
+        """Return the weight (n,) of each reading, by its branch; 0 in the cycle that is left."""
+        weight = np.zeros(len(self.rows))
+        for v in evaluated.values:
+            for side in (self.rows < v.cycle.peak, self.rows >= v.cycle.peak):
+                is_branch = side & (number == v.cycle.number) & (v.cycle.number != leave)
+                weight[is_branch] = 1.0 / (v.peak * math.sqrt(max(int(is_branch.sum()), 1)))
+        return weight
+
+    def law_at(self, x: Array) -> HypoelasticLaw:
+        """Return the law of unknowns."""
+        permanent, unloading, share, saturation = x[self.knots : self.shared]
+        reloading = 1.0 + share * (unloading - 1.0)
+        unused = [0, 1, 1, 0] * 2
+        memory = Memory.of([permanent, unloading, reloading, saturation / self.top, *unused])
+        others = np.full(self.form.size - self.knots, self.mean)
+        beta = np.r_[others, self.mean * x[: self.knots]]
+        strain_range = np.array([self.top, 1, 1])
+        return HypoelasticLaw(beta, 0.0, strain_range, form=self.form, memory=memory)
+
+    def strain_at(self, x: Array) -> Array:
+        """Return the strains (n,) of the law, with what the extensometer has lost."""
+        return np.maximum(self.strain + self.top * self.has_slipped @ x[self.shared :], 0.0)
+
+    def residual(self, x: Array) -> Array:
+        """Return the weighted residuals (n,)."""
+        return self.weight * (_stress(self.law_at(x), self.strain_at(x)) - self.load)
+
+    def jacobian(self, x: Array) -> Array:
+        """Return the derivatives (n, unknowns) of the residuals; by slip central differences."""
+        knots = self.knots
+        law, strain = self.law_at(x), self.strain_at(x)
+        slopes = law_slopes(law, self.names, 1.0)
+        by_constants = own_stress(law.pieces, law.coupling, 0, strain, *slopes)[1]
+        unloading, share = x[knots + 1 : knots + 3]
+        chain = np.diag([*[self.mean] * knots, 1.0, 1.0, unloading - 1.0, 1.0 / self.top])
+        chain[knots + 2, knots + 1] = share
+        by_slip = []
+        step = CYCLE_FIT.slip_step
+        for direction in np.eye(len(x))[self.shared :]:
+            above = _stress(law, self.strain_at(x + step * direction))
+            below = _stress(law, self.strain_at(x + -step * direction))
+            by_slip.append((above - below) / (2 * step))
+        return self.weight[:, None] * np.column_stack([by_constants @ chain, *by_slip])
+
+    def solve(self) -> Any:
+        """Return the result of `scipy.optimize.least_squares`."""
+        settings, count = CYCLE_FIT, len(self.slipped)
+        low_tangent, high_tangent = settings.tangent_bounds
+        low_slip, high_slip = settings.slip_bounds
+        low = [*[low_tangent] * self.knots, 0.0, 1.0, 0.0, 0.0, *[low_slip] * count]
+        largest = settings.largest_set, settings.largest_unloading, 1.0, settings.largest_saturation
+        high = [*[high_tangent] * self.knots, *largest, *[high_slip] * count]
+        begin = [*[1.0] * self.knots, *settings.initial_memory, *[0.0] * count]
+        return scipy.optimize.least_squares(
+            self.residual,
+            begin,
+            self.jacobian,
+            bounds=(low, high),
+            xtol=settings.tolerance,
+            ftol=settings.tolerance,
+            gtol=settings.tolerance,
+            max_nfev=settings.max_evaluations,
+        )
+
+    def sigma(self, best: Any) -> Array:
+        """Return one standard deviation of each constant, of independent readings."""
+        freedom = max(int((self.weight > 0).sum()) - len(best.x), 1)
+        variance = 2 * best.cost / freedom
+        unloading = best.x[self.knots + 1]
+        scale = np.r_[
+            np.full(self.knots, self.mean),
+            1.0,
+            1.0,
+            unloading - 1.0,
+            1.0 / self.top,
+            np.full(len(self.slipped), self.top),
+        ]
+        covariance = np.linalg.pinv(best.jac.T @ best.jac)
+        return scale * np.sqrt(variance * np.diag(covariance))
+
+
+def fit_cycles(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int = 0) -> FittedCycles:
+    """Fit a loading curve and a memory to the cycles of a history.
+
+    Parameters
+    ----------
+    one : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+    leave : int
+        Number of a cycle that is not fitted; 0: all are.
+
+    Returns
+    -------
+    FittedCycles
+        With what an extensometer has lost by slip before each later cycle; a cycle that is left
+        out has that of the next one.
+    """
+    problem = CycleFit(one, knots, leave)
+    best = problem.solve()
+    law, strain = problem.law_at(best.x), problem.strain_at(best.x)
+    load = _stress(law, strain)
+    is_fitted = problem.weight > 0
+    slips = (problem.top * best.x[problem.shared :]).tolist()
+    constants = law.memory.constants[: len(QUANTITIES)] if law.memory else ()
+    return FittedCycles(
+        knots=np.array(problem.form.knots[0]),
+        stiffness=problem.mean * best.x[:knots],
+        memory=np.array(constants),
+        slip=dict(zip(problem.slipped, slips, strict=True)),
+        sigma=problem.sigma(best),
+        rows=problem.rows,
+        strain=strain,
+        load=load + one.reference,
+        rms=float(np.sqrt(np.mean((load - problem.load)[is_fitted] ** 2))),
+        law=law,
+    )
+
+
+def left_out(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFrame:
+    """Return each cycle beside its prediction by a fit to the others.
+
+    Predicted are strains at the loads, as a machine that follows loads would find them: stiffness
+    and permanent strain, without slip.
+
+    Parameters
+    ----------
+    one : EvaluatedHistory
+        What is fitted.
+    knots : int
+        Of the tangent of the loading curve.
+
+    Returns
+    -------
+    DataFrame
+        A row a cycle, but of the first and of one that alone reaches its load: no others could
+        predict them.
+    """
+    rows = []
+    for v in one.values:
+        number = v.cycle.number
+        other_peaks = [w.peak for w in one.values if w is not v]
+        if (
+            number == 1
+            or v.peak > (1 + CRITERIA.same_peak) * max(other_peaks)
+            or math.isnan(v.permanent)
+        ):
+            continue
+        fitted = fit_cycles(one, knots, leave=number)
+        before = int(np.searchsorted(fitted.rows, v.cycle.start))
+        strain_up, load_up, strain_down, load_down = fitted.driven(before, v.peak, one.reference)
+        row: dict[str, Any] = {"file": one.history.path.name, "cycle": number}
+        branches = {"EA_loading": (load_up, strain_up), "EA_unloading": (load_down, strain_down)}
+        for name, (load, strain) in branches.items():
+            measured, predicted = getattr(v, name), tangent_stiffness(load, strain, v.peak)
+            row |= {f"{name}_N": measured, f"{name}_predicted_N": predicted}
+            row[f"{name}_off_percent"] = 100 * (predicted / measured - 1)
+        permanent = passage(load_down, strain_down, one.reference)[1]
+        row |= {
+            "permanent_strain": v.permanent,
+            "permanent_strain_predicted": permanent,
+            "permanent_strain_off": permanent - v.permanent,
+        }
+        rows.append(row)
+    return pd.DataFrame(rows)
