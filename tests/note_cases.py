@@ -14,6 +14,7 @@ import pytest
 from bubblefit.errors import InputError, Note, NoteKind, SolverFailure
 from bubblefit.experiments import kinds
 from bubblefit.experiments.bubble.findings import warnings_of
+from bubblefit.experiments.cycles.doubts import scatter_notes
 from bubblefit.experiments.kinds import notes_of, state_said
 from bubblefit.experiments.strips.gauge import GaugeTable, virtual_strain_gauge
 from bubblefit.inference.assessment import certainty
@@ -273,8 +274,9 @@ def notes_of_cycles(folder: Path, _: Any) -> list[Note]:
     time, load, strain = load_cycles.made()
     travel = folder / "travel.csv"
     load_cycles.write(travel, ["Time (s),Load (N),Crosshead (mm)"], (time, load, 200 * strain))
-    faulty = list(load_cycles.faulty(folder).values())
-    return [*bf.cycles(faulty).notes, *bf.cycles(travel, length=200.0).notes]
+    faulty = bf.cycles(list(load_cycles.faulty(folder).values()))
+    scatter = scatter_notes({"warp": faulty.histories, "fill": faulty.histories[:1]})
+    return [*faulty.notes, *scatter, *bf.cycles(travel, length=200.0).notes]
 
 
 def notes_of_states(*_: Any) -> list[Note]:

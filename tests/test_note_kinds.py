@@ -15,7 +15,7 @@ import pytest
 from bubblefit.cli.fits import lines_of
 from bubblefit.errors import FEW, SOLVER, Note, NoteKind, lines
 from bubblefit.experiments.bubble.findings import FLAT_SHEET, INVERSE_CRIME, SURFACES
-from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SLIP
+from bubblefit.experiments.cycles.doubts import CHANGING, DRIFT, GRIPS, SCATTER, SLIP
 from bubblefit.experiments.cylinder import report as cylinders
 from bubblefit.experiments.kinds import (
     BEYOND_CARD,
@@ -129,6 +129,8 @@ CASES = (
     (SLIP, made.notes_of_cycles, r"at the peak of cycle 2 0\.0004 less strain than in cycle 1"),
     (DRIFT, made.notes_of_cycles, "the strain moves by 2e-05 a second before the load does"),
     (GRIPS, made.notes_of_cycles, "strains are travel of the machine"),
+    (SCATTER, made.notes_of_cycles, "4 specimens of the warp scatter: on loading in cycle"),
+    (SCATTER, made.notes_of_cycles, "one specimen of the fill: how much specimens scatter"),
     (CHANGING, made.notes_of_cycles, r"lost\.csv: no cycle repeats the one before"),
     (STATES, made.notes_of_states,
      r"bubble: first loading, one: conditioned, three: first loading\): one law is not both"),
