@@ -343,9 +343,9 @@ def prepare_tube(model: TubeModel, law: HypoelasticLaw, tolerance: float, wall: 
         model.thickness,
         law,
         np.arange(12),
-        Whole(),
+        Whole(),  # type: ignore[arg-type]
         tolerance,
-        step_limit=np.inf,  # type: ignore[arg-type]
+        step_limit=np.inf,
     )
 
 
