@@ -1019,7 +1019,7 @@ class FitAudit:
                 rows.append([label, *cells])
             # Between the fit's strains the band is interpolated: its last digit may differ.
             ledger.table(WORDS[name], ["strain", "MPa", "kN/m"], rows, "recomputed", digits=3,
-                         slack=2e-3)  # fmt: skip
+                         slack=1e-5)  # fmt: skip
             self._drawn_modulus(name)
             rest = float(card.modulus(name, 0.0)), float(card.modulus(name, end))
             ledger.text(rf"^{name}, [^:]*: from {NUM} MPa at rest to {NUM} MPa at {NUM} %",
@@ -1413,7 +1413,7 @@ class FitAudit:
             found = (match[2], match[3], match[6], match[7], match[8])
             for digits, number, right in zip((3, 4, 4, 4, 4), found, expected, strict=True):
                 if number is not None:
-                    self.ledger.compare_text(place, number, right, digits, 2e-3)
+                    self.ledger.compare_text(place, number, right, digits, 1e-5)
             told = percent(sigma) if sigma < 0.999 * PRIOR else "unknown"
             if match[4] not in (told, "not known") and not _near(match[4], told):
                 self.ledger.find(place, f"1 sigma is {match[4]}; expected {told}")
