@@ -449,8 +449,8 @@ def height_flipped(view: View, expected: Expected) -> Iterator[Doubt]:
     slope = flattened_share(view.last, view.outline, LIMITS)
     if slope is not None and slope > LIMITS.height_slope:
         text = (
-            f"dz follows the bumps of the heights z by {slope:+.0%} at {view.top} kPa, and a sheet "
-            "that is pulled flat has -100%: change the sign of z"
+            f"dz follows the bumps of the heights z by {slope:+.0%} at {view.top} kPa, but a sheet "
+            "that is pulled flat loses them: change the sign of z"
         )
         yield Doubt("height-flipped", False, text)
 
