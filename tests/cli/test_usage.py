@@ -334,11 +334,12 @@ def test_simulate_with_a_card(study, tmp_path, golden):
     assert result["apex_mm"] == sorted(result["apex_mm"])
     table = pd.read_csv(tmp_path / "sim/displacement.csv")
     assert table["dz_mm"].max() == pytest.approx(max(result["apex_mm"]), rel=1e-6)
-    # A negative G12: the solver fails.
+    # A negative G12 is refused before any analysis.
     values = ", ".join(map(str, [0, 0, 0, -1e-3, 0, 0, 0, 0.1, 0, 0, 0, 0.1]))
     bad = re.sub(r"beta = \[.*?\]", f"beta = [{values}]", card.read_text(), flags=re.S)
     (tmp_path / "bad.toml").write_text(bad)
-    in_process(*run[:4], tmp_path / "bad.toml", "--out", "none", cwd=tmp_path, code=4)
+    done = in_process(*run[:4], tmp_path / "bad.toml", "--out", "none", cwd=tmp_path, code=2)
+    one_line(done, "bad.toml", "G12 is -1 MPa")
     assert not (tmp_path / "none").exists()
 
 
