@@ -316,6 +316,7 @@ def audit_bootstrap(folder, ledger):
                 lambda match: [min(map(len, groups.values()))], needed=False)  # fmt: skip
     ledger.text(r"(\d+) samples: the ends of the bands", [result["samples"]], needed=False)
     _bootstrap_charts(ledger, table, result)
+    _named_parts(folder, ledger, [unit for units in groups.values() for unit in units])
     audit_notes(folder, ledger)
 
 
@@ -833,6 +834,7 @@ def audit_validate(folder, ledger):
         _words_of_test(ledger, row, rows)
     _validate_relative(folder, ledger, rows)
     beyond_range(ledger, {})
+    _named_parts(folder, ledger, [row["test"] for row in rows])
     audit_notes(folder, ledger)
 
 
@@ -890,6 +892,20 @@ def largest_loads(folder):
         for specimen, own in points.groupby("specimen"):
             most[f"{test}: {direction}, specimen {specimen}", compared] = own["load"].max()
     return most
+
+
+def _named_parts(folder, ledger, names):
+    """Check pressures in names of frames against the project, and claim names of parts."""
+    kpa = {"kPa": 1.0, "MPa": 1e3, "bar": 100.0, "Pa": 1e-3}
+    unit = kpa[folder.project.get("units", {}).get("pressure", "kPa")]
+    known = [
+        unit * p for test in folder.project.get("bubble", []) for p in test.get("pressures", [])
+    ]
+    for name in dict.fromkeys(names):
+        match = re.search(rf"{N} kPa$", name)
+        if match and known and not np.isclose(float(match[1]), known, rtol=1e-3).any():
+            ledger.find(name, f"is none of the pressures {known} kPa")
+        claim_literal(ledger, name)
 
 
 def audit_weights(folder, ledger):
