@@ -210,12 +210,14 @@ def _audit_run(folder, ledger, k, run, own, curves):
         inside = place <= reached * (1 + 1e-9)
         loads[name] = float(np.interp(place, d, load)) if inside else None
     ledger.json((*at, "load_N"), loads)
-    sigma = dict.fromkeys(loads)
+    sigma, spread = dict.fromkeys(loads), np.zeros(len(d))
     if "load_sigma_N" in own and own["load_sigma_N"].notna().any():
         spread = own["load_sigma_N"].to_numpy(float)
         sigma = {name: float(np.interp(place, d, spread)) if loads[name] is not None else None
                  for name, place in test["places_mm"].items()}  # fmt: skip
     ledger.json((*at, "load_sigma_N"), sigma)
+    row |= {"over": over, "spread": spread,
+            "sigma_at": lambda place: float(np.interp(place, d, np.nan_to_num(spread)))}  # fmt: skip
     top = knee[1] if knee else load.max()
     straight = straight_of(d, load, top)
     if straight is None:
@@ -442,11 +444,12 @@ def _band(value, rows, row, key, form):
     others = [own for own in rows if not own["run"]["predicted"]]
     same = [o for o in others if all(o["run"][k] == run[k] for k in ("test", "card"))]
     other = same[0] if same else None
-    if any(v is not None for v in row["sigma"].values()):
-        return None
-    ends = [value]
+    place = row["over"] if key == "stiffness" else row[key][0]
+    off = 1.959964 * row["sigma_at"](place) / (row["over"] if key == "stiffness" else 1.0)
+    ends = [value - off, value + off]
     if other is not None and other.get(key) is not None:
-        ends.append(other[key] if key == "stiffness" else other[key][1])
+        end = other[key] if key == "stiffness" else other[key][1]
+        ends += [end - off, end + off]
     low, high = f"{min(ends):{form}}", f"{max(ends):{form}}"
     return "\u2013" if low == high else f"{low} to {high}"
 
@@ -615,15 +618,58 @@ def _audit_words(folder, ledger, rows):
             point = row[key]
             sentence_of = (
                 rf"{name} none up to {row['reached']:g} mm" if point is None
-                else rf"{name} at {point[1]:.0f}( \(\d+ to \d+\))? N and {point[0]:.0f} mm"
+                else rf"{name} at {point[1]:.0f}{_in_words(row, rows, key)} N and {point[0]:.0f} mm"
             )  # fmt: skip
             if run["predicted"]:
-                _claim_pattern(ledger, rf"{re.escape(sentence)}[^;.]*?{sentence_of}")
+                band = _band(row["stiffness"], rows, row, "stiffness", ".3g")
+                band = "" if band == "\u2013" else rf" \({re.escape(band)}\)"
+                _claim_pattern(ledger, rf"{re.escape(sentence)}{band} N/mm[^;]*?{sentence_of}")
         if folder.terminal:
             _terminal_row(ledger, row, result)
     _audit_charts(ledger, rows)
+    _audit_spread(folder, ledger, rows)
     for text in (f"{run['test']} with {run['card']}" for run in result["runs"]):
         claim_literal(ledger, text)
+
+
+def _in_words(row, rows, key):
+    band = _band(row[key][1], rows, row, key, ".0f")
+    return "" if band == "\u2013" else rf" \({re.escape(band)}\)"
+
+
+def _audit_spread(folder, ledger, rows):
+    """Check what is said of the spread by the cards, and of a braid's angle."""
+    own = [row for row in rows if "loads" in row and np.nanmax(row["spread"]) > 0]
+    shares = [float(np.nanmax(row["spread"]) / row["load"].max()) for row in own]
+    if shares:
+        ledger.text(
+            r"off by up to ([\d.]+ %) of the largest \(one standard", [percent(max(shares))]
+        )
+    laws = cards_of(folder, set(folder.result["cards"]))
+    counts = {min(4, len(law.directions)) for law in laws.values() if law.directions}
+    ledger.text(r"(\d+) of its least certain directions",
+                lambda match: [int(match[1]) if int(match[1]) in counts else -1], needed=False)  # fmt: skip
+    ledger.text(r"(\d+) % by (?:what )?the card", [95], needed=False)
+    angles = [s["wall"]["angle"] for s in folder.project.get("cylinder", [])
+              if isinstance(s.get("wall"), dict) and "angle" in s["wall"]]  # fmt: skip
+
+    def braid(match):
+        near = [a for a in angles if np.isclose(a, float(match[1]), atol=0.06)]
+        return [near[0] if near else -1, np.degrees(np.arctan(np.sqrt(2)))]
+
+    ledger.text(rf"braid's {N} degrees are near {N}", braid, digits=3, needed=False)
+    changes = []
+
+    def change(match):
+        changes.append(float(match[3]))
+        places = {p for t in folder.result["tests"].values() for p in t["places_mm"].values()}
+        return [match[1], float(match[2]) if float(match[2]) in places else -1, None]
+
+    words = rf"half a degree (less|more) changes the load at {N} mm by {N} %"
+    ledger.text(words, change, digits=6, needed=False)
+    _claim_pattern(ledger, words)
+    if changes and np.prod(np.sign(changes[:2])) > 0:
+        ledger.find("braid", f"less and more of the angle change the load alike: {changes[:2]}")
 
 
 def _audit_charts(ledger, rows):

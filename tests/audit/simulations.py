@@ -35,6 +35,7 @@ def cards_of(folder, names):
                 thickness=card.get("thickness", fabric.get("thickness")),
                 ends={name: np.inf for name in MODULI},
             )
+            found[card["name"]].directions = []
     places = [folder.base.glob(f"{depth}*.toml") for depth in ("", "*/", "*/*/")]
     for path in sorted({*itertools.chain(*places), *folder.path.glob("*/material.toml")}):
         law = _card_file(path)
@@ -58,6 +59,7 @@ def _card_file(path):
         return None
     law = Law.of_card(card)
     law.name = card.get("name", "")
+    law.directions = card.get("certainty", {}).get("directions", [])
     law.thickness_change = card.get("thickness_change", "constant")
     return law
 
