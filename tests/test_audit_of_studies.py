@@ -17,9 +17,11 @@ from .audit_disturbances import (
     disturbed,
 )
 from .commands import in_process
-from .cylinder_cases import STOPS, Formula, write_project, write_readings
+from .cylinder_cases import STOPS, Banded, Formula, write_project, write_readings
+from .experiments.cylinder.test_section import BEAM
 from .projects import constant_strips, small
 
+PLACES = 'measured.files = ["read.csv"]\nplaces'
 CARD = ("--card", "out/material.toml")
 #: By the folder that a command leaves: what is typed beside a fit of constant strips. Further
 #: ones are audited where their golden files are compared.
@@ -137,6 +139,30 @@ def test_a_simulated_bubble_is_audited(bubble, tmp_path):
 @pytest.fixture
 def formula(monkeypatch):
     monkeypatch.setitem(registry.SOLVERS, "formula", Formula)
+    monkeypatch.setitem(registry.SOLVERS, "banded", Banded)
+
+
+@pytest.mark.usefixtures("formula")
+def test_bands_of_bent_cylinders_by_card_and_wall_are_audited(ran, tmp_path):
+    folder, _ = ran("profile")
+    (tmp_path / "made.toml").write_text((folder / "out" / "material.toml").read_text())
+    project = write_project(tmp_path)
+    text = project.read_text().replace('solver = "formula"', 'solver = "banded"')
+    project.write_text(text.replace("thickness = 0.81", "thickness = 0.8"))
+    run = ("bend", project, "--card", "made.toml", "--out", "out", "--quiet", "--jobs", 1)
+    printed = in_process(*run, "--test", "high", cwd=tmp_path).stdout
+    ledger = audit(tmp_path / "out", terminal=printed, base=tmp_path)
+    assert [str(finding) for finding in ledger.findings] == []
+
+
+def test_a_braided_beam_is_audited(tmp_path):
+    text = BEAM.replace("angle = 65.0", "angle = 56.5").replace("places", PLACES)
+    (tmp_path / "project.toml").write_text(text)
+    (tmp_path / "read.csv").write_text("deflection [mm],load [N]\n0,0\n20,200\n40,400\n")
+    printed = in_process("bend", "project.toml", "--out", "out", "--quiet", cwd=tmp_path).stdout
+    ledger = audit(tmp_path / "out", terminal=printed, base=tmp_path)
+    assert [str(finding) for finding in ledger.findings] == []
+    assert "half a degree" in printed
 
 
 @pytest.mark.usefixtures("formula")

@@ -216,8 +216,9 @@ def _audit_run(folder, ledger, k, run, own, curves):
         sigma = {name: float(np.interp(place, d, spread)) if loads[name] is not None else None
                  for name, place in test["places_mm"].items()}  # fmt: skip
     ledger.json((*at, "load_sigma_N"), sigma)
-    row |= {"over": over, "spread": spread,
-            "sigma_at": lambda place: float(np.interp(place, d, np.nan_to_num(spread)))}  # fmt: skip
+    known = np.nan_to_num(spread)
+    row |= {"over": over, "spread": spread}
+    row["sigma_at"] = lambda place: float(np.interp(place, d, known))
     top = knee[1] if knee else load.max()
     straight = straight_of(d, load, top)
     if straight is None:
@@ -228,7 +229,7 @@ def _audit_run(folder, ledger, k, run, own, curves):
     strains = run["inflation_strain"]
     ledger.claim_json((*at, "inflation_strain"), "consistent")
     for name in ("warp", "fill"):
-        if strains["body"][name] > strains["with_seam_and_ends"][name] * (1 + 1e-9):
+        if strains["body"][name] > strains["with_seam_and_ends"][name] + 1e-9:
             ledger.find(f"runs {k}: inflation_strain", f"{name} of the body exceeds the whole")
     _inflation(folder, ledger, k, run, test)
     _gas(folder, ledger, k, pressure, volume, test)
@@ -647,8 +648,11 @@ def _audit_spread(folder, ledger, rows):
         )
     laws = cards_of(folder, set(folder.result["cards"]))
     counts = {min(4, len(law.directions)) for law in laws.values() if law.directions}
-    ledger.text(r"(\d+) of its least certain directions",
-                lambda match: [int(match[1]) if int(match[1]) in counts else -1], needed=False)  # fmt: skip
+
+    def directions(match):
+        return [int(match[1]) if int(match[1]) in counts else -1]
+
+    ledger.text(r"(\d+) of its least certain directions", directions, needed=False)
     ledger.text(r"(\d+) % by (?:what )?the card", [95], needed=False)
     angles = [s["wall"]["angle"] for s in folder.project.get("cylinder", [])
               if isinstance(s.get("wall"), dict) and "angle" in s["wall"]]  # fmt: skip
