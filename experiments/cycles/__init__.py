@@ -115,14 +115,14 @@ class Specimen:
         return f"{self.direction} {self.evaluated.name}"
 
 
-def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Specimen:
+def specimen_of(direction: str, evaluated: EvaluatedHistory, increments: int) -> Specimen:
     """Return a history thinned to a number of readings a branch; its turning points stay as read.
 
     Parameters
     ----------
     direction : str
         Warp, fill or bias.
-    found : EvaluatedHistory
+    evaluated : EvaluatedHistory
         The whole history.
     increments : int
         Readings of a branch, at most.
@@ -132,14 +132,14 @@ def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Spe
     InputError
         If no reading lies above the reference load.
     """
-    history = found.history
-    strain, load = history.strain - found.zero, history.load - found.reference
-    start, end = matched_rows(found)
+    history = evaluated.history
+    strain, load = history.strain - evaluated.zero, history.load - evaluated.reference
+    start, end = matched_rows(evaluated)
     row = np.arange(len(load))
     is_matched = (row >= start) & (row <= end) & (strain > MIN_STRAIN)
     readings: list[tuple[float, float, int, int]] = []
     last_strain = 0.0
-    for v in found.values:
+    for v in evaluated.values:
         branches = [slice(v.cycle.start, v.cycle.peak + 1)]
         if v.cycle.unloaded:
             branches.append(slice(v.cycle.peak, v.cycle.end + 1))
@@ -152,17 +152,17 @@ def specimen_of(direction: str, found: EvaluatedHistory, increments: int) -> Spe
                     readings.append((mean_strain, mean_load, branch, v.cycle.number))
                     last_strain = mean_strain
     if not readings:
-        problem = f"no reading above the reference load of {found.reference:g} N"
+        problem = f"no reading above the reference load of {evaluated.reference:g} N"
         raise InputError(history.path, "load", problem)
     strains, loads, branch_numbers, cycle_numbers = zip(*readings, strict=True)
     return Specimen(
         direction=direction,
-        evaluated=found,
+        evaluated=evaluated,
         strain=np.array(strains),
         load=np.array(loads),
         branch=np.array(branch_numbers).astype(np.intp),
         cycle=np.array(cycle_numbers).astype(np.intp),
-        leaves=_predictable_cycles(found),
+        leaves=_predictable_cycles(evaluated),
     )
 
 

@@ -81,12 +81,12 @@ class FittedCycles:
         sigma = self.sigma[len(self.knots) :].tolist()
         return list(zip(QUANTITIES, self.memory.tolist(), sigma, strict=False))
 
-    def driven(self, before: int, peak: float, level: float) -> tuple[Array, ...]:
+    def driven(self, preceding: int, peak: float, level: float) -> tuple[Array, ...]:
         """Return a loading to a peak and the unloading after it, by the load as of a machine.
 
         Parameters
         ----------
-        before : int
+        preceding : int
             Number of the readings that precede the loading.
         peak : float
             N.
@@ -98,7 +98,7 @@ class FittedCycles:
         strain_up, load_up, strain_down, load_down : arrays
             Of loading and unloading, N.
         """
-        path = self.strain[:before]
+        path = self.strain[:preceding]
         branches: list[Array] = []
         for end in (self.law.strain_range[0], 0.0):
             strain = np.linspace(path[-1], end, CYCLE_FIT.driven_points)
@@ -242,12 +242,14 @@ class CycleFit:
         return scale * np.sqrt(variance * np.diag(covariance))
 
 
-def fit_cycles(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int = 0) -> FittedCycles:
+def fit_cycles(
+    evaluated: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int = 0
+) -> FittedCycles:
     """Fit a loading curve and a memory to the cycles of a history.
 
     Parameters
     ----------
-    one : EvaluatedHistory
+    evaluated : EvaluatedHistory
         What is fitted.
     knots : int
         Of the tangent of the loading curve.
@@ -260,7 +262,7 @@ def fit_cycles(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int =
         With what an extensometer has lost by slip before each later cycle; a cycle that is left
         out has that of the next one.
     """
-    problem = CycleFit(one, knots, leave)
+    problem = CycleFit(evaluated, knots, leave)
     best = problem.solve()
     law, strain = problem.law_at(best.x), problem.strain_at(best.x)
     load = _stress(law, strain)
@@ -275,13 +277,13 @@ def fit_cycles(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots, leave: int =
         sigma=problem.sigma(best),
         rows=problem.rows,
         strain=strain,
-        load=load + one.reference,
+        load=load + evaluated.reference,
         rms=float(np.sqrt(np.mean((load - problem.load)[is_fitted] ** 2))),
         law=law,
     )
 
 
-def left_out(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFrame:
+def left_out(evaluated: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFrame:
     """Return each cycle beside its prediction by a fit to the others.
 
     Predicted are strains at the loads, as a machine that follows loads would find them: stiffness
@@ -289,7 +291,7 @@ def left_out(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFram
 
     Parameters
     ----------
-    one : EvaluatedHistory
+    evaluated : EvaluatedHistory
         What is fitted.
     knots : int
         Of the tangent of the loading curve.
@@ -301,25 +303,27 @@ def left_out(one: EvaluatedHistory, knots: int = CYCLE_FIT.knots) -> pd.DataFram
         predict them.
     """
     rows = []
-    for v in one.values:
+    for v in evaluated.values:
         number = v.cycle.number
-        other_peaks = [w.peak for w in one.values if w is not v]
+        other_peaks = [w.peak for w in evaluated.values if w is not v]
         if (
             number == 1
             or v.peak > (1 + CRITERIA.same_peak) * max(other_peaks)
             or math.isnan(v.permanent)
         ):
             continue
-        fitted = fit_cycles(one, knots, leave=number)
-        before = int(np.searchsorted(fitted.rows, v.cycle.start))
-        strain_up, load_up, strain_down, load_down = fitted.driven(before, v.peak, one.reference)
-        row: dict[str, Any] = {"file": one.history.path.name, "cycle": number}
+        fitted = fit_cycles(evaluated, knots, leave=number)
+        preceding = int(np.searchsorted(fitted.rows, v.cycle.start))
+        strain_up, load_up, strain_down, load_down = fitted.driven(
+            preceding, v.peak, evaluated.reference
+        )
+        row: dict[str, Any] = {"file": evaluated.history.path.name, "cycle": number}
         branches = {"EA_loading": (load_up, strain_up), "EA_unloading": (load_down, strain_down)}
         for name, (load, strain) in branches.items():
             measured, predicted = getattr(v, name), tangent_stiffness(load, strain, v.peak)
             row |= {f"{name}_N": measured, f"{name}_predicted_N": predicted}
             row[f"{name}_off_percent"] = 100 * (predicted / measured - 1)
-        permanent = passage(load_down, strain_down, one.reference)[1]
+        permanent = passage(load_down, strain_down, evaluated.reference)[1]
         row |= {
             "permanent_strain": v.permanent,
             "permanent_strain_predicted": permanent,
