@@ -11,11 +11,14 @@ VARIABLE = "BUBBLEFIT_DISTURBED"
 
 
 def disturb_data(monkeypatch, share, seed=1):
-    """Multiply what strips and bubbles are fitted to by 1 + share * N(0, 1), value by value."""
-    random = np.random.default_rng(seed)
+    """Multiply what strips and bubbles are fitted to by 1 - share to 1 + share, value by value.
+
+    The same data are disturbed alike whenever they are read.
+    """
 
     def disturbed(values):
-        return values * (1.0 + share * random.standard_normal(values.shape))
+        random = np.random.default_rng([seed, values.size])
+        return values * (1.0 + share * random.uniform(-1.0, 1.0, values.shape))
 
     def disturbed_curves(*arguments, read=strips.read_load_curves, **options):
         curves = read(*arguments, **options)
