@@ -206,8 +206,8 @@ def test_what_is_not_a_card_is_said_in_one_line(tmp_path, content):
     path = tmp_path / "material.toml"
     path.write_bytes(content)
     assert str(path) in complaint(read_card, path)
-    for unreadable in (tmp_path / "none.toml", tmp_path):
-        assert "cannot be read" in complaint(read_card, unreadable)
+    assert "cannot be read" in complaint(read_card, tmp_path / "none.toml")
+    assert "is a folder; name a file" in complaint(read_card, tmp_path)
 
 
 ENDS = [0.1, 0.12, 0.2]

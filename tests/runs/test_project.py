@@ -258,7 +258,7 @@ def test_data_folders_by_test(tmp_path):
 
 def test_unreadable_files(tmp_path):
     assert "bubblefit init" in complaint(read_project, tmp_path / "none.toml")
-    assert "cannot be read" in complaint(read_project, tmp_path)
+    assert "is a folder; name a file" in complaint(read_project, tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     assert "UTF-8" in complaint(read_project, tmp_path / "binary.toml")
 
