@@ -179,17 +179,24 @@ def in_base_units(
     """
     converted = dict(table)
     for key, value in table.items():
-        field = section.model_fields.get(key)
-        if field is None:
-            continue  # of a form of the moduli: a strain or a count
-        marks = [*field.metadata, *_marks(field.annotation)]
-        unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
-        inner = next(_sections(field.annotation), None)
+        unit, model = _unit_and_model(section, key)
         if unit is not None:
             converted[key] = _scaled(value, getattr(scales, unit.name))
-        elif inner is not None:
-            converted[key] = _tables_in_base_units(inner, value, scales)
+        elif model is not None:
+            converted[key] = _tables_in_base_units(model, value, scales)
     return converted
+
+
+def _unit_and_model(
+    section: type[BaseModel], key: str
+) -> tuple[Unit | None, type[BaseModel] | None]:
+    """Return the unit that a key is marked with, and the model of the table below it."""
+    field = section.model_fields.get(key)
+    if field is None:
+        return None, None  # of a form of the moduli: a strain or a count
+    marks = [*field.metadata, *_marks(field.annotation)]
+    unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
+    return unit, next(_sections(field.annotation), None)
 
 
 def _tables_in_base_units(section: type[BaseModel], value: Any, scales: Any) -> Any:
@@ -200,27 +207,39 @@ def _tables_in_base_units(section: type[BaseModel], value: Any, scales: Any) -> 
 
 
 def unit_doubts(
-    section: type[BaseModel], said: Mapping[str, Any], scales: Any, at: str = ""
+    section: type[BaseModel], table: Mapping[str, Any], scales: Any, at: str = ""
 ) -> Iterator[tuple[str, str]]:
-    """Yield (dotted key, problem) of numbers of a table that seem to be in another unit.
+    """Yield the numbers of a table that seem to be in another unit.
 
-    scales : MPa, or mm, per unit by the names of `Unit`, and names of units (`pressure_unit`).
+    Parameters
+    ----------
+    section : type
+        Model of the table.
+    table : mapping
+    scales : Scales
+        MPa, or mm, per unit by the names of `Unit`, and names of units (`pressure_unit`).
+    at : str
+        Dotted key of the table.
+
+    Yields
+    ------
+    key : str
+        Dotted key of the number.
+    problem : str
     """
-    for key, value in said.items():
-        if (field := section.model_fields.get(key)) is None:
-            continue
-        dotted_key = f"{at}.{key}" if at else key
-        several = value if isinstance(value, (list, tuple)) else [value]
-        inside = next(_sections(field.annotation), None)
-        marks = [*field.metadata, *_marks(field.annotation)]
-        unit = next((mark for mark in marks if isinstance(mark, Unit)), None)
-        for number, item in enumerate(several):
-            item_key = dotted_key if several is not value else f"{dotted_key}[{number}]"
-            if isinstance(item, Mapping) and inside is not None:
-                yield from unit_doubts(inside, item, scales, item_key)
+    for key, value in table.items():
+        unit, model = _unit_and_model(section, key)
+        is_list = isinstance(value, (list, tuple))
+        for number, item in enumerate(value if is_list else [value]):
+            item_key = f"{at}.{key}" if at else key
+            if is_list:
+                item_key += f"[{number}]"
+            if isinstance(item, Mapping) and model is not None:
+                yield from unit_doubts(model, item, scales, item_key)
             elif isinstance(item, (int, float)) and unit is not None and unit.quantity is not None:
-                name, scale = getattr(scales, f"{unit.name}_unit"), getattr(scales, unit.name)
-                if problem := unit_doubt(unit.quantity, item, name, scale):
+                unit_name = getattr(scales, f"{unit.name}_unit")
+                problem = unit_doubt(unit.quantity, item, unit_name, getattr(scales, unit.name))
+                if problem:
                     yield item_key, problem
 
 

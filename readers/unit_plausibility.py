@@ -18,18 +18,24 @@ Quantity = Literal["pressure", "size", "thickness"]
 class PlausibleRange:
     """Limits of a quantity in its base unit (MPa or mm), and the middle of its usual values.
 
-    units : sizes of units in the base unit, of those that numbers are mistaken for.
+    Attributes
+    ----------
+    lowest, highest, usual : float
+    units : mapping
+        Sizes in the base unit of the units that numbers are mistaken for.
+    remark : str
+        What is said of a number above the highest.
     """
 
-    least: float
-    most: float
+    lowest: float
+    highest: float
     usual: float
     units: Mapping[str, float] = field(repr=False)
     remark: str = ""
 
     def holds(self, value: float) -> bool:
         """Return whether a value in the base unit lies between the limits."""
-        return self.least <= value <= self.most
+        return self.lowest <= value <= self.highest
 
 
 PRESSURES = {name: PRESSURE_UNITS[name] for name in ("Pa", "mbar", "kPa", "bar", "MPa")}
@@ -58,10 +64,13 @@ def unit_doubt(quantity: Quantity, number: float, unit: str, scale: float) -> st
     value = number * scale
     if not value > 0 or limits.holds(value):
         return ""
-    high = value > limits.most
-    limit = (limits.most if high else limits.least) / scale
-    problem = f"expected {unit}, at {'most' if high else 'least'} {limit:g}, got {number:g}"
-    problem += limits.remark if high else ""
+    if value > limits.highest:
+        limit = f"most {limits.highest / scale:g}"
+    else:
+        limit = f"least {limits.lowest / scale:g}"
+    problem = f"expected {unit}, at {limit}, got {number:g}"
+    if value > limits.highest:
+        problem += limits.remark
     candidates = {
         name: abs(log(number * size / limits.usual))
         for name, size in limits.units.items()
@@ -69,17 +78,21 @@ def unit_doubt(quantity: Quantity, number: float, unit: str, scale: float) -> st
     }
     if not candidates:
         return problem
-    meant = min(candidates, key=lambda name: candidates[name])
-    factor = scale / limits.units[meant]
+    likely = min(candidates, key=lambda name: candidates[name])
+    factor = scale / limits.units[likely]
     remedy = f"Divide by {factor:g}" if factor > 1 else f"Multiply by {1 / factor:g}"
-    return f"{problem}; is this in {meant}? {remedy}"
+    return f"{problem}; is this in {likely}? {remedy}"
 
 
 #: Mistaken units of pressure, by the factor by which pressures are then too high.
 MISTAKES = {
-    1e3: "kPa given as MPa, or Pa as kPa", 1e2: "kPa given as bar", 1e1: "bar given as MPa",
-    1e-1: "MPa given as bar", 1e-2: "bar given as kPa", 1e-3: "MPa given as kPa",
-}  # fmt: skip
+    1e3: "kPa given as MPa, or Pa as kPa",
+    1e2: "kPa given as bar",
+    1e1: "bar given as MPa",
+    1e-1: "MPa given as bar",
+    1e-2: "bar given as kPa",
+    1e-3: "MPa given as kPa",
+}
 
 
 def pressure_remedy(modulus: float, bounds: tuple[float, float]) -> str:
@@ -93,11 +106,11 @@ def pressure_remedy(modulus: float, bounds: tuple[float, float]) -> str:
         MPa, of the law.
     """
     low, high = bounds
-    inside = [factor for factor in MISTAKES if low <= modulus / factor <= high]
-    if not inside:
+    factors = [factor for factor in MISTAKES if low <= modulus / factor <= high]
+    if not factors:
         return ""
     middle = (low * high) ** 0.5
-    factor = min(inside, key=lambda trial: abs(log(modulus / trial / middle)))
-    how = f"divided by {factor:g}" if factor > 1 else f"multiplied by {1 / factor:g}"
+    factor = min(factors, key=lambda trial: abs(log(modulus / trial / middle)))
+    remedy = f"divided by {factor:g}" if factor > 1 else f"multiplied by {1 / factor:g}"
     corrected = modulus / factor
-    return f" With pressures {how} ({MISTAKES[factor]}) it would be {corrected:.3g} MPa"
+    return f" With pressures {remedy} ({MISTAKES[factor]}) it would be {corrected:.3g} MPa"
